@@ -3,7 +3,7 @@ PY := .venv/bin/python
 STAMPS := build/stamps
 .DEFAULT_GOAL := setup
 
-.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
+.PHONY: setup cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
 	wheel first-hour clean help
 
 ##@ To try it
@@ -62,15 +62,22 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
 test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not alone"
+	@$(MAKE) --no-print-directory test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-computing.log 2>&1 & computing=$$!; \
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
+	wait $$computing; computing=$$?; cat build/test-computing.log; exit $$((waiting + computing))
 	$(PY) -m pytest $(LONGEST) -m alone
 	@$(MAKE) --no-print-directory test-ros
 
-# They mostly wait for arms that move; ROS_JOBS=1 runs one after the other.
-ROS_JOBS ?= 2
+# It fills the time in which the others wait, and leaves them the processor when they want it.
+test-computing: setup  ## tests that wait for nothing: values, protocols, kinematics, simulated steps, training
+	nice -n 5 $(PY) -m pytest $(LONGEST) -m "computing and not alone"
 
-test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, side by side; ROS_JOBS=1: one after the other
-	@$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target) test-ros2 test-ros1
+# They mostly wait for arms that move, so the two parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
+ROS_JOBS ?= 3
+SIDE_BY_SIDE = @$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target)
+
+test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, parts of both side by side; ROS_JOBS=1: one after the other
+	$(SIDE_BY_SIDE) ros2-shared ros1-shared ros2-own ros1-own
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
 	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST) -m "not alone"
@@ -83,12 +90,18 @@ test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 
 	scripts/test_pythons.sh $(PYTHONS)
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
-	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest $(LONGEST) tests/ros2; \
-	else echo "no ROS 2 here: the tests of its node are skipped"; fi
+	$(SIDE_BY_SIDE) ros2-shared ros2-own
 
 test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where there are packages of it
-	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest $(LONGEST) tests/ros1; \
-	else echo "no ROS 1 here: the tests of its node are skipped"; fi
+	$(SIDE_BY_SIDE) ros1-shared ros1-own
+
+# ros1 or ros2, and the part of its suite: see tests/conformance/parts.py
+PARTS := ros2-shared ros2-own ros1-shared ros1-own
+.PHONY: $(PARTS)
+$(PARTS):
+	@ros=$(firstword $(subst -, ,$@)); if [ -x build/$$ros/bin/python ]; then \
+	PART=$(lastword $(subst -, ,$@)) build/$$ros/bin/python -m pytest $(LONGEST) tests/$$ros; \
+	else echo "no ROS $${ros#ros} here: the tests of its node are skipped"; fi
 
 conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each kind of execution
 	@for execution in servo spline fri; do for ros in ros2 ros1; do \

@@ -38,6 +38,7 @@ def outputs() -> dict[Path, str]:
         pages / "protocol-types.md": docs.types(spec),
         pages / "errors.md": docs.errors(spec),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
+        ROOT / "src" / "heptarm" / "fri" / "loop" / "include" / "heptarm_law.h": native.law_header(),
         ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",

@@ -49,6 +49,18 @@ GENERATORS = (
 RUNTIME = ("rosidl_runtime_c", "rcutils")
 
 
+#: What upstream's generators match definitions and descriptions with: by the name alone, which a message and an action
+#: may share, as in control_msgs/GripperCommand.
+_MATCHING = "build_type_description_tuples"
+
+
+def _described(definitions: Sequence[str], descriptions: Sequence[str]) -> list[str]:
+    """Match definitions "folder:msg/Name.idl" with descriptions of the same kind and name."""
+    found = {(path.parent.name, path.stem): path for path in map(Path, descriptions)}
+    relative = [Path(one.rpartition(":")[2]) for one in definitions]
+    return [f"{path}:{found[path.parent.name, path.stem]}" for path in relative]
+
+
 class Package:
     """An interface package to install into the environment.
 
@@ -98,8 +110,11 @@ class Package:
         idl = [f"{folder}:{path.relative_to(folder)}" for path in sorted(folder.rglob("*.idl"))]
         HashTypeDescription("hash").generate_type_hashes(self.name, idl, folders, output_path=folder)
         described = [str(path) for path in sorted(folder.rglob("*.json"))]
-        for module, name, place in GENERATORS:
-            self._run(getattr(importlib.import_module(module), name), place, idl, folders, described)
+        for module_name, name, place in GENERATORS:
+            module = importlib.import_module(module_name)
+            if hasattr(module, _MATCHING):
+                setattr(module, _MATCHING, _described)
+            self._run(getattr(module, name), place, idl, folders, described)
 
     def _run(
         self, kind: Any, place: str, idl: Sequence[str], folders: Sequence[str], described: Sequence[str]

@@ -95,10 +95,9 @@ def _of(tree: ast.Module) -> Iterator[Declared]:
     types = {}  # of ROS: local name to kind and full name
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
-            if node.module == "heptarm.ros.interface.services":
+            if node.module == "heptarm.ros.interface.offered":
                 for row in SERVICES:
                     yield Declared(row.name, "service", row.type)
-            if node.module == "heptarm.ros.interface.topics":
                 for topic in TOPICS:
                     yield Declared(topic.name, "subscribes", topic.type)
             if node.module == "heptarm.ros.interface.actions":

@@ -17,8 +17,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "src")]
 
+from heptarm.sim.plant.appearance import ArmMeshes  # noqa: E402
 from heptarm.sim.plant.plant import Plant  # noqa: E402
 from heptarm.sim.plant.scene import Scene  # noqa: E402
+from heptarm.sim.plant.world import compiled  # noqa: E402
 from heptarm.values.arrays import Array  # noqa: E402
 from heptarm.values.pose import deg  # noqa: E402
 
@@ -32,10 +34,14 @@ def drawn(name: str) -> Array:
     """A scene seen from its right side, shape (height, width, 3)."""
     plant = Plant(q=POSTURE, scene=Scene.of(name))
     plant.step(200)
+    model = compiled("iiwa14", scene=Scene.of(name), meshes=ArmMeshes())
+    data = mujoco.MjData(model)
+    data.qpos[:] = plant.data.qpos
+    mujoco.mj_forward(model, data)
     camera = mujoco.MjvCamera()
     camera.lookat, camera.distance, camera.azimuth, camera.elevation = (0.42, 0.0, 0.32), 1.55, 140.0, -24.0
-    with mujoco.Renderer(plant.model, *SIZE) as renderer:
-        renderer.update_scene(plant.data, camera)
+    with mujoco.Renderer(model, *SIZE) as renderer:
+        renderer.update_scene(data, camera)
         return np.array(renderer.render())
 
 

@@ -46,7 +46,7 @@ if [ $fetched = no ]; then
 fi
 headers=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["include"])')
 [ -e "$headers/Python.h" ] || no "Python's headers are missing (python3-dev)"
-$venv/bin/python scripts/ros2_interfaces.py ros2/interfaces/control_msgs ros2/interfaces/tf2_msgs ros2/heptarm_msgs
+$venv/bin/python scripts/ros2_interfaces.py ros2/interfaces/*/ ros2/heptarm_msgs
 site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
 printf '%s\n' "$PWD/src" "$PWD/ros2/heptarm_ros2" >"$site/heptarm_sources.pth"
 echo "$venv/bin/python has ROS 2 and heptarm_ros2"

@@ -1,8 +1,8 @@
 """The whole suite: its order, and one virtual cabinet for all.
 
 In one process fast tests come first, then slow ones, then those with a browser. Workers of pytest-xdist begin with the
-folders whose tests wait for simulators and other processes, and fill up with the many short files of the rest: so no
-worker is left alone with something long at the end.
+folders whose tests take long, and fill up with the many short files of the rest: so no worker is left alone with
+something long at the end. Tests that only compute run beside them, in the time in which those wait.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry", "tests.browser"]
 
 _LATE = ("slow", "browser")
-#: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
+#: Folders with what takes long.
 _LONG_FIRST = (
     "docs",
     "strangers",
@@ -39,9 +39,9 @@ _LONG_FIRST = (
     "cabinet",
     "cpp",
     "record",
-    "house",
-    "rl",
 )
+#: Folders whose tests wait for no other process.
+_COMPUTING = ("fri", "house", "model", "rl", "schema", "sim", "values", "wire")
 
 # no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)
@@ -55,8 +55,12 @@ def pytest_configure(config: pytest.Config) -> None:
     config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Sorts the tests, and leaves out the long ones; the sort is stable, so files keep their own order."""
+    for item in items:
+        if item.path.parent.name in _COMPUTING:
+            item.add_marker("computing")
     items.sort(key=_folder if hasattr(config, "workerinput") else _rank)
     if not LONG and (long := [item for item in items if item.get_closest_marker("long")]):
         config.hook.pytest_deselected(items=long)

@@ -1,5 +1,6 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
+from . import devices as devices
 from .arm.arm import (
     Arm as Arm,
 )
@@ -18,6 +19,18 @@ from .arm.link.target import (
 from .arm.motion.handle import (
     MotionHandle as MotionHandle,
 )
+from .arm.motion.jog import (
+    TwistServo as TwistServo,
+)
+from .arm.motion.jog import (
+    VelocityServo as VelocityServo,
+)
+from .arm.motion.preview import (
+    LimitApproach as LimitApproach,
+)
+from .arm.motion.preview import (
+    ProgramPreview as ProgramPreview,
+)
 from .arm.motion.servo import (
     JointServo as JointServo,
 )
@@ -26,6 +39,27 @@ from .arm.motion.servo import (
 )
 from .arm.motion.servo import (
     ServoStats as ServoStats,
+)
+from .arm.several import (
+    Arms as Arms,
+)
+from .arm.several import (
+    MotionOfArms as MotionOfArms,
+)
+from .arm.several import (
+    StatesOfArms as StatesOfArms,
+)
+from .arm.several import (
+    connect_all as connect_all,
+)
+from .arm.several import (
+    start_together as start_together,
+)
+from .arm.several import (
+    states_together as states_together,
+)
+from .arm.several import (
+    stop_all as stop_all,
 )
 from .errors import (
     ArrivalError as ArrivalError,
@@ -82,6 +116,9 @@ from .errors import (
     NotReady as NotReady,
 )
 from .errors import (
+    OutsideWorkspace as OutsideWorkspace,
+)
+from .errors import (
     ProtocolError as ProtocolError,
 )
 from .errors import (
@@ -114,6 +151,12 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .fri.loop.compiled import (
+    law as law,
+)
+from .fri.loop.compiled import (
+    law_from as law_from,
+)
 from .record.recorder import (
     Recorder as Recorder,
 )
@@ -140,6 +183,9 @@ from .skills.replay import (
 )
 from .values.clearance import (
     Clearance as Clearance,
+)
+from .values.clearance import (
+    ForeseenCollision as ForeseenCollision,
 )
 from .values.clearance import (
     TouchOnPath as TouchOnPath,
@@ -239,6 +285,9 @@ from .values.tool import (
 )
 from .values.tool import (
     Workpiece as Workpiece,
+)
+from .values.workspace import (
+    Workspace as Workspace,
 )
 
 __version__: str

@@ -12,7 +12,8 @@
     ├── CommandRejected (ValueError)        refused before anything moved
     │   ├── ShapeError                      wrong shape or length
     │   ├── LimitError                      outside a range
-    │   │   └── Unreachable                 no joint position reaches the pose
+    │   │   ├── Unreachable                 no joint position reaches the pose
+    │   │   └── OutsideWorkspace            a command leaves `arm.workspace`
     │   ├── ModeConflict                    conflicts with what is running
     │   ├── CollisionForeseen               `arm.collision_check` found bodies that would touch
     │   └── NotInControl                    this client does not control the robot
@@ -146,6 +147,10 @@ class LimitError(CommandRejected):
 
 class Unreachable(LimitError):
     """No joint position reaches the pose."""
+
+
+class OutsideWorkspace(LimitError):
+    """A command leaves `arm.workspace`; it was not sent."""
 
 
 class ModeConflict(CommandRejected):
@@ -286,6 +291,7 @@ EXTRAS = {
     "viz": ("viser", "matplotlib", "trimesh"),
     "rl": ("torch", "gymnasium", "PIL"),
     "record": ("mcap", "pandas", "pyarrow"),
+    "devices": ("evdev", "pyspacemouse"),
 }
 
 

@@ -42,7 +42,7 @@ START = """
         arm.close()
 """
 FORK = """
-    arm = ha.connect("sim://iiwa14")
+    arm = ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0)
     arm.move(HOME)
     handle = arm.start(FAR)
     arm.wait_until(lambda s: abs(s.dq).max() > 0.1)
@@ -65,7 +65,7 @@ FORK = """
     print("done")
 """
 FORK_IN_BLOCKS = """
-    with ha.connect("sim://iiwa14") as arm:
+    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         with arm.servo(rate=50, watchdog=2.0) as servo:
             servo.set(servo.start.q)
             child = os.fork()
@@ -81,14 +81,14 @@ FORK_IN_BLOCKS = """
 """
 MULTIPROCESSING = """
     def observe(target, results):
-        with ha.connect(target, control=False) as arm:
+        with ha.connect(target, control=False, timeout=30.0) as arm:
             results.put([float(x) for x in arm.state.q])
 
     def inherit(results):
         results.put(refusal(lambda: arm.state))
 
     if __name__ == "__main__":
-        arm = ha.connect("sim://iiwa14")
+        arm = ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0)
         target = f"sim://127.0.0.1:{arm.connection.cabinet.port}"
         arm.move(HOME)
         for method in ("fork", "spawn"):

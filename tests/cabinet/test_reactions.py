@@ -51,11 +51,14 @@ def test_what_no_condition_ends_reports_no_forces(cabinet: FakeCabinet) -> None:
 
 def test_relaxing_takes_its_time_before_the_end(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
-        stays = finish(peer, started(peer, reacting(1.1, None)))
-        finish(peer, started(peer, turn(0.0)))
-        relaxes = finish(peer, started(peer, reacting(1.1, wire.Relax())))
-        assert (relaxes.cause, relaxes.fired) == (CAUSE.CONDITION, 0)
-        assert relaxes.duration > stays.duration + 0.15
+        stays, relaxes = [], []
+        for _ in range(2):  # a busy machine makes one of them longer
+            stays.append(finish(peer, started(peer, reacting(1.1, None))))
+            finish(peer, started(peer, turn(0.0)))
+            relaxes.append(finish(peer, started(peer, reacting(1.1, wire.Relax()))))
+            finish(peer, started(peer, turn(0.0)))
+        assert {(one.cause, one.fired) for one in relaxes} == {(CAUSE.CONDITION, 0)}
+        assert min(one.duration for one in relaxes) > min(one.duration for one in stays) + 0.15
 
 
 @pytest.mark.parametrize("node", [PUSHED, CORE])

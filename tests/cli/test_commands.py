@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from heptarm.wire.messages import MAJOR, MINOR
@@ -128,7 +129,24 @@ def test_dry_run_moves_nothing(target: str) -> None:
         "move", "ptp", "50", "30", "0", "-90", "0", "60", "0", "--deg", "--dry-run", "--target", target
     )
     (after,) = objects("state", "--target", target)
-    assert done.returncode == 0 and "nothing was moved" in done.stdout
+    assert done.returncode == 0 and "nothing was moved" in done.stdout and "at full override" in done.stdout
+    assert after["q"] == pytest.approx(before["q"], abs=1e-6)
+
+
+def test_plan_reports_limits_and_collisions_and_moves_nothing(target: str, tmp_path: Path) -> None:
+    (before,) = objects("state", "--target", target)
+    words = ("plan", "ptp", "0", "90", "0", "-30", "0", "60", "0", "--deg", "--speed", "0.5")
+    (ahead,) = objects(*words, "--out", str(tmp_path / "plan.svg"), "--target", target)
+    assert ahead["closest"]["velocity"]["fraction"] == pytest.approx(0.5, abs=0.02)
+    assert ahead["duration_s"] > 0.5 and (tmp_path / "plan.svg").stat().st_size > 1000
+    assert ahead["checked"] is False and ahead["end_q"] == pytest.approx(
+        np.radians([0, 90, 0, -30, 0, 60, 0])
+    )
+    done = run(*words, "--box", "0.6,0,0.1,0.6,0.8,0.2", "--target", target)
+    assert done.returncode == 1 and re.search(r"collisions .*link_\d .*box 0 after", done.stdout)
+    refused = run("plan", "lin-rel", "--x", "3", "--target", target)
+    assert refused.returncode == 1 and "not reachable" in refused.stderr
+    (after,) = objects("state", "--target", target)
     assert after["q"] == pytest.approx(before["q"], abs=1e-6)
 
 

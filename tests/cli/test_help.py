@@ -147,7 +147,7 @@ def test_progress_of_a_known_time() -> None:
 def test_a_view_without_viser_is_one_sentence() -> None:
     program = (
         "import sys\nsys.modules['viser'] = None\n"
-        "from heptarm.sim.runtime.view import main\nsys.exit(main(['--target', 'sim://localhost:1']))"
+        "from heptarm.panel.process import main\nsys.exit(main(['--target', 'sim://localhost:1']))"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False

@@ -47,6 +47,8 @@ WITHOUT_A_CONNECTION = {
 ARGUMENTS = {
     "move ptp": "0 0 0 0 0 0 0",
     "move lin": "0.5 0 0.5 0 0 0",
+    "plan ptp": "0 0 0 0 0 0 0",
+    "plan lin": "0.5 0 0.5 0 0 0",
     "teach": "{folder}/taught.npz",
     "replay": "{folder}/recorded.npz",
     "bench": "--fri",
@@ -101,7 +103,9 @@ def test_every_command_names_its_target_and_its_key_in_one_way() -> None:
     for name in CONNECTING:
         arguments = EVERY[name].assemble_argument_collection()
         kinds = [argument.hint for argument in arguments]
-        assert options.CommandTarget in kinds, f"heptarm {name} connects without cli.options.CommandTarget"
+        assert {options.CommandTarget, options.CommandTargets} & set(kinds), (
+            f"heptarm {name} connects without cli.options.CommandTarget"
+        )
         names = {one for argument in arguments for one in argument.names}
         assert {"--target", "--key-file"} <= names, name
 

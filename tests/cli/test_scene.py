@@ -50,7 +50,7 @@ class Canvas:
 
 
 def test_every_shape_of_arm_and_scene_is_drawn_and_moves_with_its_body(tmp_path: Path) -> None:
-    from heptarm.sim.runtime.view import DrawnWorld
+    from heptarm.panel.drawing import DrawnWorld
 
     plant = Plant(q=(0.0, 0.4, 0.0, -1.5, 0.0, 1.1, 0.0), scene=Scene.of("table"))
     file, canvas = tmp_path / "positions", Canvas()
@@ -73,7 +73,7 @@ def test_every_shape_of_arm_and_scene_is_drawn_and_moves_with_its_body(tmp_path:
 
 
 def test_shapes_of_every_kind_are_drawn(tmp_path: Path) -> None:
-    from heptarm.sim.runtime.view import DrawnWorld
+    from heptarm.panel.drawing import DrawnWorld
 
     file = tmp_path / "shapes.xml"
     file.write_text(

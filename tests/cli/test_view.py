@@ -10,9 +10,23 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from tests.cli.running import sim
+from tests.cli.running import run, sim
 
 pytest.importorskip("viser")
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--meshes", "."), "--meshes needs --view"),
+        (("--view", "--meshes", "/nowhere"), "meshes must be a folder with link_0.stl to link_7.stl"),
+        (("--fri", "2.5", "--meshes", "."), "--meshes cannot be used with --fri"),
+        (("--app", ".", "--meshes", "."), "--meshes cannot be used with --app"),
+    ],
+)
+def test_meshes_that_nobody_could_see_are_refused(words: tuple[str, ...], text: str) -> None:
+    done = run("sim", *words)
+    assert done.returncode != 0 and text in done.stderr
 
 
 def _picture(browser: object) -> np.ndarray:
@@ -45,7 +59,10 @@ def _settled(browser: object, patience: float = 60.0) -> np.ndarray:
 
 @pytest.mark.browser
 def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) -> None:
-    with sim("--view", "--view-port", "0") as ready:
+    own = Path(ha.__file__).parent / "sim" / "models" / "meshes"
+    for part in [*(own / "lbr").iterdir(), *(own / "iiwa14").iterdir()]:
+        (tmp_path / part.name).write_bytes(part.read_bytes())
+    with sim("--view", "--view-port", "0", "--meshes", str(tmp_path)) as ready:
         browser.get(ready["view"])
         first = _settled(browser)
         browser.save_screenshot(str(tmp_path / "view.png"))

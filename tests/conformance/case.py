@@ -20,6 +20,7 @@ CASES: dict[str, Case] = {}
 
 _OWN_BRAKES = "a motion of the cabinet brakes by the cabinet's own limits"
 _PLANNED = "a spline of the cabinet is planned as a whole, so it cannot be extended"
+_SPEEDS = "a spline of the cabinet has speeds and no times"
 _AT_REST = "a spline of the cabinet ends at rest, so such a goal is refused"
 #: Cases that do not apply to an execution, and why.
 UNFIT: dict[str, dict[str, str]] = {
@@ -44,6 +45,11 @@ UNFIT: dict[str, dict[str, str]] = {
         "a_stream_of_some_joints_where_it_is_allowed": _PLANNED,
         "deactivating_ends_a_stream": _PLANNED,
         "an_old_window_is_left_out": _PLANNED,
+        "velocities_of_feedback_belong_to_its_positions": _SPEEDS,
+        "at_half_the_speed_trajectory_time_is_half_of_the_time_that_passed": _SPEEDS,
+        "a_stream_that_comes_in_pairs_is_followed_to_its_end": _PLANNED,
+        "a_stream_of_one_position_holds_the_arm": _PLANNED,
+        "a_stream_may_follow_a_cancelled_goal": _PLANNED,
         "an_end_that_moves_where_it_is_allowed": _AT_REST,
         "an_end_that_moves_succeeds_with_the_default_tolerances": _AT_REST,
         "an_end_that_moves_may_be_followed_by_a_goal": _AT_REST,

@@ -19,7 +19,16 @@ _EVERYWHERE = (
     "an_empty_trajectory_on_the_topic_does_as_upstreams_controller",
 )
 
-for _topic in ("refusals", "arrivals", "interruptions", "deviations", "surroundings", "instants", "streams"):
+for _topic in (
+    "refusals",
+    "arrivals",
+    "interruptions",
+    "deviations",
+    "surroundings",
+    "instants",
+    "streams",
+    "lifetimes",
+):
     importlib.import_module(f"tests.conformance.{_topic}")
 
 

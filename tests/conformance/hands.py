@@ -281,6 +281,49 @@ def case_somebody_taps_the_arm(probe: Probe, stage: Stage) -> None:
     refused(act(probe, "wait_for_taps", "WaitForTaps", force=9999.0), "force")
 
 
+# --------------------------------------------------------------------------------------------- gripper
+
+
+def fingers(stage: Stage, *, opened: bool, closed: bool) -> None:
+    """Set the end switches of the gripper."""
+    stage.do(f"set Hand.Opened {str(opened).lower()}")
+    stage.do(f"set Hand.Closed {str(closed).lower()}")
+
+
+def grip(probe: Probe, position: float) -> Sent:
+    command = probe.make("control_msgs/GripperCommand", position=position)
+    return probe.send("gripper_cmd", "control_msgs/GripperCommand", command=command)
+
+
+def case_a_gripper_closes_on_something_and_opens(probe: Probe, stage: Stage) -> None:
+    fingers(stage, opened=True, closed=False)
+    opened = grip(probe, 0.1).end()
+    assert opened.reached_goal and not opened.stalled and opened.position == 0.1
+    sent = grip(probe, 0.0)
+    until(lambda: sent.reported, "no feedback")
+    fingers(stage, opened=False, closed=False)
+    held = sent.end()
+    assert held.stalled and not held.reached_goal and math.isnan(held.position)
+    values = done(probe.call("signals", "GetSignals"))
+    assert dict(zip(values.names, values.values))["Hand.Shut"] == 1.0
+    fingers(stage, opened=False, closed=True)
+    empty = grip(probe, 0.0).end()
+    assert empty.reached_goal and not empty.stalled and empty.position == 0.0
+
+
+def case_a_gripper_goal_ends_without_its_switches(probe: Probe, stage: Stage) -> None:
+    fingers(stage, opened=False, closed=False)
+    late = grip(probe, 0.1).end()  # without air
+    assert not late.reached_goal and not late.stalled
+    replaced, sent = grip(probe, 0.1), grip(probe, 0.1)
+    assert not replaced.end().reached_goal
+    sent.cancel()
+    assert not sent.end().reached_goal
+    assert not grip(probe, math.nan).end().reached_goal
+    fingers(stage, opened=True, closed=False)
+    assert grip(probe, 0.1).end().reached_goal
+
+
 #: All cases by name.
 CASES: dict[str, Callable[[Probe, Stage], None]] = {
     name.removeprefix("case_"): case for name, case in list(globals().items()) if name.startswith("case_")

@@ -28,7 +28,7 @@ from tests.conformance.case import (
 from tests.conformance.client import Client, SentGoal
 
 #: The swing of A7 [rad] and its duration [s].
-SWING, DURATION = 0.3, 4.0
+SWING, DURATION = 0.3, 3.0
 #: Largest lag [s], and largest error of the speed, a fraction of its peak.
 LAG, SPEED = 0.04, 0.05
 #: How far ahead the windows of MoveIt Servo reach, its parameter `max_expected_latency` [s].

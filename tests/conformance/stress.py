@@ -36,7 +36,7 @@ def status(pid: int, name: str) -> int:
     return int(next(line for line in lines if line.startswith(f"{name}:")).split()[1])
 
 
-def preempted_often(client: Client, *, count: int = 50, seconds: float = 5.0) -> None:
+def preempted_often(client: Client, *, count: int = 50, seconds: float = 2.5) -> None:
     """Each goal takes the place of the one before: every end has a name, and only the last one succeeds."""
     here = rests(client)
     path = swing(client)

@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from heptarm.errors import ShapeError
@@ -37,12 +38,14 @@ class Bench:
         wire: Version = Version.V1_15,
         law: Law | None = None,
         policy: Policy | None = None,
+        memory: npt.NDArray[np.float64] | None = None,
         **params: object,
     ) -> None:
         values, schema = Params.flat(params)  # type: ignore[arg-type]
-        block = MemoryBlock(at.Layout.words(history=256, params=values.size))
+        remembered = 0 if memory is None else memory.size
+        block = MemoryBlock(at.Layout.words(history=256, params=values.size, memory=remembered))
         block.unlink()
-        self.layout = at.Layout(block, history=256, params=values.size)
+        self.layout = at.Layout(block, history=256, params=values.size, memory=remembered)
         self.layout.params.write(values)
         policy = policy or (Policy(Missing.HOLD, patience=1e6) if law is None else Policy())
         self.cycle = Cycle(
@@ -52,6 +55,7 @@ class Bench:
             policy=policy,
             law=law,
             params=Params(np.zeros(values.size), schema),
+            memory_values=None if memory is None else memory.copy(),
         )
         self.controller = Controller(9, wire=wire, period_ms=1)
         self.controller._sock.close()

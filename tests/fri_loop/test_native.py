@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.native import HANDBACK, LAW, Native, Unavailable, library
+from heptarm.fri.loop.native import HANDBACK, LAW, Native, library
 from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
+from heptarm.io.compiled import Unavailable
 from tests.long import longer
 
 from .controller import IPO
@@ -80,8 +81,9 @@ class Twins:
             return raw
         self.plain += 1
         if size == LAW:
-            states = bench.layout.states
-            bench.cycle.call_law(State(states.floats[states.count % len(states.ints)]), self.out, bench.now)
+            states, dq = bench.layout.states, np.frombuffer(native.memory.dq)
+            state = State(states.floats[states.count % len(states.ints)], dq=dq)
+            bench.cycle.call_law(state, self.out, bench.now)
             native.memory.is_ending = bench.cycle.is_ending
             size = native.answer()
         native.finish(bench.now + 30_000)

@@ -1,4 +1,4 @@
-"""Collisions foreseen: known postures, paths through a table, what the arm holds, and the paths of motions."""
+"""Collisions foreseen: known postures, paths through a table, what the arm holds."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ import pytest
 
 import heptarm as ha
 from heptarm import model
-from heptarm.model.joint_path import PathGeometry, joint_paths
-from heptarm.values.motion.motion import Motion
+from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
 
 IIWA = robot("iiwa14")
-ORIGIN = Pose.at()
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 TABLE = "0.6,0,0.1,0.4,0.8,0.2"
-GEOMETRY = PathGeometry(IIWA, lambda name: ORIGIN, lambda name: ORIGIN if name == "base" else None)
+
+
+def vertical(start: Array, dz: float) -> Array:
+    """Joint positions along a vertical line of the flange, shape (n, 7) [rad]."""
+    pose, path = Pose.from_matrix(model.forward(IIWA, start)), [start]
+    for height in np.linspace(0.0, dz, max(2, round(abs(dz) / 0.01)))[1:]:
+        path.append(model.solve(IIWA, Pose(pose.xyz + [0.0, 0.0, height], pose.quat), near=path[-1].tolist()))
+    return np.array(path)
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +72,7 @@ def test_a_clearance_is_the_distance_of_the_shapes(bare: ha.CollisionModel) -> N
 
 def test_a_path_through_the_table_is_found_where_it_enters(bare: ha.CollisionModel) -> None:
     above = model.solve(IIWA, Pose.of((0.6, 0.0, 0.4), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
-    down = joint_paths(GEOMETRY, above, [ha.lin_rel(z=-0.3, frame="base")])[0]
+    down = vertical(above, -0.3)
     found = bare.first_on(down)
     assert found is not None and found.clearance.second == "box 0"
     height = model.forward(IIWA, found.q)[2, 3]
@@ -79,7 +84,7 @@ def test_a_path_through_the_table_is_found_where_it_enters(bare: ha.CollisionMod
 def test_a_contact_may_be_left_but_not_deepened(bare: ha.CollisionModel) -> None:
     inside = model.solve(IIWA, Pose.of((0.6, 0.0, 0.198), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
     assert bare.touching(inside)
-    up, deeper = (joint_paths(GEOMETRY, inside, [ha.lin_rel(z=z, frame="base")])[0] for z in (0.1, -0.02))
+    up, deeper = vertical(inside, 0.1), vertical(inside, -0.02)
     assert bare.first_on(up) is None
     assert bare.first_on(deeper) is not None
     assert bare.first_on(np.concatenate([up, up[::-1]])) is not None  # what was left counts again
@@ -143,46 +148,3 @@ def test_the_model_agrees_with_contacts_of_the_simulated_arm() -> None:
             assert bool(arm.touching(q)) == (deepest < 0.0)
         touching += deepest < 0.0
     assert 20 < touching < 280
-
-
-@pytest.mark.parametrize(
-    "motion",
-    [
-        ha.ptp(deg(20, 40, 0, -80, 0, 60, 10)),
-        ha.ptp(Pose.of((0.5, 0.2, 0.4), (0.0, 1.0, 0.0, 0.0))),
-        ha.lin(Pose.of((0.5, 0.2, 0.4), (0.0, 1.0, 0.0, 0.0))),
-        ha.lin_rel(x=0.05, z=-0.05, a=0.3),
-        ha.lin_rel(y=0.1, frame="base"),
-        ha.circ(Pose.of((0.55, 0.1, 0.5), (0, 1, 0, 0)), Pose.of((0.6, 0.0, 0.45), (0, 1, 0, 0))),
-        ha.spline([Pose.of((0.5, 0.1, 0.4), (0, 1, 0, 0)), Pose.of((0.6, 0.1, 0.4), (0, 1, 0, 0))]),
-        ha.spline_joints([deg(10, 30, 0, -90, 0, 60, 0), deg(20, 30, 0, -90, 0, 60, 0)]),
-        ha.ptp_home(),
-        ha.hold(1.0),
-        ha.hand_guide(),
-    ],
-    ids=lambda motion: type(motion).__name__,
-)
-def test_every_motion_has_a_joint_path(motion: Motion) -> None:
-    path = GEOMETRY.joint_path(HOME, motion)
-    assert path.shape[1] == 7 and np.array_equal(path[0], HOME)
-    if type(motion).__name__ in ("Lin", "LinRel", "Circ", "Spline"):
-        assert len(path) > 5 and np.abs(np.diff(path, axis=0)).max() < 0.2
-
-
-def test_an_arc_goes_around_its_centre() -> None:
-    start = Pose.from_matrix(model.forward(IIWA, HOME))
-    centre = start.xyz - (0.05, 0.0, 0.0)
-    via, end = (
-        Pose.of(centre + 0.05 * np.array(at), start.quat) for at in ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
-    )
-    path = GEOMETRY.joint_path(HOME, ha.circ(via, end))
-    radii = [np.linalg.norm(model.forward(IIWA, q)[:3, 3] - centre) for q in path]
-    assert radii == pytest.approx([0.05] * len(path), abs=1e-6)
-    assert any(model.forward(IIWA, q)[1, 3] > start.y + 0.0475 for q in path)
-    assert model.forward(IIWA, path[-1])[:3, 3] == pytest.approx(end.xyz, abs=1e-6)
-
-
-def test_motions_follow_each_other() -> None:
-    first, second = joint_paths(GEOMETRY, HOME, [ha.lin_rel(z=0.1), ha.lin_rel(z=-0.1)])
-    assert np.array_equal(first[-1], second[0])
-    assert second[-1] == pytest.approx(HOME, abs=1e-6)

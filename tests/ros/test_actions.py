@@ -53,4 +53,4 @@ def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> No
 
 
 def test_names_of_actions_are_unique() -> None:
-    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 9
+    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 10

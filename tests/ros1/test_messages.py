@@ -15,6 +15,8 @@ SUMS = {
     "FollowJointTrajectoryFeedback": "10817c60c2486ef6b33e97dcd87f4474",
     "JointTrajectoryControllerState": "10817c60c2486ef6b33e97dcd87f4474",
     "JointJog": "1685da700c8c2e1254afc92a5fb89c96",
+    "GripperCommandAction": "950b2a6ebe831f5d4f4ceaba3d8be01e",
+    "GripperCommand": "680acaff79486f017132a7f198d40f08",
     "JointTolerance": "f544fe9c16cf04547e135dd6063ff5be",
 }
 

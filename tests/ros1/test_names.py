@@ -1,23 +1,23 @@
-"""Programs written for other drivers: their topics and actions, as far as their types are standard."""
+"""Programs written for other drivers, with those drivers' own types."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 
 import actionlib
 import numpy as np
 import pytest
 import rospy
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
-from geometry_msgs.msg import Pose, Wrench
 from heptarm_msgs.msg import Status
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from heptarm.ros.interface.names import PRESETS
+from tests.conformance import names
 from tests.conformance.stage import Stage
 from tests.ros1.peer import NodeProcess, active, collect, publisher, until
+from tests.ros1.test_surface import Client
 
 JOINTS = [f"iiwa_joint_{i}" for i in range(1, 8)]
 
@@ -35,28 +35,30 @@ def arrives(states: list[JointState], joint: int, value: float) -> None:
     until(lambda: abs(states[-1].position[joint] - value) < 2e-3, f"joint {joint} does not arrive")
 
 
-def test_a_program_for_libiiwa(ros: None, spare: Stage) -> None:
-    node, states = started(spare, "libiiwa")
-    poses = collect("/libiiwa/iiwa/state/end_effector_pose", Pose)
-    wrenches = collect("/libiiwa/iiwa/state/end_effector_wrench", Wrench)
-    until(lambda: poses and wrenches, "no pose comes")
-    joint = publisher("/libiiwa/iiwa/command/joint", JointState)
-    stop = publisher("/libiiwa/iiwa/command/stop", Empty)
-    joint.publish(JointState(position=[math.nan] * 6 + [0.3]))  # NaN keeps
-    arrives(states, 6, 0.3)
-    joint.publish(JointState(name=["iiwa_joint_2"], position=[0.2]))
-    arrives(states, 1, 0.2)
-    height = poses[-1].position.z - 0.05
-    target = Pose()
-    target.position.x, target.position.y, target.position.z = math.nan, math.nan, height
-    publisher("/libiiwa/iiwa/command/cartesian", Pose).publish(target)  # no orientation keeps it
-    until(lambda: abs(poses[-1].position.z - height) < 2e-3, "the flange does not arrive")
-    joint.publish(JointState(name=["iiwa_joint_1"], position=[2.8]))
-    until(lambda: states[-1].velocity[0] > 0.1, "the arm does not set out")
-    stop.publish(Empty())
-    until(lambda: abs(states[-1].velocity[0]) < 1e-3, "the arm does not stop")
-    assert states[-1].position[0] < 2.7
+@pytest.fixture(scope="module")
+def libiiwa(ros: None, spare: Stage) -> Iterator[Client]:
+    node = NodeProcess(spare.target, ns="/libiiwa", names="libiiwa", speed=0.6)
+    yield Client("/libiiwa")
+    assert node.end() == 0, node.said
+
+
+def test_a_program_for_libiiwa(libiiwa: Client) -> None:
+    names.a_program_for_libiiwa(libiiwa)
+
+
+def test_a_stream_for_libiiwa(libiiwa: Client) -> None:
+    names.servo_of_libiiwa(libiiwa)
+
+
+def test_a_trajectory_for_libiiwa(libiiwa: Client) -> None:
+    states = libiiwa.listen("iiwa/state/joint_states", "sensor_msgs/JointState")
+    until(lambda: states, "no states come")
     follow("/libiiwa/iiwa_controller/follow_joint_trajectory", states)
+
+
+def test_a_program_for_lbr_stack(ros: None, spare: Stage) -> None:
+    node = NodeProcess(spare.target, ns="/other", names="lbr_stack")
+    names.a_program_for_lbr_stack(Client("/other"))
     assert node.end() == 0, node.said
 
 
@@ -93,5 +95,5 @@ def follow(name: str, states: list[JointState]) -> None:
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_presets_name_a_topic_once(preset: str) -> None:
-    names = [entry.name for entry in PRESETS[preset].entries]
-    assert len(set(names)) == len(names)
+    given = [entry.name for entry in PRESETS[preset].entries]
+    assert len(set(given)) == len(given)

@@ -36,26 +36,30 @@ class Sent:
 
 
 class Client:
-    """A probe of ROS 1."""
+    """A probe of ROS 1; names are relative to that of a node, or to a namespace."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = NAME) -> None:
+        self._name = name
         self._publishers: dict[str, rospy.Publisher] = {}
 
+    def _full(self, name: str) -> str:
+        return name if name.startswith("/") else f"{self._name}/{name}"
+
     def call(self, name: str, kind: str, /, **request: Any) -> Any:
-        return call(f"{NAME}/{name}", found(kind, "srv"), **request)
+        return call(self._full(name), found(kind, "srv"), **request)
 
     def send(self, name: str, kind: str, /, **goal: Any) -> Sent:
-        client = actionlib.ActionClient(f"{NAME}/{name}", found(f"{kind}Action", "msg"))
+        client = actionlib.ActionClient(self._full(name), found(f"{kind}Action", "msg"))
         assert client.wait_for_action_server_to_start(rospy.Duration(60))
         return Sent(client, found(f"{kind}Goal", "msg")(**goal))
 
     def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
-        return collect(f"/surface{name}" if name == "/joint_states" else full(name), found(kind, "msg"))
+        return collect(f"/surface{name}" if name == "/joint_states" else self._full(name), found(kind, "msg"))
 
     def tell(self, name: str, kind: str, /, **message: Any) -> Callable[[], None]:
         made = found(kind, "msg")(**message)
         if name not in self._publishers:
-            self._publishers[name] = publisher(full(name), type(made))
+            self._publishers[name] = publisher(self._full(name), type(made))
         return lambda: self._publishers[name].publish(made)
 
     def make(self, kind: str, /, **fields: Any) -> Any:
@@ -75,10 +79,6 @@ class Client:
             return self.call("query_state", "control_msgs/QueryTrajectoryState")
         except rospy.ServiceException:  # the type has no field for that
             return None
-
-
-def full(name: str) -> str:
-    return name if name.startswith("/") else f"{NAME}/{name}"
 
 
 def found(kind: str, part: str) -> Any:

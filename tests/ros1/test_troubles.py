@@ -111,7 +111,7 @@ def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: Nod
     sent = other.send(step(other, time=9.0, size=6.0))
     until(lambda: other.feedback(sent), "the goal does not begin")
     spare_node.process.send_signal(signal.SIGSTOP)
-    time.sleep(2.0)
+    time.sleep(1.5)
     spare_node.process.send_signal(signal.SIGCONT)
     ended = other.result(sent)
     assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended
@@ -125,9 +125,9 @@ def step_anywhere(client: Client):
     return TrajectoryGoal(client.joints, (TrajectoryPoint(5.0, (0.0,) * 7),))
 
 
-def test_without_a_cabinet_or_with_a_wrong_parameter_it_waits_and_reports_it(ros: None, stage: Stage) -> None:
+def test_without_a_cabinet_or_with_a_wrong_parameter_it_waits_and_reports_it(ros: None, spare: Stage) -> None:
     lonely = NodeProcess("127.0.0.1:9", name="lonely")
-    wrong = NodeProcess(stage.target, name="wrong", servo__rate=-3)
+    wrong = NodeProcess(spare.target, name="wrong", servo__rate=-3)
     lonely.waits_for("not configured")
     wrong.waits_for("servo.rate must be in [1, 500], got -3")
     assert lonely.end() == 0, lonely.said

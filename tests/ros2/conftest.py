@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.conformance import parts
 from tests.conformance.stage import Stage
 
 if TYPE_CHECKING:
@@ -44,6 +45,11 @@ os.environ.pop("HEPTARM_TARGET", None)
 def pytest_configure(config: pytest.Config) -> None:
     """Lets the message generators, which rclpy imports, use deprecated features of Python."""
     config.addinivalue_line("filterwarnings", "ignore:module 'sre_:DeprecationWarning")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the tests of the other part, where the environment selects one."""
+    parts.select(config, items)
 
 
 def pytest_unconfigure() -> None:

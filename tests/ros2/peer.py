@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -70,22 +70,23 @@ def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
 
 
 class NodeProcess:
-    """The node as users start it, with parameters, in a process of its own."""
+    """The node as users start it, with parameters or the words of a launch file, in a process of its own."""
 
-    def __init__(self, target: str, *, name: str = "heptarm", space: str = "/", **values: object) -> None:
+    def __init__(
+        self,
+        target: str,
+        *,
+        name: str = "heptarm",
+        space: str = "/",
+        words: Sequence[str] = (),
+        **values: object,
+    ) -> None:
         self.log = Path(tempfile.mkstemp(prefix="node-", suffix=".log")[1])
-        command = [
-            sys.executable,
-            "-m",
-            "heptarm_ros2.main",
-            "--ros-args",
-            "-r",
-            f"__node:={name}",
-            "-r",
-            f"__ns:={space}",
-        ]
-        for key, value in ({"target": target} | values).items():
-            command += ["-p", f"{key.replace('__', '.')}:={value}"]
+        command = [sys.executable, "-m", "heptarm_ros2.main"]
+        command += words or ["--ros-args", "-r", f"__node:={name}", "-r", f"__ns:={space}"]
+        if not words:
+            for key, value in ({"target": target} | values).items():
+                command += ["-p", f"{key.replace('__', '.')}:={value}"]
         with self.log.open("w") as log:
             self.process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
 

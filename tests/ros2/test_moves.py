@@ -1,9 +1,7 @@
-"""Single motions as actions, and the names of other drivers."""
+"""Single motions as actions."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,12 +9,9 @@ import pytest
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Pose, PoseStamped
 from heptarm_msgs.action import MoveJoints, MovePose
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Empty
 
 from tests.conformance.case import rests
-from tests.conformance.stage import Stage
-from tests.ros2.peer import Client, NodeProcess, Ros, fresh, until
+from tests.ros2.peer import Client, Ros, fresh, until
 
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
 
@@ -79,22 +74,3 @@ def test_cancelling_brakes_and_a_senseless_motion_is_aborted_in_words(
     assert rests(client)[0] < here[0] + 1.9
     status, result = joints.end(joints.start(joint_names=["elbow"], position=[0.0]))
     assert status == GoalStatus.STATUS_ABORTED and "elbow" in result.message
-
-
-def test_a_program_for_libiiwa(ros: Ros, spare: Stage, nodes: Callable[..., NodeProcess]) -> None:
-    nodes(spare.target, space="/libiiwa", names="libiiwa")
-    states = ros.collect(JointState, "/libiiwa/iiwa/state/joint_states")
-    poses = ros.collect(Pose, "/libiiwa/iiwa/state/end_effector_pose")
-    until(lambda: states and poses, "no states come")
-    assert states[-1].name == [f"iiwa_joint_{i}" for i in range(1, 8)]
-    command = ros.node.create_publisher(JointState, "/libiiwa/iiwa/command/joint", 1)
-    stop = ros.node.create_publisher(Empty, "/libiiwa/iiwa/command/stop", 1)
-    until(lambda: command.get_subscription_count() and stop.get_subscription_count(), "nobody listens")
-
-    def moved() -> bool:
-        command.publish(JointState(position=[math.nan] * 6 + [0.3]))
-        return abs(states[-1].position[6]) > 0.02
-
-    until(moved, "the arm does not move")  # the node may not be active yet
-    until(lambda: abs(states[-1].position[6] - 0.3) < 2e-3, "the joint does not arrive")
-    stop.publish(Empty())

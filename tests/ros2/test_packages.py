@@ -22,18 +22,23 @@ import yaml
 from sensor_msgs.msg import JointState
 
 from heptarm.model.kinematics import forward
+from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.services import SERVICES
+from heptarm.ros.interface.topics import TOPICS
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, joint_parameters
 from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.stream import is_streamed
 from heptarm.values.robot import ROBOTS
 from tests.conformance.stage import Stage
 from tests.interrupts import ctrl_c_interrupts
-from tests.ros2.peer import Ros, until
+from tests.ros2.launching import LaunchedNode, describe, flat, parameters_of
+from tests.ros2.peer import NodeProcess, Ros, until
 
 ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "ros2"
 URDF = ROS2 / "heptarm_description" / "urdf"
 PACKAGES = ("heptarm_bringup", "heptarm_description", "heptarm_moveit_config", "heptarm_msgs", "heptarm_ros2")
+CONTROLLERS = ROS2 / "heptarm_bringup" / "config" / "controllers.yaml"
 LAUNCHES = sorted(ROS2.glob("*/launch/*.xml"))
 
 
@@ -136,7 +141,8 @@ def test_ros2_control_over_the_nodes_topics(control: str, plugin: str) -> None:
     assert block is not None and block.findtext("hardware/plugin") == plugin
     assert [joint.get("name") for joint in block.findall("joint")] == [f"left_A{i}" for i in range(1, 8)]
     for joint in block.findall("joint"):
-        assert [e.get("name") for e in joint.findall("command_interface")] == ["position"]
+        commands = [e.get("name") for e in joint.findall("command_interface")]
+        assert commands == (["position", "velocity"] if control == "mock" else ["position"])
         assert [e.get("name") for e in joint.findall("state_interface")] == ["position", "velocity"]
     topics = {param.get("name"): param.text for param in block.findall("hardware/param")}
     if control == "topic":
@@ -153,6 +159,30 @@ def test_the_numbers_are_written_by_their_script() -> None:
 
 
 # ---------------------------------------------------------------------------------------- packages
+
+
+@pytest.mark.parametrize(
+    "path", sorted(ROOT.glob("ros[12]/heptarm_*/package.xml")), ids=lambda path: path.parent.name
+)
+def test_a_package_can_be_released(path: Path) -> None:
+    manifest = ET.parse(path).getroot()
+    assert {url.get("type") for url in manifest.findall("url")} == {"website", "repository", "bugtracker"}
+    version = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.M)
+    assert version is None or manifest.findtext("version") == version.group(1)
+    log = (path.parent / "CHANGELOG.rst").read_text().splitlines()
+    assert log[1] == f"Changelog for package {path.parent.name}" and "Forthcoming" in log
+
+
+def test_the_node_depends_on_every_package_it_imports() -> None:
+    for name, folder in (("ros2/heptarm_ros2", "heptarm_ros2"), ("ros1/heptarm_ros1", "src/heptarm_ros1")):
+        manifest = ET.parse(ROOT / name / "package.xml").getroot()
+        declared = {one.text for one in manifest if one.tag.endswith("depend")}
+        text = "\n".join(path.read_text() for path in (ROOT / name / folder).glob("*.py"))
+        used = set(re.findall(r"^\s*(?:from|import) (\w+)(?:\.(?:msg|srv|action))? ?", text, re.M))
+        used |= {row.type.partition("/")[0] for row in (*SERVICES, *TOPICS, *ACTIONS)}
+        ours = {"heptarm", Path(name).name, "__future__", *sys.stdlib_module_names}
+        keys = {"numpy": "python3-numpy"}
+        assert {keys.get(one, one) for one in used - ours} <= declared
 
 
 @pytest.mark.parametrize("name", PACKAGES)
@@ -196,10 +226,18 @@ def test_upstreams_interfaces_are_upstreams() -> None:
 # ------------------------------------------------------------------------------------ launch files
 
 
+def arguments(path: Path) -> dict[str, tuple[str, str]]:
+    """Arguments of a launch file in Python: default and description."""
+    for one in ast.parse(path.read_text()).body:
+        if isinstance(one, ast.Assign) and getattr(one.targets[0], "id", "") == "ARGUMENTS":
+            return dict(ast.literal_eval(one.value))
+    raise AssertionError(f"{path.name} has no ARGUMENTS")
+
+
 @pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.name)
 def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path) -> None:
     launch = ET.parse(path).getroot()
-    declared = {arg.get("name") for arg in launch.findall("arg")}
+    declared = {arg.get("name") for arg in (*launch.findall("arg"), *launch.findall("let"))}
     assert all(arg.get("description") for arg in launch.findall("arg"))
     assert set(re.findall(r"\$\(var (\w+)\)", path.read_text())) <= declared
     known = {one.name for one in (*PARAMETERS, *joint_parameters([f"A{i}" for i in range(1, 8)]))}
@@ -213,16 +251,13 @@ def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path
     for package, rest in re.findall(r"\$\(find-pkg-share (\w+)\)(/[\w/.]+)", path.read_text()):
         assert (ROS2 / package / rest[1:]).is_file(), rest
     for include in launch.iter("include"):
-        inner = ET.parse(ROS2 / "heptarm_bringup" / "launch" / Path(include.get("file", "")).name).getroot()
+        (inner,) = ROS2.glob(f"*/launch/{Path(include.get('file', '')).name}")
         given = {arg.get("name") for arg in include.findall("arg")}
-        assert given <= {arg.get("name") for arg in inner.findall("arg")}
-
-
-def flat(values: dict[str, Any], before: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name, value in values.items():
-        found |= flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
-    return found
+        if inner.suffix == ".py":
+            assert given <= arguments(inner).keys()
+        else:
+            found = ET.parse(inner).getroot()
+            assert given <= {arg.get("name") for arg in found.findall("arg")}
 
 
 def test_the_nodes_parameter_file_has_its_defaults() -> None:
@@ -236,11 +271,10 @@ def test_the_nodes_parameter_file_has_its_defaults() -> None:
 
 def test_controllers_and_moveit_have_the_nodes_joints_and_action() -> None:
     joints = list(NodeConfiguration.of({}).joints)
-    controllers = yaml.safe_load((ROS2 / "heptarm_bringup/config/controllers.yaml").read_text())
-    assert controllers["joint_trajectory_controller"]["ros__parameters"]["joints"] == joints
     moveit = yaml.safe_load((ROS2 / "heptarm_moveit_config/config/moveit_controllers.yaml").read_text())
     ours = moveit["moveit_simple_controller_manager"]
-    assert ours["controller_names"] == ["heptarm"] and ours["heptarm"]["joints"] == joints
+    named = [name.replace("$(arg prefix)", "") for name in ours["heptarm"]["joints"]]
+    assert ours["controller_names"] == ["heptarm"] and named == joints
     assert ours["heptarm"]["action_ns"] == "follow_joint_trajectory"
 
 
@@ -260,6 +294,88 @@ def test_moveits_semantic_description_names_what_there_is() -> None:
     ROBOTS["iiwa14"].check(np.array(list(home.values())))
 
 
+# --------------------------------------------------------------------------- descriptions, really built
+
+
+def by_executable(nodes: list[LaunchedNode]) -> dict[str, LaunchedNode]:
+    return {node.name or node.executable: node for node in nodes}
+
+
+@pytest.mark.parametrize("control", ["mock", "topics"])
+def test_ros2_control_starts_with_all_its_controllers(control: str) -> None:
+    found = by_executable(
+        describe(
+            "heptarm_bringup",
+            "control.launch.xml",
+            control=control,
+            namespace="left",
+            prefix="l_",
+            model="med7",
+        )
+    )
+    assert ("heptarm" in found) == (control == "topics")
+    assert {node.namespace for node in found.values()} == {"/left"}
+    joints = [f"l_A{i}" for i in range(1, 8)]
+    arm = ET.fromstring(found["robot_state_publisher"].parameters["robot_description"])
+    system = arm.find("ros2_control")
+    assert system is not None and [joint.get("name") for joint in system.findall("joint")] == joints
+    manager = found["ros2_control_node"]
+    values = yaml.safe_load(CONTROLLERS.read_text().replace("$(var prefix)", "l_"))
+    names = {"joint_state_broadcaster", "joint_trajectory_controller", "forward_position_controller"}
+    names |= {"forward_velocity_controller"}
+    manager.name = "controller_manager"
+    types = parameters_of(values, manager)
+    assert {name.removesuffix(".type") for name in types} == names | {"update_rate"}
+    for name in names - {"joint_state_broadcaster"}:
+        controller = LaunchedNode("", "", name, "/left")
+        assert parameters_of(values, controller)["joints"] == joints
+    active, inactive = (found[f"spawner_of_{which}_ones"].arguments for which in ("active", "inactive"))
+    assert active == ["joint_state_broadcaster", "joint_trajectory_controller"]
+    commanded = {e.get("name") for e in system.findall("joint/command_interface")}
+    others = ["forward_position_controller"] + ["forward_velocity_controller"] * (control == "mock")
+    assert inactive == ["--inactive", *others] and ("velocity" in commanded) == (control == "mock")
+    if control == "topics":
+        topics = {param.get("name"): param.text for param in system.findall("hardware/param")}
+        assert topics["joint_states_topic"] == "/left/heptarm/joint_states"
+        assert topics["joint_commands_topic"] == "/left/heptarm/servo/joint"
+        # the broadcaster alone publishes joint_states
+        assert found["heptarm"].remaps == {"joint_states": "heptarm/joint_states"}
+        assert found["heptarm"].parameters["forward_controllers"] is False
+
+
+@pytest.mark.parametrize("name", ["forward_position_controller", "forward_velocity_controller"])
+def test_another_controller_may_be_the_active_one(name: str) -> None:
+    found = by_executable(describe("heptarm_bringup", "control.launch.xml", control="mock", controller=name))
+    active, inactive = (found[f"spawner_of_{which}_ones"].arguments for which in ("active", "inactive"))
+    assert active == ["joint_state_broadcaster", name]
+    assert name not in inactive and len(inactive) == 3
+
+
+def test_two_arms_are_two_nodes_with_their_descriptions() -> None:
+    nodes = describe("heptarm_bringup", "two_arms.launch.xml", left="sim://a", right="sim://b")
+    arms = {node.namespace: node for node in nodes if node.executable == "heptarm_node"}
+    assert {space: node.parameters["target"] for space, node in arms.items()} == {
+        "/left": "sim://a",
+        "/right": "sim://b",
+    }
+    for node in nodes:
+        if node.executable == "robot_state_publisher":
+            arm = ET.fromstring(node.parameters["robot_description"])
+            assert f"{node.namespace[1:]}_A1" in {joint.get("name") for joint in arm.findall("joint")}
+
+
+def test_the_node_runs_as_its_launch_file_starts_it(spare: Stage, ros: Ros) -> None:
+    given = {"target": spare.target, "namespace": "launched", "prefix": "l_", "description": "false"}
+    (node,) = describe("heptarm_bringup", "heptarm.launch.xml", **given, joint_states="heptarm/joint_states")
+    process = NodeProcess(spare.target, words=node.command())
+    try:
+        states = ros.collect(JointState, "/launched/heptarm/joint_states")
+        until(lambda: states, "the node does not start")
+        assert list(states[-1].name) == [f"l_A{i}" for i in range(1, 8)]
+    finally:
+        process.finish()
+
+
 class Anything:
     """A substitute for what a launch file uses of missing packages; records its arguments."""
 
@@ -276,7 +392,7 @@ class Anything:
         if self._name == "get_package_share_directory":
             return str(ROS2 / given[0])
         if self._name.endswith(".perform"):
-            return "iiwa14"
+            return {"model": "iiwa14"}.get(Anything.made[-2][1][0], "")
         return self
 
 
@@ -302,7 +418,7 @@ def started(path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 def test_moveits_launch_file_uses_files_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
     path = ROS2 / "heptarm_moveit_config/launch/move_group.launch.py"
-    assert len(started(path, monkeypatch)) == 2
+    assert len(started(path, monkeypatch)) == 3
     assert sum("file_path" in named for _, _, named in Anything.made) == 6
 
 
@@ -311,7 +427,7 @@ def test_moveit_servo_is_started_with_its_configuration(monkeypatch: pytest.Monk
     nodes = [named for name, _, named in Anything.made if name == "Node"]
     assert nodes[0]["package"] == "moveit_servo"
     servo = nodes[0]["parameters"][0]["moveit_servo"]
-    assert servo["command_out_topic"] == "/heptarm/joint_trajectory"
+    assert servo["command_out_topic"] == "heptarm/joint_trajectory"
     assert servo["command_out_type"] == "trajectory_msgs/JointTrajectory"
     semantic = expand(ROS2 / "heptarm_moveit_config/config/heptarm.srdf.xacro")
     assert [group.get("name") for group in semantic.findall("group")] == [servo["move_group_name"]]
@@ -351,10 +467,10 @@ def test_upstreams_launch_reads_them(path: Path) -> None:
     shutil.which("ros2") is None,
     reason="upstream's launch is in no wheel: this needs an installation of ROS 2",
 )
-def test_upstreams_launch_starts_the_node(stage: Stage, ros: Ros) -> None:
+def test_upstreams_launch_starts_the_node(spare: Stage, ros: Ros) -> None:
     if subprocess.run(["ros2", "pkg", "prefix", "heptarm_bringup"], check=False).returncode:
         pytest.skip("heptarm_bringup is in no workspace that is sourced")
-    command = ["ros2", "launch", "heptarm_bringup", "heptarm.launch.xml", f"target:={stage.target}"]
+    command = ["ros2", "launch", "heptarm_bringup", "heptarm.launch.xml", f"target:={spare.target}"]
     command += ["namespace:=launched", "prefix:=l_", "description:=false"]
     with ctrl_c_interrupts():
         process = subprocess.Popen(command, start_new_session=True)

@@ -23,7 +23,7 @@ from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, to_duratio
 Start = Callable[..., NodeProcess]
 
 
-def test_fifty_preemptions_in_five_seconds(client: Client, node: NodeProcess) -> None:
+def test_fifty_preemptions_one_after_the_other(client: Client, node: NodeProcess) -> None:
     threads = status(node.process.pid, "Threads")
     preempted_often(client)
     assert status(node.process.pid, "Threads") <= threads + THREADS

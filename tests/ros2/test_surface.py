@@ -37,28 +37,31 @@ class Sent:
 
 
 class Client:
-    """A probe of ROS 2."""
+    """A probe of ROS 2; names are relative to that of a node, or to a namespace."""
 
-    def __init__(self, ros: Ros) -> None:
-        self._ros = ros
+    def __init__(self, ros: Ros, name: str = NAME) -> None:
+        self._ros, self._name = ros, name
         self._publishers: dict[str, Any] = {}
+
+    def _full(self, name: str) -> str:
+        return name if name.startswith("/") else f"{self._name}/{name}"
 
     def call(self, name: str, kind: str, /, **request: Any) -> Any:
         one = found(kind, "srv")
-        return self._ros.call(one, f"{NAME}/{name}", one.Request(**request))
+        return self._ros.call(one, self._full(name), one.Request(**request))
 
     def send(self, name: str, kind: str, /, **goal: Any) -> Sent:
         one = found(kind, "action")
-        return Sent(self._ros, self._ros.act(one, f"{NAME}/{name}"), one.Goal(**goal))
+        return Sent(self._ros, self._ros.act(one, self._full(name)), one.Goal(**goal))
 
     def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
-        topic = f"/surface{name}" if name == "/joint_states" else full(name)
+        topic = f"/surface{name}" if name == "/joint_states" else self._full(name)
         return self._ros.collect(found(kind, "msg"), topic, latched=latched)
 
     def tell(self, name: str, kind: str, /, **message: Any) -> Callable[[], None]:
         made = found(kind, "msg")(**message)
         if name not in self._publishers:
-            self._publishers[name] = self._ros.node.create_publisher(type(made), full(name), 1)
+            self._publishers[name] = self._ros.node.create_publisher(type(made), self._full(name), 1)
         one = self._publishers[name]
         until(one.get_subscription_count, f"nobody listens to {name}")
         return lambda: one.publish(made)
@@ -77,10 +80,6 @@ class Client:
     def query(self) -> Any:
         answer = self.call("query_state", "control_msgs/QueryTrajectoryState")
         return answer if answer.success else None
-
-
-def full(name: str) -> str:
-    return name if name.startswith("/") else f"{NAME}/{name}"
 
 
 def found(kind: str, part: str) -> Any:

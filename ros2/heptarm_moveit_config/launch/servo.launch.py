@@ -13,48 +13,64 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from moveit_configs_utils import MoveItConfigsBuilder
 
+ARGUMENTS = {
+    "model": ("iiwa14", "iiwa7, iiwa14, med7 or med14"),
+    "namespace": ("", "namespace of the arm's node and of move_group"),
+    "prefix": ("", "prefix of the names of joints and frames"),
+}
+
 
 def generate_launch_description():
     """What is started."""
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument(
-                "model", default_value="iiwa14", description="iiwa7, iiwa14, med7 or med14"
-            ),
-            OpaqueFunction(function=_start),
-        ]
-    )
+    declared = [
+        DeclareLaunchArgument(name, default_value=value, description=text)
+        for name, (value, text) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=_start)])
+
+
+def _prefixed(value, prefix):
+    """A configuration in which the prefix stands for `$(arg prefix)`, as ROS 1 writes it."""
+    if isinstance(value, dict):
+        return {_prefixed(key, prefix): _prefixed(entry, prefix) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_prefixed(entry, prefix) for entry in value]
+    return value.replace("$(arg prefix)", prefix) if isinstance(value, str) else value
 
 
 def _start(context):
-    model = LaunchConfiguration("model").perform(context)
+    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    model, prefix = given["model"], given["prefix"]
     description = get_package_share_directory("heptarm_description")
     ours = get_package_share_directory("heptarm_moveit_config")
     configuration = (
         MoveItConfigsBuilder("heptarm", package_name="heptarm_moveit_config")
         .robot_description(
-            file_path=os.path.join(description, "urdf", "heptarm.urdf.xacro"), mappings={"model": model}
+            file_path=os.path.join(description, "urdf", "heptarm.urdf.xacro"),
+            mappings={"model": model, "prefix": prefix},
         )
-        .robot_description_semantic(file_path="config/heptarm.srdf.xacro")
+        .robot_description_semantic(file_path="config/heptarm.srdf.xacro", mappings={"prefix": prefix})
         .robot_description_kinematics(file_path="config/kinematics.yaml")
         .joint_limits(file_path=f"config/joint_limits_{model}.yaml")
         .to_moveit_configs()
     )
     with open(os.path.join(ours, "config", "servo.yaml"), encoding="utf-8") as file:
-        servo = yaml.safe_load(file)["/**"]["ros__parameters"]
+        servo = _prefixed(yaml.safe_load(file)["/**"]["ros__parameters"], prefix)
+    group = servo["moveit_servo"]["move_group_name"]
     return [
         Node(
             package="moveit_servo",
             executable="servo_node",
             name="servo_node",
+            namespace=given["namespace"],
             output="screen",
             parameters=[
                 servo,
-                {"update_period": servo["moveit_servo"]["publish_period"], "planning_group_name": "arm"},
+                {"update_period": servo["moveit_servo"]["publish_period"], "planning_group_name": group},
                 configuration.robot_description,
                 configuration.robot_description_semantic,
-                configuration.robot_description_kinematics,
-                configuration.joint_limits,
+                _prefixed(configuration.robot_description_kinematics, prefix),
+                _prefixed(configuration.joint_limits, prefix),
             ],
         ),
     ]

@@ -9,7 +9,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.node import Node
 
 from heptarm.errors import HeptarmError
-from heptarm.ros.interface.action import ActionDispatcher, RosAction, fill
+from heptarm.ros.interface.action import ActionDispatcher, ActionResult, RosAction, fill
 from heptarm.ros.interface.actions import ACTIONS
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
@@ -54,7 +54,7 @@ class ActionServers:
         except HeptarmError as error:
             self._node.get_logger().warning(f"{row.name} refused: {error}")
             handle.abort()
-            return kind.Result(success=False, message=str(error))
+            return ActionResult(GoalOutcome.ABORTED, str(error)).fill(kind.Result())
         result = work(_Client(handle, kind))
         if result.outcome is GoalOutcome.SUCCEEDED:
             handle.succeed()

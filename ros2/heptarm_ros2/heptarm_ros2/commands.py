@@ -12,9 +12,9 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from heptarm.errors import HeptarmError
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
-from heptarm.ros.interface.services import SERVICES
-from heptarm.ros.interface.topics import Topic, TopicDispatcher, topics_of
+from heptarm.ros.interface.topics import Topic, TopicDispatcher
 
 
 class Commands:
@@ -23,6 +23,11 @@ class Commands:
     def __init__(self, node: Node, context: NodeContext) -> None:
         self._node = node
         self._topics, self._requests = TopicDispatcher(context), ServiceDispatcher(context)
+        table = offered(context.driver.configuration.values)
+        for package in table.missing:
+            node.get_logger().warning(
+                f"{package} is not installed: topics and services with its types are left out"
+            )
         at_once = ReentrantCallbackGroup()
         one_topic, one_service = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self._subscriptions = [
@@ -34,7 +39,7 @@ class Commands:
                 callback_group=at_once if row.at_once else one_topic,
                 qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             )
-            for row in topics_of(context.driver.configuration.values)
+            for row in table.topics
         ]
         self._services = [
             node.create_service(
@@ -43,7 +48,7 @@ class Commands:
                 self._on_request(row),
                 callback_group=at_once if row.at_once else one_service,
             )
-            for row in SERVICES
+            for row in table.services
         ]
 
     def destroy(self) -> None:

@@ -53,6 +53,7 @@ class HeptarmNode(LifecycleNode):
         self._trajectories: TrajectoryAction | None = None
         self._actions: ActionServers | None = None
         self._ending = threading.Event()
+        self._starts = False  # by itself, which it does again
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)  # a simulated clock may stand still, or jump
         for one in sorted(parameters.PARAMETERS, key=lambda one: one.name != "names"):
             self._declare(one)  # `names` first: it selects the defaults of the others
@@ -113,7 +114,10 @@ class HeptarmNode(LifecycleNode):
         self._start_timer.cancel()
         if self._ending.is_set():
             return
-        if self.driver is None and self.trigger_configure() is not TransitionCallbackReturn.SUCCESS:
+        self._starts = True
+        configured = self.driver is not None or self.trigger_configure() is TransitionCallbackReturn.SUCCESS
+        self._starts = False
+        if not configured:
             self._start_timer.timer_period_ns = round(_RETRY * 1e9)
             self._start_timer.reset()
             return
@@ -129,7 +133,8 @@ class HeptarmNode(LifecycleNode):
             self._events = EventPublisher(*shared)
             self.driver = Driver(self.configuration, self)
         except HeptarmError as error:
-            log.error(f"not configured: {error}")
+            waits = f"; wait, the next attempt is in {_RETRY:g} s" if self._starts else ""
+            log.error(f"not configured: {error}{waits}")
             self._destroy()
             return TransitionCallbackReturn.FAILURE
         values, arm = self.configuration.values, self.driver.arm

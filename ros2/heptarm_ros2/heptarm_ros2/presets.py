@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Pose, Wrench
 from rclpy.node import Node
-from sensor_msgs.msg import JointState
+from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from heptarm.ros.interface.messages import RosAdapter
-from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.messages import RosAdapter, class_of
+from heptarm.ros.interface.names import PRESETS
 from heptarm.ros.interface.state_messages import preset_message
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.state import State
@@ -17,17 +16,24 @@ class PresetPublisher:
     """Publishes states under the names that the parameter `names` adds."""
 
     def __init__(self, node: Node, ros: RosAdapter, configuration: NodeConfiguration) -> None:
-        self._node, self._ros, self._joints = node, ros, configuration.joints
-        kinds = {NameRole.JOINT_STATES: JointState, NameRole.POSE: Pose, NameRole.WRENCH: Wrench}
+        self._node, self._ros, self._names = node, ros, configuration
         self._publishers = [
-            (entry, node.create_publisher(kinds[entry.role], entry.name, 10))
+            (
+                entry,
+                node.create_publisher(
+                    class_of(entry.type, "msg"),
+                    entry.name,
+                    10,
+                    qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+                ),
+            )
             for entry in PRESETS[configuration.values["names"]].published()
         ]
 
     def state(self, state: State) -> None:
         """Publish a state."""
         for entry, publisher in self._publishers:
-            message = preset_message(self._ros, entry, state, self._joints)
+            message = preset_message(self._ros, entry, publisher.msg_type, state, self._names)
             if message is not None:
                 publisher.publish(message)
 

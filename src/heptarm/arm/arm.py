@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from heptarm.arm.devices.io import Io
 from heptarm.arm.devices.operator import Operator
@@ -24,6 +25,8 @@ from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import program
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
+from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
+from heptarm.arm.motion.preview import ProgramPreview
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
@@ -34,7 +37,7 @@ from heptarm.skills import collision_guard as guarding
 from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
-from heptarm.values.arrays import callback, instance, integer, shown, within, word
+from heptarm.values.arrays import array, callback, instance, integer, shown, within, word
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -46,6 +49,7 @@ from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece
+from heptarm.values.workspace import Workspace
 from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
@@ -58,6 +62,18 @@ _STREAM_SIZE = 2000
 #: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
 _TOOL_PATIENCE = 5.0
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
+
+
+def _checked(check: CollisionCheck) -> CollisionCheck:
+    """Refuse what cannot check a path."""
+    if not callable(getattr(check, "first_on", None)):
+        raise ShapeError(
+            f"collision_check must have a method first_on, got {shown(check)}",
+            parameter="collision_check",
+            value=check,
+            hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+        )
+    return check
 
 
 class Arm:
@@ -322,7 +338,7 @@ class Arm:
             CommandRejected: the file cannot be written (when the block begins).
             MissingExtra: the package mcap is not installed (when the block begins).
         """
-        return Recorder(self._connection, Path(instance(path, (str, Path), "path")), rate=rate)
+        return Recorder({"": self._connection}, Path(instance(path, (str, Path), "path")), rate=rate)
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -376,21 +392,87 @@ class Arm:
     def collision_check(self) -> CollisionCheck | None:
         """Checks the path of each motion before it is sent, such as a `heptarm.CollisionModel`; None: nothing does.
 
-        `move` and `start` then refuse a path on which bodies would touch. Servo motions, FRI and hand guiding have no
-        path that could be checked. It is no safety function: it knows only its own model of the scene.
+        `move` and `start` then refuse a path on which bodies would touch, and one that cannot be planned. Servo
+        motions, FRI and hand guiding have no path that could be checked. It is no safety function: it knows only its
+        own model of the scene. It plans as `plan` does.
         """
         return self._foresight.check
 
     @collision_check.setter
     def collision_check(self, value: CollisionCheck | None) -> None:
-        if value is not None and not callable(getattr(value, "first_on", None)):
-            raise ShapeError(
-                f"collision_check must have a method first_on, got {shown(value)}",
-                parameter="collision_check",
-                value=value,
-                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
-            )
-        self._foresight.check = value
+        self._foresight.check = None if value is None else _checked(value)
+
+    def plan(
+        self,
+        motion: Motion | Sequence[Motion],
+        *,
+        speed: float | None = None,
+        start: npt.ArrayLike | None = None,
+        step: float = 0.01,
+        collision_check: CollisionCheck | None = None,
+    ) -> ProgramPreview:
+        """Look ahead: how a motion, or several as one batch, would go. Nothing moves, and nothing is sent.
+
+        It is planned as the virtual cabinet plans it, also beside a robot, whose own planner may take a little longer
+        or shorter. Needs `pip install 'heptarm[sim]'`, but no simulator.
+
+        Args:
+            motion: one motion or several, without hand guiding and endless holds.
+            speed: ceiling, (0, 1]; the lower one of this and `arm.speed` applies, as in `move`.
+            start: joint positions at which it begins, shape (7,) [rad]; None: where the arm rests.
+            step: time between two samples of the result [s], 0.001 to 1.
+            collision_check: checks the path for collisions, such as a `heptarm.CollisionModel`; None:
+                `arm.collision_check`. It is no safety function.
+
+        Returns:
+            Duration, paths over time, where limits come closest, and collisions.
+
+        Raises:
+            LimitError: a joint would leave its limits.
+            Unreachable: a pose is out of reach.
+            OutsideWorkspace: it leaves `workspace`.
+            CommandRejected: the path passes a singularity, or names an unknown frame.
+            ModeConflict: a motion runs, and `start` is not given.
+            StaleState: the newest state is too old, or lacks the joints.
+            MissingExtra: the planner is not installed.
+        """
+        motions = program.listed(motion)
+        ceiling = self._speed
+        if speed is not None:
+            ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        return self._foresight.preview(
+            motions,
+            ceiling=ceiling,
+            start=None if start is None else array(start, 7, "start"),
+            step=within(step, "step", 0.001, 1.0, unit="s"),
+            check=None if collision_check is None else _checked(collision_check),
+        )
+
+    @property
+    def workspace(self) -> Workspace | None:
+        """Where the tool and the joints may be, for all commands of this arm object; None: anywhere.
+
+        `move` and `start` refuse a motion that leaves it, before anything is sent; so far as the path is known: of
+        hand guiding and a hold it is not, of splines it is taken as straight from point to point. Servo motions,
+        velocities too, clamp their targets to it or refuse them. FRI sessions have limits of their own.
+
+        It is no safety function: only this program obeys it.
+
+        Raises:
+            ShapeError: not a Workspace (when it is set).
+            CommandRejected: its frame is neither "base" nor a taught frame (likewise).
+        """
+        return self._foresight.workspace
+
+    @workspace.setter
+    def workspace(self, value: Workspace | None) -> None:
+        before = self._foresight.workspace
+        self._foresight.workspace = None if value is None else instance(value, Workspace, "workspace")
+        try:
+            self._foresight.boundary()
+        except CommandRejected:
+            self._foresight.workspace = before
+            raise
 
     def move(
         self,
@@ -421,6 +503,7 @@ class Arm:
         Raises:
             CommandRejected: refused before anything moved; LimitError and others name the value and the range.
             CollisionForeseen: `collision_check` found bodies that would touch.
+            OutsideWorkspace: a motion leaves `workspace`.
             MotionAborted: ended early; carries cause, state and history.
             ConnectionLost: the connection was lost; the cabinet stops the arm.
             Timeout: not ended in time; the arm was stopped.
@@ -555,7 +638,7 @@ class Arm:
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
         motions = program.with_kept_joints(self._connection, motions)
-        self._foresight.examine(motions, when)
+        self._foresight.examine(motions, when, ceiling)
         return program.send(
             self._connection,
             self._tooling,
@@ -572,15 +655,22 @@ class Arm:
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...
     @overload
     def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[ServoKeywords]) -> PoseServo: ...
+    @overload
+    def servo(self, kind: Literal["velocity"], **settings: Unpack[ServoKeywords]) -> VelocityServo: ...
+    @overload
+    def servo(self, kind: Literal["twist"], **settings: Unpack[ServoKeywords]) -> TwistServo: ...
     @documented
     def servo(
-        self, kind: Literal["joint", "pose", "lin"] = "joint", **settings: Unpack[ServoKeywords]
-    ) -> JointServo | PoseServo:
-        """A stream of targets that the arm follows; it begins with the `with` block.
+        self,
+        kind: Literal["joint", "pose", "lin", "velocity", "twist"] = "joint",
+        **settings: Unpack[ServoKeywords],
+    ) -> JointServo | PoseServo | VelocityServo | TwistServo:
+        """A stream of targets, or of velocities, that the arm follows; it begins with the `with` block.
 
         Args:
-            kind: what the targets are: "joint" positions; "pose" of the motion frame, reached by the joints; or "lin":
-                the same, reached on straight lines.
+            kind: what the targets are: "joint" positions; "pose" of the motion frame, reached by the joints; "lin":
+                the same, reached on straight lines; or velocities: "velocity" of the joints, or a "twist" of the
+                motion frame. Velocities ramp to zero when none is set for `timeout`.
             **settings: as follows.
 
         Raises:
@@ -597,12 +687,52 @@ class Arm:
         self._tooling.check_mode(request.mode)
         ends, parts = condition_message(self._until(request.until, breaks), self._connection.signals)
         self._tooling.check_until(parts)
-        stream = JointServo if kind == "joint" else PoseServo
-        return stream(
+        message, boundary = replace(message, until=ends), self._foresight.boundary()
+        period, watchdog = request.period, request.watchdog_time
+        if kind == "joint":
+            return JointServo(
+                self._connection,
+                message,
+                period=period,
+                watchdog=watchdog,
+                boundary=boundary,
+                until=parts,
+                breaks=breaks,
+            )
+        moving = self._tooling.on_flange(request.moving)
+        if kind in ("pose", "lin"):
+            return PoseServo(
+                self._connection,
+                message,
+                period=period,
+                watchdog=watchdog,
+                moving=moving,
+                boundary=boundary,
+                until=parts,
+                breaks=breaks,
+            )
+        speed, acceleration = request.joint_fractions(self._speed)
+        limits = JogLimits(speed, acceleration, request.silence, boundary, request.keep_clear_of)
+        if kind == "velocity":
+            return VelocityServo(
+                self._connection,
+                message,
+                limits,
+                period=period,
+                watchdog=watchdog,
+                until=parts,
+                breaks=breaks,
+            )
+        along, change, turn, spin = request.line_limits()
+        return TwistServo(
             self._connection,
-            replace(message, until=ends),
-            period=request.period,
-            watchdog=request.watchdog_time,
+            message,
+            limits,
+            twist=TwistLimits(along, change, turn, spin),
+            moving=moving,
+            axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
+            period=period,
+            watchdog=watchdog,
             until=parts,
             breaks=breaks,
         )
@@ -620,8 +750,11 @@ class Arm:
             **settings: period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
                 multiplier: answer every n-th message; 1.
                 mode: control mode of the hold; None: that of `using`, otherwise position.
-                law: `law(state, out, params)`, called in the loop's process in every cycle; None: `Fri.command`.
+                law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in
+                    every cycle; a law of `heptarm.law`, `heptarm.law_from` or `heptarm.laws` runs there without Python.
+                    None: `Fri.command`.
                 params: numbers and arrays by name for the law, which can change while it runs.
+                memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
                 policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
                 limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
                 pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.

@@ -21,10 +21,12 @@ from heptarm.errors import HeptarmError, missing_extra
 COMMANDS = {
     "demo": "demo:demo",
     "sim": "sim:sim",
+    "panel": "panel:panel",
     "state": "state:state",
     "stop": "stop:stop",
     "recover": "motion:recover",
     "servo": "motion:servo",
+    "jog": "jog:jog",
     "teach": "motion:teach",
     "replay": "motion:replay",
     "record": "record:record",
@@ -37,6 +39,7 @@ COMMANDS = {
     "completion": "completion:completion",
 }
 MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin-rel": "motion:move_lin_rel"}
+PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_lin_rel"}
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
@@ -70,10 +73,12 @@ def _add(group: App, commands: dict[str, str], *, listed: bool) -> App:
 _words = [one for one in sys.argv[1:] if not one.startswith("-")]
 _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
+_plans = App(name="plan", help="Look ahead of a motion: duration, limits, collisions; nothing moves.")
 _keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
 _targets = App(name="targets", help="List, save and remove robots that have a name.")
 _learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
 app.command(_add(_move, MOVES, listed=_words == ["move"]))
+app.command(_add(_plans, PLANS, listed=_words == ["plan"]))
 app.command(_add(_keys, KEYS, listed=_words == ["key"]))
 app.command(_add(_targets, TARGETS, listed=_words == ["targets"]))
 app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))

@@ -14,6 +14,7 @@ from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import items
 from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, MoveOptions, Speed
 from heptarm.cli.output import confirm, emit, state_data
+from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.arrays import within
@@ -109,8 +110,8 @@ def _move(motion: Motion, options: MoveOptions) -> int:
         items((motion,), arm.robot, options.speed)
         title, percent = arm.robot.title, f"{options.speed:.0%}"
         if options.dry_run:
-            text = f"{motion!r} at {percent} speed is within the limits of the {title}; nothing was moved"
-            emit({"ok": True, "text": text}) if options.as_json else print(text)
+            preview = arm.plan(motion, speed=options.speed)
+            emit({"ok": True} | preview_data(preview)) if options.as_json else print(preview)
             return 0
         if not (arm.is_virtual or options.yes or confirm(f"Move the real {title} at {percent} speed?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")

@@ -110,6 +110,41 @@ class CommandTarget:
         return keys.find_key(key_file=file, host=parsed.host, port=parsed.port)
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandTargets:
+    """What a command for several arms connects to.
+
+    Attributes:
+        texts: each as in `heptarm.connect`; none: HEPTARM_TARGET.
+        key_file: file with the key of all of them; None: the keys are looked up elsewhere.
+    """
+
+    texts: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--target",
+            group=COMMON,
+            help="What to connect to, as of other commands; may be repeated. Default: HEPTARM_TARGET.",
+        ),
+    ] = ()
+    key_file: KeyFile = None
+
+    def each(self) -> list[tuple[str, CommandTarget]]:
+        """The targets, and what connects to each of them.
+
+        Raises:
+            ConnectFailed: none is given, and HEPTARM_TARGET is not set.
+        """
+        from heptarm.arm.link.target import target_from_env
+
+        chosen = self.texts or (target_from_env(),)
+        return [(text, CommandTarget(text=text, key_file=self.key_file)) for text in chosen]
+
+
+#: No targets were given on the command line.
+NO_TARGETS = CommandTargets()
+
 #: Arms that this process has controlled.
 _controlled: list[Arm] = []
 
@@ -133,7 +168,12 @@ Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are 
 Speed = Annotated[float, Parameter(name="--speed", help="Fraction of the full speed, (0, 1].")]
 Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask before a real robot moves.")]
 DryRun = Annotated[
-    bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")
+    bool,
+    Parameter(
+        name="--dry-run",
+        negative="",
+        help="Show how the motion would go, as heptarm plan does; move nothing.",
+    ),
 ]
 
 

@@ -27,13 +27,16 @@ def plot(
             help="File to write: .png, .svg, .pdf or .html. Default: beside the recording.",
         ),
     ] = None,
+    arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
     compare: Annotated[Path | None, Parameter(help="A second recording, drawn on the first one.")] = None,
     as_json: Json = False,
 ) -> int:
     """Plot a recording: joints, speeds and torques by their limits, wrench, path; motions and events as bands."""
     names = tuple(name.strip() for name in signals.split(",") if name.strip())
-    run = load(file)
-    figure = plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare), names)
+    run = load(file, arm=arm)
+    figure = (
+        plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare, arm=arm), names)
+    )
     written = plots.save(figure, file.with_suffix(".png") if out is None else out)
     if as_json:
         emit(

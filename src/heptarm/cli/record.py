@@ -70,10 +70,11 @@ def convert(
     out: Annotated[Path, Parameter(help="File to write: .parquet, .csv or .npz.")],
     /,
     *,
+    arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
     as_json: Json = False,
 ) -> int:
     """Convert a recording to Parquet, CSV or NumPy."""
-    run = load(file)
+    run = load(file, arm=arm)
     files = convert_recording(run, out)
     if as_json:
         emit({"files": [str(one) for one in files], "states": len(run), "complete": run.complete})

@@ -58,7 +58,18 @@ def sim(
         Parameter(help="Real-time priority: while an FRI session is open (fri), always (on), never (off)."),
     ] = "fri",
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
-    view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
+    panel: Annotated[
+        bool,
+        Parameter(negative="", help="Open the panel in the browser: look, jog, and be the operator."),
+    ] = False,
+    view_port: Annotated[int, Parameter(help="Port of view or panel; 0 takes a free one.")] = 8080,
+    meshes: Annotated[
+        str,
+        Parameter(
+            help="With --view or --panel: DIR with link_0.stl to link_7.stl, or .obj: draw the arm in these meshes "
+            "instead of heptarm's own."
+        ),
+    ] = "",
     key_file: KeyFile = None,
     key: Annotated[str, Parameter(show=False)] = "",
     fault: Annotated[
@@ -223,7 +234,9 @@ def sim(
     if application is not None:
         defaults = {
             "--view": (view, False),
+            "--panel": (panel, False),
             "--view-port": (view_port, 8080),
+            "--meshes": (meshes, ""),
             "--host": (host, "127.0.0.1"),
             "--port": (port, 30001),
             "--count": (count, 1),
@@ -275,6 +288,8 @@ def sim(
 
         own = {
             "--view": view,
+            "--panel": panel,
+            "--meshes": bool(meshes),
             "--key-file": key_file is not None,
             "--project": project is not None,
             "--scene": bool(scene),
@@ -309,7 +324,13 @@ def sim(
             speed=speed,
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
-    _check_count(count, port, has_view=view)
+    if view and panel:
+        raise CommandRejected(
+            "--view and --panel show the same cabinet", parameter="view", hint="leave out --view"
+        )
+    page = "panel" if panel else "view" if view else ""
+    _check_count(count, port, page=page)
+    _check_meshes(meshes, page=page)
     cabinet = SimulatorOptions(
         model=model,
         host=host,
@@ -326,14 +347,35 @@ def sim(
     )
     if count > 1:
         return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
-    return _cabinet(cabinet, view=view, view_port=view_port, key_file=key_file, as_json=as_json)
+    return _cabinet(
+        cabinet, page=page, page_port=view_port, meshes=meshes, key_file=key_file, as_json=as_json
+    )
 
 
-def _check_count(count: int, port: int, *, has_view: bool) -> None:
+def _check_meshes(folder: str, *, page: str) -> None:
+    """Check meshes for the page before anything starts.
+
+    Raises:
+        CommandRejected: there is no page to use them, or they cannot be used.
+    """
+    if not folder:
+        return
+    if not page:
+        raise CommandRejected("--meshes needs --view or --panel", parameter="meshes", hint="add --view")
+    require_extra("sim")
+    from heptarm.sim.plant.appearance import ArmMeshes
+
+    try:
+        ArmMeshes.of(folder)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="meshes", value=folder) from None
+
+
+def _check_count(count: int, port: int, *, page: str) -> None:
     """Check the number of cabinets.
 
     Raises:
-        CommandRejected: it is out of range, or there is a view, which shows one cabinet.
+        CommandRejected: it is out of range, or there is a view or a panel, which shows one cabinet.
     """
     most = _MOST if port == 0 else min(_MOST, 65536 - port)
     if not 1 <= count <= most:
@@ -343,11 +385,11 @@ def _check_count(count: int, port: int, *, has_view: bool) -> None:
             value=count,
             allowed=f"[1, {most}]",
         )
-    if count > 1 and has_view:
+    if count > 1 and page:
         raise CommandRejected(
-            "--view cannot be used with --count: a view shows one cabinet",
-            parameter="view",
-            hint="run python -m heptarm.sim.runtime.view --target sim://HOST:PORT for each of them",
+            f"--{page} cannot be used with --count: it shows one cabinet",
+            parameter=page,
+            hint="run heptarm panel --target sim://HOST:PORT, with one --target for each of them",
         )
 
 
@@ -427,12 +469,26 @@ def _type_to_all(cabinets: list[subprocess.Popen[str]], as_json: bool) -> None:
 
 
 def _cabinet(
-    options: SimulatorOptions, *, view: bool, view_port: int, key_file: Path | None, as_json: bool
+    options: SimulatorOptions,
+    *,
+    page: str,
+    page_port: int,
+    meshes: str,
+    key_file: Path | None,
+    as_json: bool,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C or SIGTERM; lines on standard input are the operator's actions.
 
+    Args:
+        options: of the cabinet.
+        page: "panel" or "view", which only shows; empty: no page in the browser.
+        page_port: TCP port of the page.
+        meshes: folder with meshes of the arm for the page; empty: heptarm's own.
+        key_file: file with the key.
+        as_json: print JSON.
+
     Raises:
-        ConnectFailed: the cabinet or the view does not start; the text gives the reason.
+        ConnectFailed: the cabinet or the page does not start; the text gives the reason.
         CommandRejected: the key cannot be used.
     """
     model, host, port = options.model, options.host, options.port
@@ -440,39 +496,30 @@ def _cabinet(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
         positions = None
-        if view and options.scene:
+        if page and options.scene:
             positions = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-"))) / "positions"
             options = replace(options, positions=positions)
         cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
-        if view:
-            viewer = stack.enter_context(
-                _child(
-                    [
-                        sys.executable,
-                        "-m",
-                        "heptarm.sim.runtime.view",
-                        "--target",
-                        target,
-                        "--port",
-                        str(view_port),
-                        *(
-                            []
-                            if positions is None
-                            else ["--scene", options.scene, "--positions", str(positions)]
-                        ),
-                    ],
-                    key,
-                )
-            )
-            ready["view"] = _ready(viewer, "the view does not start")["url"]
+        if page:
+            command = [sys.executable, "-m", "heptarm.panel.process", "--target", target]
+            command += ["--port", str(page_port)]
+            if positions is not None:
+                command += ["--scene", options.scene, "--positions", str(positions)]
+            if meshes:
+                command += ["--meshes", meshes]
+            if page == "view":
+                command += ["--read-only"]
+            viewer = stack.enter_context(_child(command, key))
+            ready[page] = _ready(viewer, f"the {page} does not start")["url"]
+            threading.Thread(target=_careful, args=(_obey, viewer, cabinet), daemon=True).start()
         if as_json:
             emit(ready | {"target": target})
         else:
             print(f"A virtual {model} is ready. Connect with {target}; Ctrl-C ends it.")
-            if view:
-                print(f"See it at {ready['view']}")
+            if page:
+                print(f"{'See it' if page == 'view' else 'The panel is'} at {ready[page]}")
             if sys.stdin is not None and sys.stdin.isatty():
                 print("You are the operator: type emergency_stop, clear, start, t1, enable ... or help.")
             sys.stdout.flush()
@@ -483,6 +530,15 @@ def _cabinet(
             return 0
 
 
+def _obey(panel: subprocess.Popen[str], cabinet: subprocess.Popen[str]) -> None:
+    """Pass on what the panel's operator does, until the panel ends."""
+    assert panel.stdout is not None
+    for line in panel.stdout:
+        words = json.loads(line).get("say", "")
+        if words:
+            _say(cabinet, words)
+
+
 def _refuse_beside_app(names: set[str]) -> None:
     """Refuse options that have no meaning for a foreign application.
 
@@ -490,8 +546,8 @@ def _refuse_beside_app(names: set[str]) -> None:
         CommandRejected: there is such an option.
     """
     for name in sorted(names):
-        if name.startswith("--view"):
-            reason = "the view needs heptarm's own application in the cabinet"
+        if name.startswith(("--view", "--panel")) or name == "--meshes":
+            reason = "the page in the browser needs heptarm's own application in the cabinet"
         elif name.startswith("--fri"):
             reason = "an FRI session is opened by the application itself"
         else:
@@ -663,12 +719,10 @@ def _listen(cabinet: subprocess.Popen[str], as_json: bool) -> None:
         threading.Thread(target=_careful, args=(_type, cabinet, as_json), daemon=True).start()
 
 
-def _careful(
-    work: Callable[[subprocess.Popen[str], bool], object], cabinet: subprocess.Popen[str], as_json: bool
-) -> None:
+def _careful(work: Callable[..., object], *arguments: object) -> None:
     """Work until the pipe is closed."""
     with suppress(OSError, ValueError):
-        work(cabinet, as_json)
+        work(*arguments)
 
 
 def _answer(cabinet: subprocess.Popen[str], as_json: bool, *, number: int = 0) -> str:

@@ -15,6 +15,21 @@ from .guard.pose_guard import (
 from .loop.client import (
     Client as Client,
 )
+from .loop.compiled import (
+    CompiledLaw as CompiledLaw,
+)
+from .loop.compiled import (
+    LawTrial as LawTrial,
+)
+from .loop.compiled import (
+    include_dir as include_dir,
+)
+from .loop.law_interface import (
+    LiveMemory as LiveMemory,
+)
+from .loop.law_interface import (
+    Memory as Memory,
+)
 from .loop.user_api import (
     Output as Output,
 )

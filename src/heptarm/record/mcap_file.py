@@ -3,6 +3,7 @@
 Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp (the motion frame for a 3D view, at most
 30 per second), /log (what happened, as text), /journal (the same with all its data), /signals (IO and control mode,
 when they change). The log time of a message is its receipt, the publish time of a state the moment of its sampling.
+In a recording of several arms the topics begin with the arm's name, as in /left/state.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +35,8 @@ from heptarm.wire import messages as wire
 
 #: Name of the metadata at the beginning of a file, and of those at its end.
 BEGIN, END = "heptarm", "heptarm.end"
+#: Fact in a recording of several arms: the name of the arm that the others are about.
+ARM = "arm"
 #: States that are written before other threads get their turn.
 _TURN = 4
 #: Shortest time between two poses for a 3D view [ns].
@@ -60,6 +64,7 @@ class RecordingFile:
         facts: texts about robot and connection, by name.
         epoch: nanoseconds since 1970 at our clock's zero.
         chunk: size of a chunk [bytes]: what is lost if the process ends at any time.
+        arm: name of the arm, if there are several in the file; see `beside`.
 
     Attributes:
         path: the file.
@@ -69,7 +74,9 @@ class RecordingFile:
         MissingExtra: the package mcap is not installed.
     """
 
-    def __init__(self, path: Path, facts: Mapping[str, str], *, epoch: int, chunk: int) -> None:
+    def __init__(
+        self, path: Path, facts: Mapping[str, str], *, epoch: int, chunk: int, arm: str = ""
+    ) -> None:
         writer = require("mcap.writer", extra="record")
         self.path = path
         try:
@@ -78,21 +85,28 @@ class RecordingFile:
         except OSError as error:
             raise _unwritable(path, error) from error
         self._epoch = epoch
-        self._pose_due = 0
-        self._rest = b""
-        self._last_signals = ""
-        self._cycles: int | None = None
         self._out: Any = writer.Writer(self._file, chunk_size=chunk)
         try:
-            self._begin(facts)
+            self._out.start(profile="", library="heptarm")
+            self._begin(facts, arm)
         except OSError as error:
             self.abandon()
             raise _unwritable(path, error) from error
 
-    def _begin(self, facts: Mapping[str, str]) -> None:
-        """Write the beginning, which a file that is cut off still has."""
-        self._out.start(profile="", library="heptarm")
-        self._out.add_metadata(BEGIN, dict(facts))
+    def beside(self, facts: Mapping[str, str], arm: str) -> RecordingFile:
+        """A writer of another arm's part of the same file; `flush`, `finish` and `abandon` are left to this one."""
+        other = copy(self)
+        other._begin(facts, arm)
+        return other
+
+    def _begin(self, facts: Mapping[str, str], arm: str) -> None:
+        """Write the beginning of an arm's part, which a file that is cut off still has."""
+        self._prefix = f"/{arm}" if arm else ""
+        self._pose_due = 0
+        self._rest = b""
+        self._last_signals = ""
+        self._cycles: int | None = None
+        self._out.add_metadata(BEGIN, {**facts, **({ARM: arm} if arm else {})})
         self._states = self._add_rows("/state", STATE)
         self._pose = self._add("/tcp", *POSE_IN_FRAME)
         self._log = self._add("/log", *LOG)
@@ -102,7 +116,7 @@ class RecordingFile:
 
     def _add(self, topic: str, name: str, descriptor: bytes, **metadata: str) -> int:
         schema = self._out.register_schema(name=name, encoding="protobuf", data=descriptor)
-        return int(self._out.register_channel(topic, "protobuf", schema, metadata))
+        return int(self._out.register_channel(self._prefix + topic, "protobuf", schema, metadata))
 
     def _add_rows(self, topic: str, layout: RowLayout) -> int:
         return self._add(topic, layout.full_name, layout.descriptor, layout=layout.text)
@@ -111,7 +125,7 @@ class RecordingFile:
         schema = self._out.register_schema(
             name=name, encoding="jsonschema", data=json.dumps(content).encode()
         )
-        return int(self._out.register_channel(topic, "json", schema))
+        return int(self._out.register_channel(self._prefix + topic, "json", schema))
 
     def states(
         self, samples: Sequence[StateSample], *, to_ours: Callable[[int], int], signals: Sequence[str] = ()

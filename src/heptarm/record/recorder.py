@@ -125,34 +125,68 @@ class CycleTap:
             del self._next[reader]
 
 
-class Recorder:
-    """Records a connection to a file while a `with` block runs; made by `Arm.record`.
+class _Tap:
+    """What is recorded of one source: its states, its journal, its FRI cycles.
 
     Args:
         source: what is recorded.
+        file: where to.
+    """
+
+    def __init__(self, source: RecordSource, file: RecordingFile) -> None:
+        self._source, self._file = source, file
+        self._entries: deque[JournalEntry] = source.journal.open()
+        self._samples = source.open_samples(_WAITING)
+        self._cycles = CycleTap()
+
+    @property
+    def lost(self) -> int:
+        """States and FRI cycles that could not be recorded."""
+        return self._samples.lost + self._cycles.lost
+
+    def write(self) -> int:
+        """Write what has arrived; returns the number of states."""
+        source, count = self._source, 0
+        while batch := self._samples.take(_BATCH):
+            self._file.states(batch, to_ours=source.to_ours, signals=source.signal_names)
+            count += len(batch)
+        while self._entries:
+            self._file.entry(self._entries.popleft())
+        self._cycles.write(source.journal.sessions, self._file)
+        return count
+
+    def close(self) -> None:
+        """Take nothing more."""
+        self._source.close_samples(self._samples)
+        self._source.journal.close(self._entries)
+
+
+class Recorder:
+    """Records one arm or several to a file while a `with` block runs; made by `Arm.record` and `Arms.record`.
+
+    Args:
+        sources: what is recorded, by the name of the arm; a single one may have the name "".
         path: the file, MCAP.
         rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
 
     Attributes:
         path: the file.
-        states: pushed states written so far.
+        states: pushed states written so far, of all arms.
 
     Raises:
         LimitError: a rate outside its range.
     """
 
-    def __init__(self, source: RecordSource, path: Path, *, rate: float | None = None) -> None:
-        self._source = source
+    def __init__(self, sources: Mapping[str, RecordSource], path: Path, *, rate: float | None = None) -> None:
+        self._sources = dict(sources)
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
         self.path = path
         self.states = 0
         self._file: RecordingFile | None = None
-        self._samples: SampleQueue | None = None
-        self._entries: deque[JournalEntry] = deque()
-        self._cycles = CycleTap()
+        self._taps: list[_Tap] = []
         self._failure: OSError | None = None
         self._ended = threading.Event()
-        self._restore: Callable[[], None] = lambda: None
+        self._restore: list[Callable[[], None]] = []
         self._thread = threading.Thread(target=self._run, name="heptarm-record", daemon=True)
         self._is_closed = False
 
@@ -166,20 +200,25 @@ class Recorder:
         """
         if self._file is not None:
             raise LocalProtocolError("a recorder is used once", hint="make another one with arm.record(...)")
-        source = self._source
-        if self._rate is not None:
-            self._restore = source.raise_rate(self._rate)
         try:
-            self._file = RecordingFile(
-                self.path, source.facts, epoch=epoch_of(source), chunk=chunk_size(source.state_rate)
-            )
+            if self._rate is not None:
+                for source in self._sources.values():
+                    self._restore.append(source.raise_rate(self._rate))
+            files = self._open_files()
         except BaseException:
-            self._restore()
+            for restore in self._restore:
+                restore()
             raise
-        self._entries = source.journal.open()
-        self._samples = source.open_samples(_WAITING)
+        self._taps = [_Tap(source, file) for source, file in zip(self._sources.values(), files, strict=True)]
         self._thread.start()
         return self
+
+    def _open_files(self) -> list[RecordingFile]:
+        """The file, and its writer for each arm."""
+        (name, first), *others = self._sources.items()
+        size = chunk_size(sum(source.state_rate for source in self._sources.values()))
+        self._file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
+        return [self._file, *(self._file.beside(source.facts, name) for name, source in others)]
 
     def note(self, text: str) -> None:
         """Put a mark on the time line; `Recording.between` finds it by its text.
@@ -194,12 +233,13 @@ class Recorder:
                 parameter="text",
                 value=text,
             )
-        self._source.journal.add(NOTE, text)
+        for source in self._sources.values():
+            source.journal.add(NOTE, text)
 
     @property
     def lost(self) -> int:
         """States and FRI cycles that could not be recorded, because the disk was too slow for too long."""
-        return (0 if self._samples is None else self._samples.lost) + self._cycles.lost
+        return sum(tap.lost for tap in self._taps)
 
     @property
     def is_running(self) -> bool:
@@ -215,10 +255,11 @@ class Recorder:
         if self._is_closed or self._file is None:
             return
         self._is_closed = True
-        try:
-            self._restore()
-        except HeptarmError as error:
-            _log.info("the rate of the states stays as it was for the recording: %s", error)
+        for restore in self._restore:
+            try:
+                restore()
+            except HeptarmError as error:
+                _log.info("the rate of the states stays as it was for the recording: %s", error)
         self._ended.set()
         self._thread.join()
         if self._failure is not None:
@@ -250,12 +291,14 @@ class Recorder:
     # -------------------------------------------------------------------------------------- its own thread
 
     def _run(self) -> None:
-        file, samples = self._file, self._samples
-        assert file is not None and samples is not None
+        file = self._file
+        assert file is not None
         try:
             while True:
                 is_last = self._ended.wait(_PERIOD)
-                self._write(file, samples)
+                for tap in self._taps:
+                    self.states += tap.write()
+                file.flush()
                 if is_last:
                     break
             file.finish({"states": str(self.states), "lost": str(self.lost)})
@@ -268,15 +311,5 @@ class Recorder:
             file.abandon()
             _log.exception("the recording %s ends early", file.path)
         finally:
-            self._source.close_samples(samples)
-            self._source.journal.close(self._entries)
-
-    def _write(self, file: RecordingFile, samples: SampleQueue) -> None:
-        source = self._source
-        while batch := samples.take(_BATCH):
-            file.states(batch, to_ours=source.to_ours, signals=source.signal_names)
-            self.states += len(batch)
-        while self._entries:
-            file.entry(self._entries.popleft())
-        self._cycles.write(source.journal.sessions, file)
-        file.flush()
+            for tap in self._taps:
+                tap.close()

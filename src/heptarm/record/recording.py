@@ -15,7 +15,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, require
 from heptarm.record.journal import NOTE
 from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout
-from heptarm.record.mcap_file import BEGIN, END
+from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, instance, shown
 from heptarm.values.robot import ROBOTS, RobotModel
@@ -261,17 +261,24 @@ class _Content:
     published: list[int] = field(default_factory=list)
     cycled: list[int] = field(default_factory=list)
     entries: list[tuple[int, str, bytes]] = field(default_factory=list)
+    arm: str = ""
+    arms: list[str] = field(default_factory=list)
+    earliest: int | None = None
 
 
-def load(path: str | Path) -> Recording:
+def load(path: str | Path, *, arm: str = "") -> Recording:
     """Read a recording; one that was cut off is read to its last whole chunk.
 
+    Args:
+        path: the file.
+        arm: which one, in a recording of several arms. Time zero is then the first pushed state of all of them.
+
     Raises:
-        CommandRejected: the file cannot be read, or is no recording of heptarm.
+        CommandRejected: the file cannot be read, or is no recording of heptarm, or has no such arm.
         MissingExtra: the package mcap is not installed.
     """
     where = Path(instance(path, (str, Path), "path"))
-    content = _Content()
+    content = _Content(arm=instance(arm, str, "arm"))
     try:
         with where.open("rb") as file:
             if file.read(len(_MAGIC)) != _MAGIC:
@@ -283,6 +290,11 @@ def load(path: str | Path) -> Recording:
         raise CommandRejected(
             f"{where} cannot be read: {error.strerror}", parameter="path", value=str(where)
         ) from error
+    if (arm or content.arms) and arm not in content.arms:
+        known = ", ".join(content.arms) or "none: the recording is of a single arm"
+        raise CommandRejected(
+            f"arm must be one of {known}, got {shown(arm)}", parameter="arm", value=arm, allowed=known
+        )
     if not content.facts:
         raise _no_recording(where, "it has no description of the robot")
     return _recording(where, content)
@@ -314,23 +326,30 @@ def _whole_records(file: Any) -> Iterator[Any]:
 
 def _take(record: Any, content: _Content) -> None:
     kind = type(record).__name__
+    prefix = f"/{content.arm}" if content.arm else ""
     if kind == "Message":
         topic = content.topics.get(record.channel_id, "")
-        if topic == "/state":
+        if topic.endswith("/state"):
+            at = record.publish_time
+            content.earliest = at if content.earliest is None else min(content.earliest, at)
+        if topic == f"{prefix}/state":
             content.payloads[STATE.full_name].append(record.data)
             content.published.append(record.publish_time)
-        elif topic == "/fri":
+        elif topic == f"{prefix}/fri":
             content.payloads[FRI_CYCLE.full_name].append(record.data)
             content.cycled.append(record.publish_time)
-        elif topic in ("/journal", "/signals"):
-            content.entries.append((record.publish_time, topic, record.data))
+        elif topic in (f"{prefix}/journal", f"{prefix}/signals"):
+            content.entries.append((record.publish_time, topic.removeprefix(prefix), record.data))
     elif kind == "Channel":
         content.topics[record.id] = record.topic
-        if "layout" in record.metadata:
-            name = {"/state": STATE.full_name, "/fri": FRI_CYCLE.full_name}[record.topic]
-            content.layouts[record.id] = RowLayout.of_text(name, record.metadata["layout"])
+        own = {f"{prefix}/state": STATE.full_name, f"{prefix}/fri": FRI_CYCLE.full_name}
+        if "layout" in record.metadata and record.topic in own:
+            content.layouts[record.id] = RowLayout.of_text(own[record.topic], record.metadata["layout"])
     elif kind == "Metadata" and record.name == BEGIN:
-        content.facts = dict(record.metadata)
+        name = record.metadata.get(ARM, "")
+        content.arms += [name] if name and name not in content.arms else []
+        if name == content.arm:
+            content.facts = dict(record.metadata)
     elif kind == "Metadata" and record.name == END:
         content.end = dict(record.metadata)
 
@@ -361,8 +380,10 @@ def _recording(path: Path, content: _Content) -> Recording:
     stamps = states["stamp"]
     t = (stamps - stamps[0]) * 1e-9 if len(stamps) else np.zeros(0)
     published = np.array(content.published, dtype=np.float64)
-    order = np.argsort(published, kind="stable")
-    line = _TimeLine(published[order], t[order], float(content.facts.get("clock_rate", "1")))
+    order, rate = np.argsort(published, kind="stable"), float(content.facts.get("clock_rate", "1"))
+    if len(t) and content.earliest is not None:  # of several arms: zero is the first state of all
+        t = t + (content.published[0] - content.earliest) * 1e-9 * rate
+    line = _TimeLine(published[order], t[order], rate)
     signals["t"] = t
     signals |= signals_of(states)
     if content.cycled:

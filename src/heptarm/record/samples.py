@@ -48,6 +48,11 @@ class SampleQueue:
         self._waiting = 0
         self.lost = 0
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no sample waits to be taken."""
+        return not self._samples
+
     def put(self, sample: StateSample) -> None:
         """Append a sample."""
         with self._changed:

@@ -18,8 +18,8 @@ from heptarm.errors import LimitError, StaleState, StreamError
 from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array, array
-from heptarm.values.mode.mode import Mode
+from heptarm.values.arrays import Array, array, instance, within
+from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.ptp import ptp
 
 if TYPE_CHECKING:
@@ -57,10 +57,11 @@ class DeploySettings:
     homing: float = 0.3
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.latency <= 0.5:
-            raise LimitError(
-                f"latency must be in [0, 0.5] s, got {self.latency} s", code=2, parameter="latency"
-            )
+        instance(self.guard, PolicyGuard, "guard")
+        check_mode(self.mode)
+        for name in ("speed", "acceleration", "homing"):
+            within(getattr(self, name), name, 0.0, 1.0, above=True)
+        within(self.latency, "latency", 0.0, 0.5, unit="s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,8 +223,13 @@ def circle(centre: npt.ArrayLike, radius: float, *, period: float) -> Target:
         centre: base frame, shape (3,) [m].
         radius: [m].
         period: of a round [s].
+
+    Raises:
+        LimitError: a number outside its range.
     """
     middle = array(centre, 3, "centre")
+    within(radius, "radius", 0.0, 2.0, unit="m")
+    within(period, "period", 0.0, 1e6, above=True, unit="s")
 
     def where(time: float) -> Array:
         angle = 2 * np.pi * time / period

@@ -12,7 +12,7 @@ from heptarm.rl.sim.batch import BatchReach, Engine
 from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import COARSE, ReachTask
-from heptarm.values.arrays import array
+from heptarm.values.arrays import array, instance, word
 
 require("gymnasium", extra="rl")
 
@@ -56,7 +56,8 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
         render_mode: None; there are no pictures.
 
     Raises:
-        CommandRejected: unknown engine, robot, action or feature.
+        CommandRejected: unknown robot, or a render mode.
+        ShapeError: unknown engine, action or feature.
         MissingExtra: Gymnasium is not installed.
     """
 
@@ -73,10 +74,10 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
         randomisation: Randomisation = NONE,
         render_mode: str | None = None,
     ) -> None:
-        if engine not in ENGINES:
-            raise CommandRejected(
-                f"engine must be one of {', '.join(map(repr, ENGINES))}, got {engine!r}", parameter="engine"
-            )
+        word(engine, "engine", tuple(ENGINES))
+        instance(randomisation, Randomisation, "randomisation")
+        if task is not None:
+            instance(task, ReachTask, "task")
         if render_mode is not None:
             raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
         self.render_mode = None

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from heptarm.errors import LimitError
 from heptarm.rl import kinematics
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, array, within
 from heptarm.values.robot import RobotModel
 
 
@@ -39,17 +39,17 @@ class PolicyGuard:
     stale: float = 0.25
 
     def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            object.__setattr__(self, name, tuple(array(getattr(self, name), 3, name).tolist()))
         if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
             raise LimitError(
                 f"low must be below high so that the box has a volume, got {self.low} and {self.high} m",
                 code=2,
                 parameter="low",
             )
-        for name in ("speed", "stale"):
-            if not getattr(self, name) > 0:
-                raise LimitError(
-                    f"{name} must be positive, got {getattr(self, name)}", code=2, parameter=name
-                )
+        within(self.margin, "margin", 0.0, 1.0, unit="rad")
+        within(self.speed, "speed", 0.0, 10.0, above=True, unit="rad/s")
+        within(self.stale, "stale", 0.0, 60.0, above=True, unit="s")
 
     def check(self, target: Array) -> Array:
         """Return a target, base frame, shape (3,) [m], if it is inside the box.

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError
 from heptarm.rl.task import ReachTask
+from heptarm.values.arrays import flag
 
 Weights = npt.NDArray[np.float32]
 
@@ -157,7 +158,7 @@ def shipped(*, feature: bool = False) -> Policy:
     Args:
         feature: the one that also sees the way to the target (`--feature`).
     """
-    return Policy.load(SHIPPED / f"reach-iiwa14{'-feature' if feature else ''}.npz")
+    return Policy.load(SHIPPED / f"reach-iiwa14{'-feature' if flag(feature, 'feature') else ''}.npz")
 
 
 def _weights(values: npt.ArrayLike) -> Weights:

@@ -13,12 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.errors import CommandRejected, ShapeError
 from heptarm.rl import kinematics
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, array, integer, within, word
 from heptarm.values.robot import RobotModel, robot
 
 ACTIONS = ("joint", "cartesian")
+FEATURES = ("", "kinematic")
+#: Numbers of a task that must be positive, and their units; most decisions of an episode, and largest number.
+_UNITS = {"rate": "Hz", "radius": "m", "joint_step": "rad", "cartesian_step": "m", "leash": "rad"}
+_MANY, _LARGE = 1_000_000, 1e6
 #: Scales of the kinematic feature [m]: the vector to the target, coarse, and clipped near the target.
 COARSE = 0.2
 FINE = 0.02
@@ -46,7 +50,8 @@ class ReachTask:
         leash: farthest that commanded joints may be from the measured ones [rad].
 
     Raises:
-        CommandRejected: unknown robot, action or feature.
+        CommandRejected: unknown robot.
+        ShapeError: unknown action or feature, or something that is no number.
         LimitError: a number outside its range.
     """
 
@@ -67,30 +72,16 @@ class ReachTask:
 
     def __post_init__(self) -> None:
         self.model  # noqa: B018  raises for an unknown robot
-        for name, choices in (("action", ACTIONS), ("feature", ("", "kinematic"))):
-            if getattr(self, name) not in choices:
-                raise CommandRejected(
-                    f"{name} must be one of {', '.join(map(repr, choices))}, got {getattr(self, name)!r}",
-                    parameter=name,
-                    value=getattr(self, name),
-                )
+        word(self.action, "action", ACTIONS)
+        word(self.feature, "feature", FEATURES)
         for name, length in (("home", 7), ("centre", 3), ("size", 3)):
-            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
-            if len(getattr(self, name)) != length:
-                raise ShapeError(
-                    f"{name} must have {length} numbers, got {getattr(self, name)}", parameter=name
-                )
-        for name in ("rate", "steps", "radius", "joint_step", "cartesian_step", "leash"):
-            if not 0 < getattr(self, name) < float("inf"):
-                raise LimitError(
-                    f"{name} must be a positive number, got {getattr(self, name)}",
-                    code=2,
-                    parameter=name,
-                    value=getattr(self, name),
-                    allowed="(0, inf)",
-                )
-        if not self.spread >= 0:
-            raise LimitError(f"spread must be 0 or more, got {self.spread}", parameter="spread", code=2)
+            object.__setattr__(self, name, tuple(array(getattr(self, name), length, name).tolist()))
+        integer(self.steps, "steps", 1, _MANY)
+        for name, unit in _UNITS.items():
+            object.__setattr__(
+                self, name, within(getattr(self, name), name, 0.0, _LARGE, above=True, unit=unit)
+            )
+        object.__setattr__(self, "spread", within(self.spread, "spread", 0.0, pi, unit="rad"))
 
     @property
     def model(self) -> RobotModel:

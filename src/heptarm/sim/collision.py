@@ -107,6 +107,11 @@ class CollisionModel:
         return self._margin
 
     @property
+    def allowed(self) -> frozenset[frozenset[str]]:
+        """Pairs of names of bodies that may touch."""
+        return frozenset(self._allowed)
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies: of the arm, its tool and the scene."""
         return tuple(self._plain(self._model.body(index).name) for index in range(1, self._model.nbody))

@@ -1,9 +1,10 @@
-"""Skills: touching, inserting, grasping, teaching, replaying and collision guarding, as functions that take an arm.
+"""Skills: touching, inserting, grasping, teaching, replaying, collision guarding, teleoperation: functions of an arm.
 
 They use only the public methods of `Arm`, so each is an example of how to build one; `Arm` offers some as methods.
 """
 
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
 from heptarm.skills.insertion import Insertion, insert
+from heptarm.skills.teleoperation import teleoperate
 
-__all__ = ["Gripper", "Insertion", "TwoSignalGripper", "insert"]
+__all__ = ["Gripper", "Insertion", "TwoSignalGripper", "insert", "teleoperate"]

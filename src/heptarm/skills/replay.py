@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 #: Longest time that the arm may need to settle at the end of a trajectory after its last target [s].
 _SETTLE = 2.0
-#: The arm has settled when no joint deviates more than this [rad].
-_SETTLED = 5e-3
+#: The arm has settled when no joint deviates more than this [rad] or moves faster than this [rad/s].
+_SETTLED, _STILL = 5e-3, 0.02
 #: The arm is at the start of the trajectory when no joint deviates more than this [rad].
 _AT_START = 1e-4
 #: Points of a trajectory with which a position is compared.
@@ -161,7 +161,8 @@ class _Run:
                     continue
                 # by the cabinet's clock, which the arm follows
                 due = due or state.stamp + round(_SETTLE * 1e9)
-                if float(np.abs(state.q - trajectory.q[-1]).max()) < _SETTLED or state.stamp > due:
+                distance = float(np.abs(state.q - trajectory.q[-1]).max())
+                if (distance < _SETTLED and float(np.abs(state.dq).max()) < _STILL) or state.stamp > due:
                     break
         result = servo.result
         if result is None:

@@ -18,6 +18,8 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
 from heptarm.values.state import GROUP_NAMES, State
 
+#: A set-point slower than this does not move [rad/s].
+_STILL = 1e-6
 #: More numbers than this are reported by their least and largest.
 _MANY = 16
 _SEEN: ContextVar[list[str] | None] = ContextVar("heptarm_measured", default=None)
@@ -154,6 +156,12 @@ class MotionStates:
     def rates(self) -> Array:
         """Commanded joint speeds between two states, shape (n - 1, 7) [rad/s]."""
         return np.asarray(np.diff(self.q_cmd, axis=0) / np.diff(self.t)[:, None])
+
+    @property
+    def moving(self) -> float:
+        """Time for which the set-point moved [s]; unlike the result's duration, no late thread makes it longer."""
+        (moved,) = np.nonzero(np.abs(self.rates).max(axis=1) > _STILL)
+        return float(self.t[moved[-1] + 1] - self.t[moved[0]]) if len(moved) else 0.0
 
     @property
     def speeds(self) -> Array:

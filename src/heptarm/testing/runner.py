@@ -15,6 +15,7 @@ from heptarm.testing.measure import NotShown, Unfit, collect
 from heptarm.testing.report import Outcome, Report, Verdict
 from heptarm.testing.scenario import REGISTRY, Risk, Scenario
 from heptarm.testing.stage import HOME, REAL_SPEED, VIRTUAL_SPEED, has_operator
+from heptarm.values.arrays import instance
 from heptarm.values.motion.ptp import ptp
 
 #: Modules of this package that define scenarios, in the order in which they run.
@@ -52,9 +53,11 @@ def find(patterns: Sequence[str] = ()) -> tuple[Scenario, ...]:
         CommandRejected: a pattern that fits none.
     """
     every = scenarios()
+    instance(patterns, (list, tuple), "patterns")
     if not patterns:
         return every
     for pattern in patterns:
+        instance(pattern, str, "patterns")
         if not any(_fits(one, pattern) for one in every):
             raise CommandRejected(
                 f"no scenario {pattern!r}",

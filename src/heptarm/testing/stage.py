@@ -7,8 +7,9 @@ from urllib.parse import urlencode
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, instance, within
 from heptarm.values.pose import deg
+from heptarm.values.robot import robot
 
 #: Where every scenario begins: the elbow bent at a right angle, the flange pointing down.
 HOME: Array = deg(0, 30, 0, -90, 0, 60, 0)
@@ -17,6 +18,8 @@ TABLE = 0.2
 DEEPEST = 0.3
 #: How fast a scenario moves: fractions of the axes' maxima.
 VIRTUAL_SPEED, REAL_SPEED = 1.0, 0.1
+#: Simulated seconds per second at most.
+FASTEST = 1000.0
 
 
 def stage(*, model: str = "iiwa14", speed: float = 1.0, sensors: str = "ideal") -> str:
@@ -26,7 +29,14 @@ def stage(*, model: str = "iiwa14", speed: float = 1.0, sensors: str = "ideal") 
         model: "iiwa7", "iiwa14", "med7" or "med14".
         speed: simulated seconds per second.
         sensors: "ideal", "noisy" or "noisy:SEED".
+
+    Raises:
+        CommandRejected: unknown model.
+        LimitError, ShapeError: another value that means nothing.
     """
+    robot(model)
+    within(speed, "speed", 0.0, FASTEST, above=True)
+    instance(sensors, str, "sensors")
     options = {
         "speed": f"{speed:g}",
         "sensors": sensors,

@@ -136,6 +136,12 @@ def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> A
         ShapeError: it is not a vector of that size.
         LimitError: an entry is infinite, or NaN where that is not allowed.
     """
+    if isinstance(value, tuple) and len(value) == size and all(type(entry) is float for entry in value):
+        result = np.array(value)
+        if math.isfinite(sum(value)):  # the usual case: every entry is finite
+            result += 0.0  # as `numbers` does
+            result.flags.writeable = False
+            return result
     result = numbers(value, name, f"{size} numbers")
     if result.shape != (size,):
         raise ShapeError(f"{name} must have shape ({size},), got {result.shape}", parameter=name, value=value)

@@ -49,3 +49,39 @@ class CollisionCheck(Protocol):
 
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
+
+
+class ClearanceModel(Protocol):
+    """What `keep_clear_of` of a stream of velocities needs; `heptarm.CollisionModel` is one."""
+
+    @property
+    def margin(self) -> float:
+        """Bodies nearer than this count as touching [m]."""
+
+    @property
+    def allowed(self) -> frozenset[frozenset[str]]:
+        """Pairs of names of bodies that may touch."""
+
+    def clearances(self, q: Array, *, below: float) -> tuple[Clearance, ...]:
+        """Pairs of bodies nearer than a distance [m] at joint positions, shape (7,) [rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForeseenCollision(Value):
+    """Two bodies that would touch in a program that was looked ahead.
+
+    Attributes:
+        clearance: the bodies, and their distance there.
+        t: time from the beginning of the program [s].
+        motion: index of the motion.
+        q: joint positions there, shape (7,) [rad].
+    """
+
+    clearance: Clearance
+    t: float
+    motion: int
+    q: Array
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"{self.clearance} after {self.t:.2f} s, in motion {self.motion}"

@@ -117,7 +117,7 @@ class Pose(Value):
     def __post_init__(self) -> None:
         object.__setattr__(self, "xyz", array(self.xyz, 3, "xyz"))
         quat = array(self.quat, 4, "quat")
-        norm = float(np.linalg.norm(quat))
+        norm = math.sqrt(quat.dot(quat))
         if abs(norm - 1.0) > 1e-3:
             raise ShapeError(
                 f"quat must have norm 1, got {norm:.6g} for {quat}",

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, shown, within
-from heptarm.values.pose import deg
+from heptarm.values.pose import Pose, deg
 
 
 def _no_inertia() -> Array:
@@ -48,6 +48,23 @@ class Body(Value):
                 allowed="none negative, none above the sum of the other two",
                 hint="check the order xx yy zz xy xz yz and that it is about the centre of mass",
             )
+
+    def placed(self, pose: Pose) -> Body:
+        """The same body seen from the frame in which its own frame has a pose."""
+        turn = pose.rotation
+        return Body(self.mass, pose.xyz + turn @ self.com, _entries(turn @ symmetric(self.inertia) @ turn.T))
+
+    def joined(self, other: Body) -> Body:
+        """This body and another one in the same frame as one."""
+        mass = self.mass + other.mass
+        if mass == 0.0:
+            return self
+        com = (self.mass * self.com + other.mass * other.com) / mass
+        inertia = np.zeros((3, 3))
+        for one in (self, other):
+            by = one.com - com
+            inertia += symmetric(one.inertia) + one.mass * (float(by @ by) * np.eye(3) - np.outer(by, by))
+        return Body(mass, com, _entries(inertia))
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -112,6 +129,11 @@ class Links(Value):
 def symmetric(entries: Array) -> Array:
     """Symmetric matrices of xx yy zz xy xz yz: shape (..., 6) to (..., 3, 3)."""
     return np.asarray(entries)[..., [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+
+
+def _entries(inertia: Array) -> Array:
+    """Entries xx yy zz xy xz yz of a symmetric matrix."""
+    return np.array([*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
 
 
 #: Acceleration and jerk of every joint in the virtual cabinet; MoveIt configurations have this acceleration.

@@ -14,12 +14,13 @@ attached to.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, shown, within
+from heptarm.values.arrays import Array, Value, array, frozen, shown, within
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
@@ -145,11 +146,20 @@ class KnownTool(Value):
         name: for `arm.tool`.
         mass: [kg].
         frames: its frames, flange to frame; the default one first.
+        com: centre of mass in the flange frame, shape (3,) [m].
+        inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
     """
 
     name: str
     mass: float
     frames: tuple[tuple[str, Pose], ...] = ()
+    com: Array = field(default_factory=lambda: frozen(np.zeros(3)))
+    inertia: Array = field(default_factory=lambda: frozen(np.zeros(6)))
+
+    @property
+    def body(self) -> Body:
+        """Mass, centre of mass and inertia."""
+        return Body(self.mass, self.com, inertia=self.inertia)
 
     @property
     def frame_names(self) -> tuple[str, ...]:

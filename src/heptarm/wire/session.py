@@ -12,6 +12,7 @@ It has no socket, clock or thread::
 from __future__ import annotations
 
 import enum
+import functools
 import hmac
 import secrets
 from collections.abc import Iterable, Iterator
@@ -153,6 +154,12 @@ class Session:
             LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
         kind = type(message)
+        if kind in self._requests and request != 0 and request not in self._waiting:  # the usual case
+            body = message.encode()
+            data = pack(kind.TYPE, body, seq=self._sent, request=request, time=time, tag=self._tag)
+            self._waiting[request] = kind
+            self._count_sent()
+            return data
         after = self._legal.get(_SYMBOLS[kind])
         if after is None or (self._source != kind.SOURCE and kind.SOURCE != "both"):
             raise self._illegal(kind)
@@ -274,6 +281,20 @@ class Session:
             yield event
 
     def _accept(self, frame: Frame) -> Received | StateReceived:
+        kind = self._answers.get(frame.type)
+        if (
+            kind is not None  # the usual case
+            and frame.request in self._waiting
+            and frame.seq == self._received
+            and frame.version == MAJOR
+        ):
+            self._count_received()
+            try:
+                message = kind.decode(frame.body)
+            except DecodeError as error:
+                raise _broken(Code.BAD_BODY, f"{kind.__name__}: {error}") from error
+            del self._waiting[frame.request]
+            return Received(message, frame.request, frame.time)
         if frame.version != MAJOR and frame.type not in _FROZEN:
             raise _broken(
                 Code.WRONG_VERSION, f"a frame has protocol version {frame.version}, this side has {MAJOR}"
@@ -296,9 +317,7 @@ class Session:
             )
         if kind.KIND == "request" and frame.request in self._waiting:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"request id {frame.request} is in use")
-        self._received = (self._received + 1) & _WRAP
-        if self._received == 0 and self._reader.tag is not None:
-            self._reader.tag.begin_round()
+        self._count_received()
         if kind is State:
             return StateReceived(frame.body, frame.time)
         try:
@@ -309,6 +328,11 @@ class Session:
             self._check_handshake(message, frame.body)
         self._after(kind, after, frame.request, frame.body)
         return Received(message, frame.request, frame.time)
+
+    def _count_received(self) -> None:
+        self._received = (self._received + 1) & _WRAP
+        if self._received == 0 and self._reader.tag is not None:
+            self._reader.tag.begin_round()
 
     def _check_handshake(self, message: Message, body: bytes) -> None:
         """Check the part of a handshake message that concerns the key."""
@@ -331,6 +355,7 @@ class Session:
 
     def _enter(self, state: SessionState) -> None:
         self._state, self._legal = state, TRANSITIONS[state]
+        self._requests, self._answers = _plain(state, self._source)
         self._packers = {
             kind: pack
             for kind, pack in self._one_way.items()
@@ -361,6 +386,16 @@ class Session:
         if kind.SOURCE not in (self._source, "both"):
             return LocalProtocolError(f"the {self._source} may not send a {kind.__name__}")
         return LocalProtocolError(f"a {kind.__name__} may not be sent in state {self._state.value!r}")
+
+
+@functools.cache
+def _plain(state: SessionState, source: str) -> tuple[frozenset[type[Message]], dict[int, type[Message]]]:
+    """Requests that a side may send, and answers that it may get, by their ids: those that keep the state as it is."""
+    legal = TRANSITIONS[state]
+    kept = [kind for kind in MESSAGES.values() if legal.get(_SYMBOLS[kind]) is state]
+    requests = (kind for kind in kept if kind.KIND == "request" and kind.SOURCE in (source, "both"))
+    answers = (kind for kind in kept if kind.KIND == "answer" and source != kind.SOURCE)
+    return frozenset(requests), {kind.TYPE: kind for kind in answers}
 
 
 def _broken(code: Code, text: str) -> RemoteProtocolError:

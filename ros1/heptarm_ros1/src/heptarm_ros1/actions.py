@@ -11,7 +11,7 @@ from actionlib import ActionServer
 from actionlib_msgs.msg import GoalStatus
 
 from heptarm.errors import HeptarmError, NotReady
-from heptarm.ros.interface.action import ActionDispatcher, GoalWork, RosAction, fill
+from heptarm.ros.interface.action import ActionDispatcher, ActionResult, GoalWork, RosAction, fill
 from heptarm.ros.interface.actions import ACTIONS
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
@@ -46,7 +46,8 @@ class ActionServers:
                 work = self._dispatcher.begin(row, handle.get_goal())
             except HeptarmError as error:
                 rospy.logwarn(f"{row.name} rejected: {error}")
-                handle.set_rejected(result(success=False, message=str(error)), str(error))
+                refused = ActionResult(GoalOutcome.ABORTED, str(error)).fill(result())
+                handle.set_rejected(refused, str(error))
                 return
             handle.set_accepted()
             client = _Client(handle, class_of(f"{row.type}Feedback", "msg"))

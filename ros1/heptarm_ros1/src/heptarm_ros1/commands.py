@@ -9,9 +9,9 @@ import rospy
 from heptarm.errors import HeptarmError
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
-from heptarm.ros.interface.services import SERVICES
-from heptarm.ros.interface.topics import Topic, TopicDispatcher, topics_of
+from heptarm.ros.interface.topics import Topic, TopicDispatcher
 from heptarm_ros1 import convert
 
 
@@ -19,10 +19,12 @@ class Commands:
     """Passes messages and requests to their handlers."""
 
     def __init__(self, context: NodeContext) -> None:
-        values = context.driver.configuration.values
+        table = offered(context.driver.configuration.values)
+        for package in table.missing:
+            rospy.logwarn(f"{package} is not installed: topics and services with its types are left out")
         topics, requests = TopicDispatcher(context), ServiceDispatcher(context)
-        self._subscribers = [_subscriber(topics, row) for row in topics_of(values)]
-        self._services = [_service(requests, row) for row in SERVICES]
+        self._subscribers = [_subscriber(topics, row) for row in table.topics]
+        self._services = [_service(requests, row) for row in table.services]
 
     def destroy(self) -> None:
         """Destroy subscribers and services."""

@@ -78,7 +78,7 @@ class HeptarmNode:
                 self.activate()
                 return
             except HeptarmError as error:
-                rospy.logerr(f"not configured: {error}")
+                rospy.logerr(f"not configured: {error}; wait, the next attempt is in {_RETRY:g} s")
             self._ending.wait(_RETRY)
 
     def configure(self) -> str:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from geometry_msgs.msg import Pose, Wrench
-from sensor_msgs.msg import JointState
-
-from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.names import PRESETS
 from heptarm.ros.interface.state_messages import preset_message
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.state import State
@@ -17,17 +15,16 @@ class PresetPublisher:
     """Publishes states under the names that the parameter `names` adds."""
 
     def __init__(self, configuration: NodeConfiguration) -> None:
-        self._joints = configuration.joints
-        kinds = {NameRole.JOINT_STATES: JointState, NameRole.POSE: Pose, NameRole.WRENCH: Wrench}
+        self._names = configuration
         self._publishers = [
-            (entry, publisher(kinds[entry.role], entry.name))
+            (entry, publisher(class_of(entry.type, "msg"), entry.name))
             for entry in PRESETS[configuration.values["names"]].published()
         ]
 
     def state(self, state: State) -> None:
         """Publish a state."""
         for entry, one in self._publishers:
-            message = preset_message(ROS, entry, state, self._joints)
+            message = preset_message(ROS, entry, one.data_class, state, self._names)
             if message is not None:
                 one.publish(message)
 

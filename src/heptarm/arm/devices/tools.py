@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from heptarm.arm.link.connection import Connection
@@ -17,6 +17,7 @@ from heptarm.values.mode.mode import Mode
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
+from heptarm.values.robot import Body
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
@@ -80,6 +81,16 @@ class Tooling:
             return None
         return Attachment(newest.groups.mode.tool, newest.groups.mode.workpiece, newest.groups.mode.frame)
 
+    @property
+    def load(self) -> Body | None:
+        """Mass, centre of mass and inertia of what is attached, in the flange frame; None: nothing that is known."""
+        attached = self.attached
+        tool = None if attached is None else self.known.get(attached.tool)
+        if self._workpiece is None or attached is None or attached.workpiece != self._workpiece.name:
+            return None if tool is None else tool.body
+        held = self._workpiece.body.placed(self.on_flange(attached.frame))
+        return held if tool is None else tool.body.joined(held)
+
     # ------------------------------------------------------------------------------- attaching
 
     def attach(self, tool: Tool | str, frame: str | None) -> None:
@@ -91,7 +102,7 @@ class Tooling:
             if frame is not None:
                 tool.frame(frame)
             self._connection.request(wire.DefineTool(tool=tool_message(tool)))
-            self._defined[tool.name] = KnownTool(tool.name, tool.mass, tool.frames)
+            self._defined[tool.name] = KnownTool(tool.name, tool.mass, tool.frames, tool.com, tool.inertia)
             name = tool.name
         elif isinstance(tool, str):
             name, main = tool, frame or ""
@@ -221,6 +232,25 @@ class Tooling:
     def in_base(self, name: str) -> Pose | None:
         """Pose of a fixed frame in the base: the base itself, or a taught frame; None: it is no fixed one."""
         return _ORIGIN if name == BASE else self.taught.get(name)
+
+    def axes(self, frame: str | Pose) -> Callable[[Pose], Pose]:
+        """A function that returns a frame's pose in the base, by the pose of the flange.
+
+        Args:
+            frame: its name, or its pose in the base.
+
+        Raises:
+            CommandRejected: no such frame is known.
+        """
+        if isinstance(frame, str):
+            self.check_reference(frame, "frame")
+            fixed = self.in_base(frame)
+            if fixed is None:
+                moved = self.on_flange(frame)
+                return lambda flange: flange @ moved
+        else:
+            fixed = frame
+        return lambda _: fixed
 
     def wrench(self, state: State, name: str, axes: str) -> Wrench:
         """External force and torque at the origin of one frame in the axes of another; raises as `pose` does."""

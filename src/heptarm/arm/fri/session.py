@@ -40,6 +40,7 @@ from heptarm.errors import (
 )
 from heptarm.fri.loop.client import Client
 from heptarm.fri.loop.cycle import LAW_FAILED
+from heptarm.fri.loop.law_interface import LiveMemory
 from heptarm.fri.loop.user_api import Params, Stats
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import Quality, SessionState
@@ -335,6 +336,11 @@ class Fri(Block):
     def params(self) -> Params:
         """Parameters of the law; assign to one to change it while the law runs."""
         return self.client.params
+
+    @property
+    def memory(self) -> LiveMemory:
+        """Memory of the law; read it, or assign to it, while the law runs."""
+        return self.client.memory
 
     @property
     def inputs(self) -> dict[str, SignalValue]:

@@ -16,6 +16,8 @@ from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop.client import Client, check_settings
+from heptarm.fri.loop.compiled import CompiledLaw
+from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
@@ -28,8 +30,12 @@ from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
-#: `law(state, out, params)`.
-Law = Callable[[FriState, Output, Params], object]
+#: `law(state, out, params)` or `law(state, out, params, memory)`.
+Law = (
+    Callable[[FriState, Output, Params], object]
+    | Callable[[FriState, Output, Params, Memory], object]
+    | CompiledLaw
+)
 
 KINDS = {mode.name.lower(): mode for mode in wire.FriCommandMode}
 #: Quantities that the client commands, by kind.
@@ -57,6 +63,7 @@ class FriKeywords(TypedDict, total=False):
     mode: Mode | None
     law: Law | None
     params: Mapping[str, npt.ArrayLike] | None
+    memory: Mapping[str, npt.ArrayLike] | None
     policy: Policy | None
     limits: Limits | None
     pose_limits: PoseLimits | None
@@ -96,6 +103,7 @@ def request(
     mode: Mode | None = None,
     law: Law | None = None,
     params: Mapping[str, npt.ArrayLike] | None = None,
+    memory: Mapping[str, npt.ArrayLike] | None = None,
     policy: Policy | None = None,
     limits: Limits | None = None,
     pose_limits: PoseLimits | None = None,
@@ -139,6 +147,7 @@ def request(
         policy=policy,
         law=law,
         params=params,
+        memory=memory,
         history=history,
         realtime=realtime,
         cpu=cpu,
@@ -167,6 +176,7 @@ def request(
                 policy=policy,
                 law=law,
                 params=params,
+                memory=memory,
                 history=history,
                 realtime=realtime,
                 cpu=cpu,

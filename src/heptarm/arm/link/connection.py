@@ -478,8 +478,11 @@ class Connection:
 
     def request(self, message: Message) -> None:
         """Send a request that is only accepted or refused; raises as `Link.request` does."""
-        with self._with_black_box():
+        try:
             self.link.submit(message, timeout=self.options.timeout)
+        except (SafetyStop, ConnectionLost) as error:
+            error.with_black_box(self.black_box.last)  # of the incident that caused it
+            raise
 
     def take_control(self) -> None:
         """Take control."""
@@ -509,14 +512,8 @@ class Connection:
             if isinstance(answer, wire.Accepted):
                 self.events.claim(program, answer.id)
 
-        with self._with_black_box():
-            self.link.submit(message, timeout=self.options.timeout, on_answer=claim)
-
-    @contextlib.contextmanager
-    def _with_black_box(self) -> Iterator[None]:
-        """A block whose errors have the black box of the incident that caused them."""
         try:
-            yield
+            self.link.submit(message, timeout=self.options.timeout, on_answer=claim)
         except (SafetyStop, ConnectionLost) as error:
             error.with_black_box(self.black_box.last)
             raise
@@ -635,7 +632,14 @@ class Connection:
             duration=duration,
             size=size,
             until=until,
+            read=self._read_while,
         )
+
+    def _read_while(self, waits: Callable[[], bool], seconds: float) -> None:
+        """Read in this thread what it waits for, where that saves time; see `Link.read_while`."""
+        link = self._link
+        if link is not None:
+            link.read_while(waits, seconds)
 
     def _stream_error(self) -> HeptarmError | None:
         """The error that ends a stream for which no state arrives."""

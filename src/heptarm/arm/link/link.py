@@ -1,7 +1,7 @@
 """One session with a cabinet over one transport: requests and answers, events, states, heartbeat.
 
-Whichever thread waits for an answer reads the socket itself, so that an answer wakes one thread, not two. The link
-thread reads while nobody waits, and sends pings.
+Whichever thread waits for an answer reads the socket itself, so that an answer wakes one thread, not two; so does a
+loop over states at a high rate. The link thread reads while nobody waits, and sends pings.
 """
 
 from __future__ import annotations
@@ -187,6 +187,9 @@ _TURN = 0.0002
 _POLLING, _STEP = 30_000_000, 0.0005
 #: From this state rate on the link thread never polls, since states must be taken at once [Hz].
 _FAST_STATES = 250.0
+#: For this long after a loop has read its states [ns] the link thread leaves the socket to it, and looks after it once
+#: per step [s].
+_LOOPING, _LOOP_STEP = 5_000_000, 0.002
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
 #: Largest number of a target; they begin again at 0, which counts as newer than all.
@@ -243,6 +246,7 @@ class Link:
         self._requested = clock.nanos()
         self._heartbeat = Heartbeat(self._requested)
         self._polling = _POLLING
+        self._looped = self._requested - _LOOPING
         self._datagrams: DatagramLine | None = None
         self._targets = 0
         self._pushing = threading.Lock()  # states and pings arrive over TCP and by datagram
@@ -435,6 +439,34 @@ class Link:
             raise rejection(answer)
         return answer
 
+    def read_while(self, waits: Callable[[], bool], seconds: float) -> None:
+        """Read in the calling thread while it waits for a state, so that each state wakes one thread, not two.
+
+        Does nothing if another thread reads, if states come by datagram, or at a low rate.
+
+        Args:
+            waits: whether it still waits.
+            seconds: how long at most [s].
+        """
+        if self._polling or self._datagrams is not None or self.is_read_here:
+            return
+        if not self._reading.acquire(timeout=_TURN):
+            return
+        clock = self._clock
+        deadline = clock.nanos() + round(seconds * 1e9)
+        shield = InterruptShield()
+        try:
+            self._caller_reads = True
+            self._reader = get_ident()
+            while waits() and self._error is None and not shield.pending and clock.nanos() < deadline:
+                self._read(wait=True)
+        finally:
+            self._looped = clock.nanos()
+            self._caller_reads = False
+            self._reader = 0
+            self._reading.release()
+            shield.release()
+
     def submit(
         self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
     ) -> int:
@@ -601,7 +633,11 @@ class Link:
                     self.ping()
                     due = now + self._heartbeat.interval
                 rest = max(0.0, (due - now) * 1e-9)
-                if self._caller_reads:
+                if now - self._looped < _LOOPING:
+                    # a loop over states reads, and is back within a moment
+                    clock.sleep(_LOOP_STEP)
+                    self._heartbeat.check(clock.nanos(), self.peer)
+                elif self._caller_reads:
                     # a caller reads; most are done within a fraction of a millisecond
                     clock.sleep(_STEP)
                     if self._caller_reads and self._reading.acquire(timeout=rest):

@@ -189,6 +189,8 @@ class States(Iterator[State]):
 
     Every state that was received before the stream's end is returned, however late the loop takes it, unless more wait
     than the stream keeps: then the oldest are dropped, and `lost` counts them.
+
+    At high rates the thread that waits reads the connection itself, see `Link.read_while`.
     """
 
     def __init__(
@@ -202,12 +204,14 @@ class States(Iterator[State]):
         duration: float | None,
         size: int,
         until: Followed | None = None,
+        read: Callable[[Callable[[], bool], float], None] | None = None,
     ) -> None:
         self._queue: SampleQueue | None = None
         self._feed = feed
         self._clock = clock
         self._build = build
         self._check = check
+        self._read = read
         self._period = None if rate is None else round(1e9 / rate)
         now = clock.nanos()
         self._end = None if duration is None else now + round(duration * 1e9)
@@ -320,8 +324,11 @@ class States(Iterator[State]):
         self.close()
 
     def _next_queued(self) -> StateSample | None:
-        assert self._queue is not None
-        return self._queue.get(self._rest())
+        queue = self._queue
+        assert queue is not None
+        if self._read is not None and queue.is_empty:
+            self._read(lambda: queue.is_empty, self._rest())
+        return queue.get(self._rest())
 
     def _next_paced(self) -> StateSample | None:
         assert self._period is not None

@@ -17,6 +17,7 @@ from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.translate.motions import items
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError
+from heptarm.values.arrays import Array
 from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
 from heptarm.values.mode.mode import Mode
@@ -56,12 +57,15 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
     return tuple(motions)
 
 
-def with_kept_joints(connection: Connection, motions: tuple[Motion, ...]) -> tuple[Motion, ...]:
+def with_kept_joints(
+    connection: Connection, motions: tuple[Motion, ...], start: Array | None = None
+) -> tuple[Motion, ...]:
     """The motions with a number for every joint that a PTP keeps: its set-point when the PTP starts.
 
     Args:
         connection: to the cabinet.
         motions: in their order.
+        start: set-point when the first one starts, shape (7,) [rad]; None: the present one.
 
     Raises:
         CommandRejected: the set-point is not known yet: another motion runs, or one to a pose or home comes before.
@@ -69,9 +73,11 @@ def with_kept_joints(connection: Connection, motions: tuple[Motion, ...]) -> tup
     """
     if not any(isinstance(one, Ptp) and one.keeps for one in motions):
         return motions
-    state = connection.fresh()
-    moves = state.motion is not None and (state.motion.active or state.motion.queued > 0)
-    known = None if moves else state.q_cmd
+    known = start
+    if start is None:
+        state = connection.fresh()
+        moves = state.motion is not None and (state.motion.active or state.motion.queued > 0)
+        known = None if moves else state.q_cmd
     made: list[Motion] = []
     for index, one in enumerate(motions):
         if isinstance(one, Ptp) and one.keeps:

@@ -17,9 +17,21 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
-from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, Timeout
+from heptarm.errors import (
+    CommandRejected,
+    HeptarmError,
+    LocalProtocolError,
+    ShapeError,
+    Timeout,
+    Unreachable,
+)
 from heptarm.io.tcp import WarmUpConnection
-from heptarm.values.arrays import Array, array, instance, within, word
+from heptarm.model.boundary import TOLERANCE, Boundary
+from heptarm.model.inverse_kinematics import solve
+from heptarm.model.kinematics import forward
+from heptarm.model.velocity import FREE, Slowdown
+from heptarm.values.arrays import Array, array, instance, shown, within, word
+from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode
@@ -31,13 +43,21 @@ from heptarm.wire import messages as wire
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
-KINDS = ("joint", "pose", "lin")
+#: Kinds of servo motions: of targets, and of velocities.
+KINDS = ("joint", "pose", "lin", "velocity", "twist")
+VELOCITIES = ("velocity", "twist")
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
 #: The protocol's defaults and ranges; `schema/protocol.toml` is their one place.
 _DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoTiming.RANGES
 #: Added to the period for the default of min_trajectory_time, so that the next target comes before its end [s].
 _OVERLAP = 0.005
-#: Limits along and about each axis of the base for straight lines: default, largest value, unit.
+#: Default of the silence after which a stream of velocities comes to rest [s].
+_SILENCE = 0.2
+#: Of a stream of velocities: the cabinet's own limit of the acceleration, relative to that of the stream, so that the
+#: arm follows the ramps of the stream; and how many periods the arm keeps a velocity after its target.
+_CABINET_ACCELERATION, _KEPT_PERIODS = 2.0, 3.0
+#: Limits along and about each axis of the base for straight lines, of the whole velocity for twists: default, largest
+#: value, unit.
 _LINE_LIMITS = {
     "speed_mps": (0.25, 10.0, "m/s"),
     "acceleration_mps2": (1.0, 100.0, "m/s²"),
@@ -63,6 +83,9 @@ class ServoKeywords(TypedDict, total=False):
     goal_timeout: float
     speed_timeout: float | None
     moving: str
+    frame: str | Pose
+    timeout: float | None
+    keep_clear_of: ClearanceModel | None
     until: Condition | None
 
 
@@ -71,28 +94,34 @@ class ServoRequest:
     """A checked request for a servo motion: its keywords, as `documented` lists them in `Arm.servo`.
 
     Attributes:
-        kind: what the targets are: "joint", "pose" or "lin".
-        rate: ticks of the loop per second [Hz]; 100.
+        kind: what the targets are: "joint", "pose" or "lin"; or velocities: "velocity" or "twist".
+        rate: ticks of the loop per second [Hz]; 100. A stream of velocities sends so many targets itself.
         watchdog: longest gap between two targets; a longer one stops the arm [s], 0.005 to 2; None: five
             periods, at least 0.2 s.
         engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" moves straight
             to it, for targets that are close and smooth.
         mode: control mode; None: that of `using`, otherwise position. Its parameters can change while the arm
             follows.
-        speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower
-            one of this and `arm.speed` applies.
+        speed: of joints, poses and velocities: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2.
+            The lower one of this and `arm.speed` applies.
         acceleration: likewise, of the acceleration and the jerk.
         speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
-            scales it, since the joints' own limits are not checked.
+            scales it, since the joints' own limits are not checked. Of "twist": largest speed, not scaled.
         acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
-        speed_radps: largest angular velocity about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
+        speed_radps: largest angular velocity about each axis of the base, of "twist" about any axis [rad/s], up to
+            20; None: 0.5. Scaled for "lin".
         acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
         min_trajectory_time: shortest trajectory to a target [s]; None: a period and 5 ms.
         goal_timeout: time at its target without another one after which the cabinet's servo motion ends [s];
             300. The next target begins a new one.
         speed_timeout: of joints with the engine "smart": how long the arm keeps the velocity of a target after
             passing it, before it brakes [s], 0.001 to 10; None: 0.1.
-        moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame.
+        moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame. A twist
+            is the velocity of its origin.
+        frame: of "twist": its axes: "tool", "flange", "base", the name of a frame, or its pose in the base; "tool".
+        timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
+        keep_clear_of: of velocities: bodies to brake before, such as a `heptarm.CollisionModel`; None: none. It is
+            no safety function: it knows only its own model of the scene.
         until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
             robot answers. See `move`.
 
@@ -118,12 +147,26 @@ class ServoRequest:
     goal_timeout: float = _DEFAULT.timing.goal_timeout
     speed_timeout: float | None = None
     moving: str = TOOL
+    frame: str | Pose | None = None
+    timeout: float | None = None
+    keep_clear_of: ClearanceModel | None = None
     until: Condition | None = None
 
     def __post_init__(self) -> None:
         word(self.engine, "engine", ENGINES)
         check_name(self.moving, "moving")
         word(self.kind, "kind", KINDS)
+        if self.frame is not None and not isinstance(self.frame, Pose):
+            check_name(self.frame, "frame")
+        if self.timeout is not None:
+            within(self.timeout, "timeout", 0.01, 10.0, unit="s")
+        if self.keep_clear_of is not None and not callable(getattr(self.keep_clear_of, "clearances", None)):
+            raise ShapeError(
+                f"keep_clear_of must have a method clearances, got {shown(self.keep_clear_of)}",
+                parameter="keep_clear_of",
+                value=self.keep_clear_of,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
         if self.until is not None:
             check_condition(self.until)
         self._refuse_foreign_limits()
@@ -155,9 +198,7 @@ class ServoRequest:
         given = {
             "min_trajectory_time": shortest,
             "goal_timeout": self.goal_timeout,
-            "speed_timeout": _DEFAULT.timing.speed_timeout
-            if self.speed_timeout is None
-            else self.speed_timeout,
+            "speed_timeout": self._kept if self.speed_timeout is None else self.speed_timeout,
         }
         message = wire.ServoOpen(
             frame="" if self.moving == TOOL else self.moving,
@@ -175,20 +216,52 @@ class ServoRequest:
                 acceleration=1.0,
                 linear=self._line_limits(ceiling),
             )
+        velocity, acceleration = self.joint_fractions(ceiling)
+        if self.kind in VELOCITIES:
+            acceleration = min(1.0, _CABINET_ACCELERATION * acceleration)
+        return replace(message, engine=ENGINES[self.engine], velocity=velocity, acceleration=acceleration)
+
+    def joint_fractions(self, ceiling: float) -> tuple[float, float]:
+        """Largest speed and acceleration, fractions of each axis' maximum; arguments and errors as `message`."""
         velocity = _DEFAULT.velocity if self.speed is None else self.speed
         acceleration = _DEFAULT.acceleration if self.acceleration is None else self.acceleration
-        return replace(
-            message,
-            engine=ENGINES[self.engine],
-            velocity=min(ceiling, within(velocity, "speed", 0.0, 1.0, above=True)),
-            acceleration=within(acceleration, "acceleration", 0.0, 1.0, above=True),
+        return (
+            min(ceiling, within(velocity, "speed", 0.0, 1.0, above=True)),
+            within(acceleration, "acceleration", 0.0, 1.0, above=True),
         )
 
+    @property
+    def silence(self) -> float:
+        """Silence after which a stream of velocities comes to rest [s]."""
+        return _SILENCE if self.timeout is None else self.timeout
+
+    @property
+    def _kept(self) -> float:
+        """How long the arm keeps the velocity of a target after passing it [s]."""
+        default = _DEFAULT.timing.speed_timeout
+        return max(default, _KEPT_PERIODS * self.period) if self.kind in VELOCITIES else default
+
+    def line_limits(self) -> tuple[float, float, float, float]:
+        """Largest speed, acceleration, angular velocity and acceleration [m/s, m/s², rad/s, rad/s²].
+
+        Raises:
+            LimitError: one is outside its range.
+        """
+        speed, acceleration, turn, spin = (
+            within(
+                default if getattr(self, name) is None else getattr(self, name),
+                name,
+                0.0,
+                most,
+                above=True,
+                unit=unit,
+            )
+            for name, (default, most, unit) in _LINE_LIMITS.items()
+        )
+        return speed, acceleration, turn, spin
+
     def _line_limits(self, ceiling: float) -> wire.CartesianDynamics:
-        chosen = []
-        for name, (default, most, unit) in _LINE_LIMITS.items():
-            given = getattr(self, name)
-            chosen.append(within(default if given is None else given, name, 0.0, most, above=True, unit=unit))
+        chosen = self.line_limits()
         return wire.CartesianDynamics(
             velocity=ceiling * chosen[0],
             acceleration=chosen[1],
@@ -213,14 +286,33 @@ class ServoRequest:
                     parameter="engine",
                     hint=hint,
                 )
-        else:
+        elif self.kind != "twist":
             for name in _LINE_LIMITS:
                 if getattr(self, name) is not None:
                     raise CommandRejected(
-                        f'{name} applies to arm.servo("lin") only; a {self.kind} servo has speed and acceleration',
+                        f'{name} applies to arm.servo("lin") and arm.servo("twist") only; '
+                        f"a {self.kind} servo has speed and acceleration",
                         parameter=name,
                         hint=hint,
                     )
+        if self.kind in VELOCITIES and self.engine != "smart":
+            raise CommandRejected(
+                f'engine applies to arm.servo("joint") and arm.servo("pose") only, got {self.engine!r}',
+                parameter="engine",
+                hint="leave it out",
+            )
+        if self.kind not in VELOCITIES:
+            for name in ("timeout", "keep_clear_of"):
+                if getattr(self, name) is not None:
+                    raise CommandRejected(
+                        f'{name} applies to arm.servo("velocity") and arm.servo("twist") only',
+                        parameter=name,
+                        hint="leave it out",
+                    )
+        if self.frame is not None and self.kind != "twist":
+            raise CommandRejected(
+                'frame applies to arm.servo("twist") only', parameter="frame", hint="leave it out"
+            )
         if self.speed_timeout is not None and (self.kind, self.engine) != ("joint", "smart"):
             raise CommandRejected(
                 'speed_timeout applies only to arm.servo("joint") with the engine "smart", '
@@ -265,6 +357,8 @@ class ServoStats:
         age_median: median age of the targets when they were applied [s]; NaN: not reported yet.
         age_p99: its 99th percentile [s].
         text: why the last refused target was refused.
+        slowdown: of a stream of velocities: why it is slower than commanded now, and by which factor.
+        slowdowns: for each reason so far, the smallest factor.
     """
 
     sent: int
@@ -279,6 +373,8 @@ class ServoStats:
     age_median: float = nan
     age_p99: float = nan
     text: str = ""
+    slowdown: Slowdown = FREE
+    slowdowns: tuple[Slowdown, ...] = ()
 
     def __str__(self) -> str:
         """A few aligned lines with units."""
@@ -288,6 +384,7 @@ class ServoStats:
             "cabinet": f"{self.received} received, {self.applied} applied, {self.refused} refused, {self.late} gaps",
             "age": f"{fixed(self.age_median * 1e3, 2)} ms median, {fixed(self.age_p99 * 1e3, 2)} ms p99 when applied",
             "refused": self.text,
+            "slowed": "; ".join(map(str, self.slowdowns)),
         }
         return lines("Servo", rows)
 
@@ -316,6 +413,7 @@ class Servo(Block):
         *,
         period: float,
         watchdog: float,
+        boundary: Boundary | None = None,
         until: tuple[Condition, ...] = (),
         breaks: tuple[BreakRule, ...] = (),
     ) -> None:
@@ -325,6 +423,7 @@ class Servo(Block):
         self._link = connection.link
         self._clock = connection.clock
         self._message = message
+        self._boundary = boundary
         self._until = until
         self._breaks = breaks
         self._handle: MotionHandle | None = None
@@ -502,10 +601,19 @@ class JointServo(Servo):
         *,
         period: float,
         watchdog: float,
+        boundary: Boundary | None = None,
         until: tuple[Condition, ...] = (),
         breaks: tuple[BreakRule, ...] = (),
     ) -> None:
-        super().__init__(connection, message, period=period, watchdog=watchdog, until=until, breaks=breaks)
+        super().__init__(
+            connection,
+            message,
+            period=period,
+            watchdog=watchdog,
+            boundary=boundary,
+            until=until,
+            breaks=breaks,
+        )
         self._low, self._high = connection.robot.q_min.tolist(), connection.robot.q_max.tolist()
         self._newest: Array | None = None
 
@@ -518,7 +626,7 @@ class JointServo(Servo):
         """Send a target; the newest one wins. After the end of the motion it has no effect.
 
         Args:
-            q: joint positions, shape (7,) [rad]; clipped to the limits of the joints.
+            q: joint positions, shape (7,) [rad]; clipped to the limits of the joints, and to `arm.workspace`.
             dq: velocity at the target, shape (7,) [rad/s]; None: come to rest there. With the engine "smart" only.
 
         Returns:
@@ -526,7 +634,7 @@ class JointServo(Servo):
 
         Raises:
             ShapeError: not seven numbers.
-            LimitError: one is not finite.
+            LimitError: one is not finite; OutsideWorkspace if `arm.workspace` refuses the target.
             CommandRejected: a velocity for the engine "direct", which takes none.
         """
         began = self._clock.nanos()
@@ -537,6 +645,11 @@ class JointServo(Servo):
                 hint='leave dq out, or use engine="smart"',
             )
         sent, target = self._clip(q)
+        if self._boundary is not None:
+            sent = self._inside(sent, self._boundary)
+            if dq is not None and sent.tolist() != target:
+                dq = np.zeros(7)  # it comes to rest at the wall
+            target = sent.tolist()
         self._newest = sent
         if dq is None:
             self._send(began, wire.ServoJoints, target)
@@ -556,6 +669,17 @@ class JointServo(Servo):
             target = sent.tolist()
         return sent, target
 
+    def _inside(self, q: Array, boundary: Boundary) -> Array:
+        """The target inside the workspace.
+
+        Raises:
+            OutsideWorkspace: it is outside, and such targets are refused.
+        """
+        last = self.start.q if self._newest is None else self._newest
+        if boundary.refuses and boundary.excess(q) > max(boundary.excess(last), TOLERANCE):
+            raise boundary.refusal(q, "the target", parameter="q")
+        return boundary.clamped(q, last)
+
     def _warm_up(self) -> None:
         if self._newest is not None:
             self._clip(self._newest)
@@ -564,6 +688,31 @@ class JointServo(Servo):
 
 class PoseServo(Servo):
     """A stream of poses of the motion frame in the base: followed by the joints or, as "lin", on straight lines."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        message: wire.ServoOpen,
+        *,
+        period: float,
+        watchdog: float,
+        moving: Pose,
+        boundary: Boundary | None = None,
+        until: tuple[Condition, ...] = (),
+        breaks: tuple[BreakRule, ...] = (),
+    ) -> None:
+        super().__init__(
+            connection,
+            message,
+            period=period,
+            watchdog=watchdog,
+            boundary=boundary,
+            until=until,
+            breaks=breaks,
+        )
+        self._to_flange = moving.inverse()  # moving: pose of the motion frame in the flange frame
+        self._newest: Pose | None = None
+        self._near: Array | None = None
 
     def __enter__(self) -> PoseServo:
         """Begin; see `Servo.__enter__`."""
@@ -577,12 +726,48 @@ class PoseServo(Servo):
         angle; it refuses a pose that is out of reach, and `stats` reports that.
 
         Returns:
-            The pose sent.
+            The pose sent: shifted into `arm.workspace`, if there is one.
 
         Raises:
             ShapeError: not a Pose.
+            OutsideWorkspace: `arm.workspace` refuses the target.
         """
         began = self._clock.nanos()
         check_pose(pose)
+        if self._boundary is not None:
+            pose = self._inside(pose, self._boundary)
         self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
         return pose
+
+    def _inside(self, pose: Pose, boundary: Boundary) -> Pose:
+        """The target inside the workspace.
+
+        Raises:
+            OutsideWorkspace: it is outside, and such targets are refused.
+        """
+        flange = pose @ self._to_flange
+        tool = (flange @ boundary.tip).xyz
+        inside = boundary.clamped_point(tool)
+        if boundary.refuses and boundary.outside(tool) > TOLERANCE:
+            raise boundary.refusal_of_point(tool, "the target", parameter="pose")
+        pose = Pose.of(pose.xyz + inside - tool, pose.quat)
+        if boundary.workspace.joints is not None:
+            # the cabinet chooses the joint positions nearest to those before
+            near = self.start.q if self._near is None else self._near
+            try:
+                q = solve(boundary.robot, pose @ self._to_flange, near=near.tolist())
+            except Unreachable:
+                return pose  # the cabinet refuses it
+            if ((q < boundary.q_min - TOLERANCE) | (q > boundary.q_max + TOLERANCE)).any():
+                if boundary.refuses:
+                    raise boundary.refusal(q, "the target", parameter="pose")
+                return self._newest if self._newest is not None else self._here
+            self._near = q
+        self._newest = pose
+        return pose
+
+    @property
+    def _here(self) -> Pose:
+        """Pose of the motion frame when the motion began."""
+        flange = Pose.from_matrix(forward(self._connection.robot, self.start.q))
+        return flange @ self._to_flange.inverse()

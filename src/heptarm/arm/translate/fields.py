@@ -9,6 +9,7 @@ import enum
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
+from operator import attrgetter
 from typing import Any, NoReturn, TypeVar
 
 from heptarm.values.frames import TOOL
@@ -40,6 +41,9 @@ def message_of(kind: type[_Message], value: object, **given: object) -> _Message
 
 def value_of(kind: type[_Value], message: Any, **given: object) -> _Value:
     """A value whose fields are those of a message under the same names, besides the `given` ones."""
+    getter = None if given else _getter(kind)  # type: ignore[arg-type]
+    if getter is not None:
+        return kind(*getter(message))
     return kind(**{name: getattr(message, name) for name in _names(kind) if name not in given}, **given)  # type: ignore[arg-type]
 
 
@@ -51,6 +55,17 @@ def frame_message(name: str) -> str:
 @cache
 def _names(kind: type) -> tuple[str, ...]:
     return tuple(one.name for one in fields(kind))
+
+
+@cache
+def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
+    """All fields of a value at once, in order; None: not all of them may be given in order."""
+    names = _names(kind)
+    if len(names) < 2 or any(
+        one.kw_only for one in fields(kind)
+    ):  # an attrgetter of one name returns no tuple
+        return None
+    return attrgetter(*names)
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, cast
 
 from heptarm.arm.translate.fields import NAMES, message_of, value_of
@@ -28,6 +29,7 @@ def mode_message(mode: Mode | None) -> wire.Mode | None:
     return cast("wire.Mode", message_of(NAMES[type(mode).__name__], mode))
 
 
+@lru_cache(maxsize=64)  # every state has one
 def read_mode(message: wire.Mode) -> Mode | HandGuiding:
     """The mode of a message."""
     if isinstance(message, wire.HandGuidingMode):

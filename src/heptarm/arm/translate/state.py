@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,9 @@ from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.codec import DecodeError
 
 _SAFETY = tuple(
-    (bit, bit.name.lower()) for bit in wire.SafetyBits if bit.name is not None and bit.name != "NONE"
+    (int(bit), bit.name.lower()) for bit in wire.SafetyBits if bit.name is not None and bit.name != "NONE"
 )
+_MODES = {one: values.OperationMode(one.name.lower()) for one in wire.OperationMode}
 
 
 def read_state(
@@ -122,8 +124,12 @@ def _cartesian(message: wire.PoseState) -> values.Cartesian:
 
 
 def _safety(message: wire.SafetyState) -> values.Safety:
-    bits = {name: bool(message.bits & bit) for bit, name in _SAFETY}
-    return values.Safety(message.stamp, values.OperationMode(message.mode.name.lower()), **bits)
+    return values.Safety(message.stamp, _MODES[message.mode], **_safety_bits(int(message.bits)))
+
+
+@lru_cache(maxsize=256)
+def _safety_bits(bits: int) -> dict[str, bool]:
+    return {name: bool(bits & bit) for bit, name in _SAFETY}
 
 
 #: The groups of a state, each with the function that makes a value of its message.

@@ -32,7 +32,8 @@ def printable(text: str, *, lines: bool = False) -> str:
 
 def printable_message(message: Message) -> Message:
     """Remove from all texts of a message what cannot be printed; values of process data stay as they are."""
-    if isinstance(message, ProcessData):
+    kind = type(message)
+    if kind is ProcessData or not (_TEXTS[kind] if kind in _TEXTS else _has_text(kind)):
         return message
     cleaned: Message = _cleaned(message, lines=False)
     return cleaned

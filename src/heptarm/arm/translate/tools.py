@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from heptarm.arm.translate.fields import message_of, value_of
+from heptarm.values.arrays import frozen
 from heptarm.values.pose import Pose
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.wire import messages as wire
@@ -16,8 +17,9 @@ def tool_message(tool: Tool | Workpiece) -> wire.ToolInfo:
 
 def known_tool(message: wire.ToolInfo) -> KnownTool:
     """A tool or workpiece that the cabinet knows."""
+    frames = tuple((one.name, read_pose(one.pose)) for one in message.frames)
     return value_of(
-        KnownTool, message, frames=tuple((one.name, read_pose(one.pose)) for one in message.frames)
+        KnownTool, message, frames=frames, com=frozen(message.com), inertia=frozen(message.inertia)
     )
 
 

@@ -17,6 +17,7 @@ from heptarm.errors import (
     CommandRejected,
     ConnectFailed,
     ConnectionLost,
+    ShapeError,
     refuse_windows,
 )
 from heptarm.fri.guard.fallback import Policy
@@ -24,7 +25,9 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import process
 from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import Law
+from heptarm.fri.loop.law_interface import LiveMemory, flat
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.protocol.version import Version
@@ -48,8 +51,9 @@ def check_settings(
     limits: Limits | None,
     pose_limits: PoseLimits | None,
     policy: Policy | None,
-    law: Law | None,
+    law: Law | CompiledLaw | None,
     params: Mapping[str, npt.ArrayLike] | None,
+    memory: Mapping[str, npt.ArrayLike] | None,
     history: int,
     realtime: bool,
     cpu: int | None,
@@ -74,10 +78,18 @@ def check_settings(
     ):
         if value is not None:
             instance(value, kind, name)
-    if law is not None:
+    if law is not None and not isinstance(law, CompiledLaw):
         callback(law, "law")
     if params is not None:
         Params.flat(params)
+    if memory is not None:
+        flat(memory, "memory")
+        if not isinstance(law, CompiledLaw) and (law is None or arity(law) < WITH_MEMORY):
+            raise ShapeError(
+                "memory needs a law with four arguments",
+                parameter="memory",
+                hint="write it as law(s, out, p, m): m has what memory= names",
+            )
     integer(history, "history", 16, 1 << 20)
     flag(realtime, "realtime")
     if cpu is not None:
@@ -98,9 +110,11 @@ class Client(Reader):
         limits: limits of joint commands; None for limits slightly inside the robot's.
         pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
         policy: behaviour without fresh commands.
-        law: `law(state, out, params)`, called in the loop's process in every cycle of COMMANDING_ACTIVE; the guard
-            limits its output. None: commands come from `command`.
+        law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in every cycle
+            of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the native loop
+            calls it. None: commands come from `command`.
         params: parameters of the law, numbers and arrays by name.
+        memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
         history: number of states that are kept.
         realtime: request real-time priority and locked memory.
         cpu: processor of the loop; None for any.
@@ -108,11 +122,12 @@ class Client(Reader):
 
     Attributes:
         params: parameters of the law; assign to change them while it runs.
+        memory: memory of the law; read it and assign to it while it runs.
         port: bound UDP port.
 
     Raises:
         ConnectFailed: the port cannot be bound, or the loop did not start.
-        CommandRejected: an argument is outside its range.
+        CommandRejected: an argument is outside its range, or the law cannot be compiled or loaded.
     """
 
     def __init__(
@@ -126,8 +141,9 @@ class Client(Reader):
         limits: Limits | None = None,
         pose_limits: PoseLimits | None = None,
         policy: Policy | None = None,
-        law: Law | None = None,
+        law: Law | CompiledLaw | None = None,
         params: Mapping[str, npt.ArrayLike] | None = None,
+        memory: Mapping[str, npt.ArrayLike] | None = None,
         history: int = 2048,
         realtime: bool = True,
         cpu: int | None = None,
@@ -141,6 +157,7 @@ class Client(Reader):
             policy=policy,
             law=law,
             params=params,
+            memory=memory,
             history=history,
             realtime=realtime,
             cpu=cpu,
@@ -154,12 +171,17 @@ class Client(Reader):
         self._limits = limits or Limits.of(arm)
         name = process.importable(law)
         sent = b"" if law is None or name else process.by_value(law)
-        values, schema = Params.flat(params or {})
+        known: Mapping[str, npt.ArrayLike] = law.parameters(arm) if isinstance(law, CompiledLaw) else {}
+        values, schema = Params.flat({**known, **(params or {})})
+        known = law.memory if isinstance(law, CompiledLaw) else {}
+        remembered, kept = flat({**known, **(memory or {})}, "memory")
         wire = None if version is None else Version.of(version).value
         self._values = values
-        block = MemoryBlock(at.Layout.words(history=history, params=values.size))
-        super().__init__(at.Layout(block, history=history, params=values.size))
+        sizes = {"history": history, "params": values.size, "memory": remembered.size}
+        block = MemoryBlock(at.Layout.words(**sizes))
+        super().__init__(at.Layout(block, **sizes))
         self._header[at.HISTORY], self._header[at.SIZE] = history, values.size
+        self._header[at.MEMORY_SIZE] = remembered.size
         self._layout.config.write(
             json.dumps(
                 {
@@ -173,6 +195,8 @@ class Client(Reader):
                     "policy": _plain(policy or Policy()),
                     "law": name,
                     "params": schema,
+                    "memory": kept,
+                    "remembered": remembered.tolist(),
                     "size": values.size,
                     "parent": os.getpid(),
                     "realtime": realtime,
@@ -182,6 +206,9 @@ class Client(Reader):
         )
         self.params = Params(values, schema, changed=self._send_params)
         self._send_params()
+        self.memory = LiveMemory(
+            remembered, kept, newest=self._newest_memory, write=self._layout.memory_set.write
+        )
         self._outputs: dict[str, tuple[int, int | float]] = {}
         self._frames: dict[str, list[float]] = {}
         self._closed = False
@@ -211,6 +238,10 @@ class Client(Reader):
                     + (f": {printed}" if printed else "")
                 )
             time.sleep(2e-3)
+        if self._header[at.STATUS] == at.Status.BAD_LAW:
+            self._worker.join(1.0)
+            text, hint = json.loads(self._layout.trouble.read() or '["the law cannot be loaded", ""]')
+            raise CommandRejected(text, parameter="law", hint=hint)
         if (status := self._header[at.STATUS]) in (at.Status.FAILED, at.Status.NO_PORT):
             self._worker.join(1.0)
             raise ConnectFailed(
@@ -279,6 +310,10 @@ class Client(Reader):
         ints = parts.view(np.int64)
         ints[at.C_AT], ints[at.C_GIVEN] = time.monotonic_ns(), given
         self._layout.commands.write(parts[1:])
+
+    def _newest_memory(self) -> npt.NDArray[np.float64] | None:
+        words = self._layout.memory.newest()
+        return None if words is None else words[1:]
 
     def _send_params(self) -> None:
         self._layout.params.write(self._values)

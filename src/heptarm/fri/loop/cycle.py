@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import json
 import math
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri.guard.fallback import CommandFallback, Policy
 from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
 from heptarm.fri.guard.joint_guard import JointGuard, Limits
 from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
 from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
 from heptarm.fri.protocol import messages as m
@@ -29,7 +31,8 @@ from heptarm.fri.session.session import Positions, Session
 from heptarm.fri.session.statistics import Histogram
 from heptarm.values.pose import Pose
 
-Law = Callable[[State, Output, Params], object]
+#: `law(state, out, params)`, or `law(state, out, params, memory)`.
+Law = Callable[..., object]
 
 #: A gap in the messages of more command periods than this is bridged by an estimate of the setpoint.
 GAP_PERIODS = 5
@@ -37,6 +40,8 @@ GAP_PERIODS = 5
 MIN_GAP = 25_000_000
 #: A command given up to this long before commanding starts counts [ns].
 GRACE = 50_000_000
+#: Time budget of a law, as a fraction of the command period.
+LAW_SHARE = 0.5
 #: Beginning of the text of the event after a failure of the law.
 LAW_FAILED = "the law failed, the arm brakes: "
 #: Beginning of the text of the event after a failure of the loop itself.
@@ -51,6 +56,10 @@ _MAX_SKIPPED = 25
 _MAX_LOST = 1000
 _ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
 _JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)
+
+
+class LawFailure(HeptarmError):
+    """A compiled law has failed; the text gives the cause."""
 
 
 def from_wire(values: Sequence[float]) -> tuple[float, ...]:
@@ -358,9 +367,14 @@ class Cycle:
         policy: behaviour without fresh commands.
         law: called in every cycle of COMMANDING_ACTIVE; None uses the commands of the user's process.
         params: parameters of the law.
+        memory: its memory, on `memory_values`; None: the law takes none.
+        memory_values: words of its memory, initially those of its first call.
         positions: position limits of the robot [rad], see `Session`.
 
     Attributes:
+        memory_values: words of the law's memory.
+        is_compiled: whether the native part calls the law.
+        q_before: measured positions of the last message; None if it had none.
         layout, session, guard, pose_commander, fallback, exchange, record, law: its parts.
         failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
@@ -380,6 +394,8 @@ class Cycle:
         policy: Policy,
         law: Law | None = None,
         params: Params | None = None,
+        memory: Memory | None = None,
+        memory_values: Floats | None = None,
         positions: Positions | None = None,
     ) -> None:
         self.layout = layout
@@ -397,6 +413,12 @@ class Cycle:
         self.law = law
         self._params = params
         self._param_tick = -1
+        self._memory = memory
+        self.memory_values: Floats = np.zeros(0) if memory_values is None else memory_values
+        self._memory_written = np.zeros(len(self.memory_values))
+        self._memory_tick = 0
+        self.is_compiled = False
+        self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)
         self.record = Record(layout, self.session)
         self._out = Output(self.exchange.outputs)
@@ -459,6 +481,7 @@ class Cycle:
         self._fresh = sample = session.receive(datagram, received)
         if sample is None:
             return None
+        self._differentiate(sample, sample.sequence - previous)
         exchange.update(sample)
         record.signals, record.state.signals = exchange.numbers, exchange.signals
         self._follow(sample, received, before, sample.sequence - previous)
@@ -489,6 +512,17 @@ class Cycle:
             answer = session.answer(replace(setpoint, io=(), transformations=()))
         self._answered = answer is not None
         return answer
+
+    def _differentiate(self, sample: Sample, leap: int) -> None:
+        """Update the velocity by the difference to the previous message; `leap` is the increment of the counter."""
+        before, self.q_before = self.q_before, sample.q
+        gap = leap * self.session.period * 1e-9
+        if sample.q is None:
+            self.record.dq[:] = math.nan
+        elif before is None or not 0 < leap <= _MAX_LOST or gap <= 0.0:
+            self.record.dq[:] = 0.0
+        else:
+            self.record.dq[:] = [(new - old) / gap for new, old in zip(sample.q, before, strict=True)]
 
     def _count(self, *, limited: bool) -> None:
         """Count limited and filled setpoints."""
@@ -715,11 +749,37 @@ class Cycle:
             if words is not None:
                 self._param_tick = ring.count
                 self._params.replace(words[1:])
+        began = time.monotonic_ns()
         try:
-            self.law(state, out, self._params)
+            if self._memory is None:
+                self.law(state, out, self._params)
+            else:
+                self._take_memory()
+                self.law(state, out, self._params, self._memory)
+                self.layout.memory.write(self.memory_values)
         except BaseException as error:  # sys.exit() as well: the arm has to brake first
-            self.record.report(now, LAW_FAILED + describe(error))
-            self.end()
+            self.law_failed(str(error) if isinstance(error, LawFailure) else describe(error), now)
+        if not self.is_compiled:  # the native part counts those of a compiled law
+            self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_SHARE * state.dt * 1e9
+
+    def _take_memory(self) -> None:
+        """Take over what the user's process has written to the memory of the law."""
+        ring, size = self.layout.memory_set, len(self.memory_values)
+        if ring.count == self._memory_tick:
+            return
+        words = ring.read(ring.count - 1)
+        if words is None:  # being written: read it in the next cycle
+            return
+        self._memory_tick = ring.count
+        values, written = words[1 : 1 + size], words[1 + size :]
+        newer = written > self._memory_written
+        self.memory_values[newer] = values[newer]
+        self._memory_written[:] = written
+
+    def law_failed(self, text: str, now: int) -> None:
+        """Report that the law has failed; brake from now on."""
+        self.record.report(now, LAW_FAILED + text)
+        self.end()
 
 
 def describe(error: BaseException) -> str:

@@ -8,11 +8,16 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <math.h>
+#include <setjmp.h>
+#include <signal.h>
 #include <stdint.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <time.h>
+#include <unistd.h>
 
+#include "include/heptarm_law.h"
 #include "native_layout.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
@@ -522,11 +527,172 @@ static void fill_state(struct loop *l, word *slot) {
     for (int i = S_POSE_IPO; i < STATE_WORDS; i++) numbers[i] = NAN; /* Python handles sessions that command poses */
 }
 
+static word clock_now(clockid_t clock) {
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
+
+/* ------------------------------------------------------------------------------------------------ compiled laws */
+
+typedef int (*compiled_law)(const struct heptarm_state *, struct heptarm_command *, const void *, void *);
+
+/* A law that crashes or does not return is left by a jump; the arm then brakes. Only one thread of a process runs a law. */
+static sigjmp_buf law_exit;
+static volatile sig_atomic_t in_law;
+static timer_t law_timer;
+static int has_timer;
+static char law_stack[1 << 16]; /* for the handler of a stack overflow */
+static const int crashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+#define TIME_IS_UP (SIGRTMIN + 5)
+
+static void on_signal(int number) {
+    if (in_law) {
+        in_law = 0;
+        siglongjmp(law_exit, number);
+    }
+    if (number == TIME_IS_UP) return; /* the law had just returned */
+    signal(number, SIG_DFL);
+    raise(number);
+}
+
+/* Prepare this thread for running a compiled law; 0 if the system refuses the timer. */
+int hf_protect(void) {
+    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_NODEFER | SA_ONSTACK};
+    stack_t stack = {.ss_sp = law_stack, .ss_size = sizeof law_stack};
+    struct sigevent event = {.sigev_notify = SIGEV_THREAD_ID, .sigev_signo = TIME_IS_UP};
+    sigemptyset(&action.sa_mask);
+    sigaltstack(&stack, NULL);
+    for (unsigned i = 0; i < sizeof crashes / sizeof *crashes; i++) sigaction(crashes[i], &action, NULL);
+    sigaction(TIME_IS_UP, &action, NULL);
+#ifndef sigev_notify_thread_id
+#define sigev_notify_thread_id _sigev_un._tid
+#endif
+    event.sigev_notify_thread_id = (pid_t)syscall(SYS_gettid);
+    has_timer = !timer_create(CLOCK_THREAD_CPUTIME_ID, &event, &law_timer);
+    return has_timer;
+}
+
+/* Copy the newest slot of a ring behind its sequence word; 0 if there is no newer one than `seen`, or it is being written. */
+static int take_slot(const word *ring, word count, word slots, word size, word *seen, double *into) {
+    if (count == *seen || count == 0) return 0;
+    const word *slot = ring + (count - 1) % slots * (size + 1);
+    if (__atomic_load_n(slot, __ATOMIC_ACQUIRE) != 2 * count) return 0;
+    memcpy(into, slot + 1, 8 * (size_t)size);
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    if (__atomic_load_n(slot, __ATOMIC_RELAXED) != 2 * count) return 0;
+    *seen = count;
+    return 1;
+}
+
+static void take_parameters(struct loop *l) {
+    double *copy = (double *)l->law_buffer;
+    word size = l->params_size, many = l->memory_size;
+    word count = __atomic_load_n(&l->header[H_PARAMS], __ATOMIC_ACQUIRE);
+    if (take_slot(l->params_ring, count, PARAM_SLOTS, size, &l->params_seen, copy)) memcpy(l->params, copy, 8 * (size_t)size);
+    count = __atomic_load_n(&l->header[H_MEMORY_SET], __ATOMIC_ACQUIRE);
+    if (!take_slot(l->memory_set_ring, count, MEMORY_SLOTS, 2 * many, &l->memory_seen, copy)) return;
+    for (word i = 0; i < many; i++) {
+        double *written = (double *)l->memory_written + i;
+        if (copy[many + i] <= *written) continue;
+        *written = copy[many + i];
+        ((double *)l->memory)[i] = copy[i];
+    }
+}
+
+static void publish_memory(struct loop *l) {
+    word tick = l->header[H_MEMORY], *slot = l->memory_ring + tick % MEMORY_SLOTS * (l->memory_size + 1);
+    __atomic_store_n(slot, 2 * tick + 1, __ATOMIC_RELAXED);
+    __atomic_thread_fence(__ATOMIC_RELEASE);
+    memcpy(slot + 1, l->memory, 8 * (size_t)l->memory_size);
+    __atomic_store_n(slot, 2 * tick + 2, __ATOMIC_RELEASE);
+    __atomic_store_n(&l->header[H_MEMORY], tick + 1, __ATOMIC_RELEASE);
+}
+
+static void law_state(struct loop *l, const word *slot, struct heptarm_state *s) {
+    const double *numbers = (const double *)slot;
+    word multiplier = slot[S_MULTIPLIER] > 0 ? slot[S_MULTIPLIER] : 1;
+    s->dt = (double)(slot[S_PERIOD] * multiplier) * 1e-9;
+    s->t = (double)slot[S_TICKS] * ((double)slot[S_PERIOD] * 1e-9);
+    s->tracking = numbers[S_TRACKING];
+    memcpy(s->q, numbers + S_Q, sizeof s->q);
+    memcpy(s->dq, l->dq, sizeof s->dq);
+    memcpy(s->tau, numbers + S_TAU, sizeof s->tau);
+    memcpy(s->tau_cmd, numbers + S_TAU_CMD, sizeof s->tau_cmd);
+    memcpy(s->tau_ext, numbers + S_TAU_EXT, sizeof s->tau_ext);
+    memcpy(s->q_cmd, numbers + S_Q_CMD, sizeof s->q_cmd);
+    memcpy(s->q_ipo, numbers + S_Q_IPO, sizeof s->q_ipo);
+    memcpy(s->wrench, numbers + S_WRENCH, sizeof s->wrench);
+    s->sequence = slot[S_SEQUENCE];
+    s->stamp = slot[S_STAMP];
+    s->received = slot[S_RECEIVED];
+    s->session = slot[S_SESSION];
+    s->quality = slot[S_QUALITY];
+    s->mode = slot[S_MODE];
+    s->safety = slot[S_SAFETY];
+    s->operation_mode = slot[S_OPERATION];
+    s->control_mode = slot[S_CONTROL];
+}
+
+static int all_finite(const double *values, int size) {
+    double sum = 0.0;
+    for (int i = 0; i < size; i++) sum += values[i] - values[i];
+    return sum == 0.0;
+}
+
+/* Whether the law has given numbers for everything that this session commands; the pose's guard is in Python. */
+static int is_finite(struct loop *l) {
+    return all_finite(l->out_q, AXES) && (l->mode != TORQUE || all_finite(l->out_tau, AXES)) &&
+           (l->mode != WRENCH || all_finite(l->out_wrench, 6));
+}
+
+static int failed(struct loop *l, int status, word code) {
+    l->law_code = code;
+    return (int)(l->law_status = status);
+}
+
+/* Call the compiled law on the state in a slot, with its prepared output in the out_ members: LAW_OK, or why it failed. */
+int hf_law(struct loop *l, const word *slot) {
+    struct heptarm_state state;
+    struct itimerspec limit = {.it_value = {.tv_sec = LAW_CUT / 1000000000LL, .tv_nsec = LAW_CUT % 1000000000LL}};
+    take_parameters(l);
+    law_state(l, slot, &state);
+    word budget = (word)(l->law_share * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
+    int number = sigsetjmp(law_exit, 0);
+    if (number) return failed(l, number == TIME_IS_UP ? LAW_ENDLESS : LAW_CRASHED, number);
+    if (has_timer) timer_settime(law_timer, 0, &limit, NULL);
+    in_law = 1;
+    int code = ((compiled_law)l->law)(&state, (struct heptarm_command *)l->out_q, l->params, l->memory);
+    in_law = 0;
+    publish_memory(l);
+    if (code != l->law_success) return failed(l, LAW_REFUSED, code);
+    l->law_not_finite = is_finite(l) ? 0 : l->law_not_finite + 1;
+    if (l->law_not_finite >= LAW_PATIENCE) return failed(l, LAW_NOT_FINITE, l->law_not_finite);
+    word took = clock_now(CLOCK_MONOTONIC) - began;
+    l->law_late = took > budget ? l->law_late + 1 : 0;
+    l->header[H_OVERRUNS] += took > budget;
+    return l->law_late >= LAW_PATIENCE ? failed(l, LAW_SLOW, took) : LAW_OK;
+}
+
 static word *open_slot(struct loop *l) {
     word tick = l->header[H_STATES], *slot = l->states + tick % l->history * STATE_WORDS;
     __atomic_store_n(slot, 2 * tick + 1, __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_RELEASE);
     return slot;
+}
+
+int hf_answer(struct loop *l);
+
+/* Velocity by the difference to the previous message. */
+static void differentiate(struct loop *l) {
+    double gap = (double)l->period * 1e-9;
+    int known = (l->t_known & KNOWN(S_Q)) != 0;
+    for (int i = 0; i < AXES; i++) {
+        double q = ARRAY(S_Q)[i];
+        l->dq[i] = !known ? NAN : l->q_known && gap > 0.0 ? (q - l->q_before[i]) / gap : 0.0;
+        l->q_before[i] = q;
+    }
+    l->q_known = known;
 }
 
 /* Process a datagram: HANDBACK, LAW (call hf_answer next), or the size of the answer in t_reply, 0 for none. */
@@ -556,6 +722,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     l->received = l->t_received = received;
     l->t_flags = l->t_answer = 0;
     l->waiting++;
+    differentiate(l);
     if (commanding) {
         l->ticks++;
     } else if (waiting) {
@@ -576,8 +743,13 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
         memcpy(l->out_q, ARRAY(S_Q_IPO), sizeof l->out_q);
         memset(l->out_tau, 0, sizeof l->out_tau);
         memset(l->out_wrench, 0, sizeof l->out_wrench);
-        fill_state(l, open_slot(l));
-        return LAW;
+        for (int i = 0; i < AXES; i++) l->out_pose[i] = NAN; /* no pose is commanded here */
+        l->out_e1 = NAN;
+        word *slot = open_slot(l);
+        fill_state(l, slot);
+        if (!l->law) return LAW;
+        l->is_ending = hf_law(l, slot) != LAW_OK;
+        return hf_answer(l);
     }
     double buffer[AXES], tau[AXES], wrench[6], fraction;
     take_command(l);
@@ -608,12 +780,6 @@ void hf_finish(struct loop *l, word now) {
     __atomic_store_n(slot, 2 * tick + 2, __ATOMIC_RELEASE);
     __atomic_store_n(&l->header[H_STATES], tick + 1, __ATOMIC_RELEASE);
     l->header[H_BEAT] = now;
-}
-
-static word clock_now(clockid_t clock) {
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return t.tv_sec * 1000000000LL + t.tv_nsec;
 }
 
 static void reply(struct loop *l, int size) {
@@ -663,6 +829,7 @@ int hf_run(struct loop *l, word turns, word *sender) {
         if (answer == LAW) return CALL_LAW;
         if (answer > 0) reply(l, answer);
         hf_finish(l, clock_now(CLOCK_MONOTONIC));
+        if (l->law_status != LAW_OK && !l->law_reported) return LAW_FAILED;
         if (l->header[H_STOP]) return CHECK;
     }
     return CHECK;

@@ -7,46 +7,55 @@ and hands back any other; the Python cycle then continues from the state of the 
 from __future__ import annotations
 
 import ctypes
+import enum
 import functools
-import hashlib
-import os
-import shutil
+import signal
 import socket
-import subprocess
-import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from heptarm.errors import HeptarmError
+import numpy as np
+
 from heptarm.fri.guard.fallback import Missing
 from heptarm.fri.guard.joint_guard import AXES, Limited
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.cycle import Cycle
+from heptarm.fri.loop.cycle import LAW_SHARE, Cycle, LawFailure
+from heptarm.fri.loop.telemetry import NAN7
+from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol.messages import CommandMode, SessionState
 from heptarm.fri.protocol.protobuf import fields
 from heptarm.fri.protocol.version import unwrap
 from heptarm.fri.session.statistics import BINS
+from heptarm.io.compiled import Unavailable, compiled_library, with_headers
 
-#: Environment variable; any value switches the native part off.
-SWITCH = "HEPTARM_PURE_PYTHON"
 HANDBACK, LAW = -1, -2
-TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW = range(5)
+TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW, LAW_FAILED = range(6)
 BUFFER = 2048
+#: A compiled law has failed after this many calls in a row that were too slow, or gave numbers that are not finite.
+LAW_PATIENCE = 10
+#: A call of a compiled law that has used this much of the processor's time is ended [ns].
+LAW_CUT = 20_000_000
 #: Largest size of robot and connection info in messages for the native part.
 MAX_PLAIN = 64
 
 _SOURCE = Path(__file__).with_name("native.c")
-_HEADER = _SOURCE.with_name("native_layout.h")
+_HEADERS = (_SOURCE.with_name("native_layout.h"), _SOURCE.parent / "include" / "heptarm_law.h")
 _WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p
 #: Fallbacks for missing commands, in the numbering of the native part.
 MISSING = tuple(Missing)
 _JOINT_MODES = (CommandMode.POSITION, CommandMode.TORQUE, CommandMode.WRENCH)
 
 
-class Unavailable(HeptarmError):
-    """The native part is not available; the text gives the reason."""
+class LawStatus(enum.IntEnum):
+    """How a call of a compiled law ended."""
+
+    OK = 0
+    REFUSED = 1
+    CRASHED = 2
+    ENDLESS = 3
+    NOT_FINITE = 4
+    SLOW = 5
 
 
 #: `struct loop` of native.c, whose header schema/generate.py writes from this table: type, size (1: no array), names.
@@ -76,9 +85,20 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "f_q f_slope f_tau"),
     ("real", 6, "f_wrench"),
     ("real", 1, "patience over"),
-    # output of the user's law
+    # output of the user's law: `struct heptarm_command`
     ("real", AXES, "out_q out_tau"),
     ("real", 6, "out_wrench"),
+    ("real", AXES, "out_pose"),
+    ("real", 1, "out_e1"),
+    # compiled law: function, parameters, memory, counts of what the user's process has written to it, a buffer
+    ("pointer", 1, "law params memory memory_written law_buffer"),
+    ("pointer", 1, "params_ring memory_ring memory_set_ring"),
+    ("word", 1, "params_size memory_size params_seen memory_seen"),
+    ("word", 1, "law_success law_status law_code law_reported law_late law_not_finite"),
+    ("real", 1, "law_share"),
+    # velocity by differences
+    ("word", 1, "q_known"),
+    ("real", AXES, "q_before dq"),
     # this cycle; t_known has one bit for each array of t_arrays, which are those of a state from S_ARRAYS on
     ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known"),
     ("real", 1, "t_tracking"),
@@ -115,50 +135,17 @@ def library() -> ctypes.CDLL:
     Raises:
         Unavailable: this system is not supported, or has no compiler.
     """
-    if os.environ.get(SWITCH):
-        raise Unavailable(f"switched off by {SWITCH}")
-    if sys.platform != "linux" or sys.byteorder != "little":
-        raise Unavailable("the native part needs Linux on a little-endian machine")
-    source = _HEADER.read_bytes() + _SOURCE.read_bytes()
-    key = hashlib.sha256(source + os.uname().machine.encode()).hexdigest()[:16]
-    root = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    target = Path(root) / "heptarm" / f"fri-{key}.so"
-    try:
-        if not target.exists():
-            _compile(target)
-        made = ctypes.CDLL(str(target))
-    except OSError as error:
-        raise Unavailable(f"the native part cannot be built or loaded: {error}") from error
+    made = compiled_library("fri", with_headers(_SOURCE, *_HEADERS))
     made.hf_size.restype = _WORD
     made.hf_turn.argtypes = (_POINTER, ctypes.c_char_p, ctypes.c_int, _WORD)
     made.hf_answer.argtypes = (_POINTER,)
     made.hf_finish.argtypes = (_POINTER, _WORD)
     made.hf_send.argtypes = (_POINTER,)
     made.hf_run.argtypes = (_POINTER, _WORD, _POINTER)
+    made.hf_law.argtypes = (_POINTER, _POINTER)
     if made.hf_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")
     return made
-
-
-def _compile(target: Path) -> None:
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        raise Unavailable("no C compiler found: install gcc for the fastest loop")
-    target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    # on the same file system, so that the last step is atomic
-    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-        made = Path(folder) / "made.so"
-        # without contraction, so that all numbers equal Python's to the last bit
-        flags = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
-        run = subprocess.run(
-            [compiler, *flags, "-o", str(made), str(_SOURCE), "-lm"],
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-        if run.returncode:
-            raise Unavailable(f"{compiler} fails: {run.stderr.strip().splitlines()[0]}")
-        os.replace(made, target)
 
 
 class Native:
@@ -181,6 +168,8 @@ class Native:
         self.reference = ctypes.byref(memory)
         self.sender = (_WORD * 2)()
         self._is_newer = False
+        #: Texts of the errors that a law compiled by Numba has raised.
+        self.raised: list[str] = []
         layout, base = cycle.layout, cycle.layout.block.ints.ctypes.data
         memory.header, memory.latency, memory.jitter = base, base + 8 * at.LATENCY, base + 8 * at.JITTER
         memory.states, memory.commands = base + 8 * layout.states_at, base + 8 * layout.commands_at
@@ -192,8 +181,82 @@ class Native:
             getattr(memory, name)[:] = getattr(limits, name)
         memory.reach = limits.reach
         memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
+        memory.law_share = LAW_SHARE
         memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
+
+    def set_law(self, address: int, kept: object, *, success: int) -> None:
+        """Set the compiled law that the native part calls; the Python cycle calls it through `call_law`.
+
+        Args:
+            address: of its function, in this process.
+            kept: what has to live as long as the function.
+            success: what the function returns unless it has failed.
+        """
+        cycle, memory, layout = self._cycle, self.memory, self._cycle.layout
+        base = layout.block.ints.ctypes.data
+        values = cycle.memory_values
+        params = layout.params.ints.shape[1] - 1
+        # params, memory, counts of writes, buffer of the larger of both rings
+        self._law_words = words = np.zeros(params + 2 * len(values) + max(params, 2 * len(values)) + 1)
+        words[params : params + len(values)] = values
+        start = words.ctypes.data
+        memory.params, memory.memory = start, start + 8 * params
+        memory.memory_written = memory.memory + 8 * len(values)
+        memory.law_buffer = memory.memory_written + 8 * len(values)
+        memory.params_ring = base + 8 * layout.params_at
+        memory.memory_ring, memory.memory_set_ring = (
+            base + 8 * layout.memory_at,
+            base + 8 * layout.memory_set_at,
+        )
+        memory.params_size, memory.memory_size = params, len(values)
+        memory.law, memory.law_success, self._kept = address, success, kept
+        memory.has_law = 1
+        self.library.hf_protect()
+        cycle.law, cycle.is_compiled = self.call_law, True
+
+    def call_law(self, state: State, out: Output, params: object) -> None:
+        """Call the compiled law from the Python cycle.
+
+        Raises:
+            LawFailure: it has failed.
+        """
+        memory = self.memory
+        memory.mode = int(state.mode)
+        memory.dq[:] = state.dq
+        for name in ("q", "tau", "wrench", "pose"):
+            getattr(memory, f"out_{name}")[:] = getattr(out, name)
+        memory.out_e1 = out.e1
+        words = np.array(state.words)
+        if self.library.hf_law(self.reference, words.ctypes.data) != LawStatus.OK:
+            memory.law_reported = 1
+            raise LawFailure(self.law_failure)
+        for name in ("q", "tau", "wrench", "pose"):
+            getattr(out, name)[:] = getattr(memory, f"out_{name}")
+        out.e1 = memory.out_e1
+
+    def note_error(self, error: Any) -> None:
+        """Note the error that a law compiled by Numba has raised; for `sys.unraisablehook`."""
+        self.raised.append(f"{type(error.exc_value).__name__}: {error.exc_value}")
+
+    @property
+    def law_failure(self) -> str:
+        """Why the compiled law has failed, in words."""
+        status, code = LawStatus(self.memory.law_status), int(self.memory.law_code)
+        if status is LawStatus.CRASHED:
+            return f"it crashed with {signal.Signals(code).name} ({signal.strsignal(code)})"
+        if status is LawStatus.ENDLESS:
+            return f"a call did not return within {LAW_CUT * 1e-6:g} ms: look for an endless loop"
+        if status is LawStatus.NOT_FINITE:
+            return f"it commanded numbers that are not finite {LAW_PATIENCE} times in a row"
+        if status is LawStatus.SLOW:
+            return (
+                f"it took longer than its time budget, {LAW_SHARE:g} of the command period, {LAW_PATIENCE} times in a "
+                f"row; the last call took {code * 1e-3:.0f} us"
+            )
+        if self.raised:
+            return self.raised.pop()
+        return f"it returned {code}"
 
     def listen(self, sock: socket.socket, peer: tuple[str, int] | None) -> None:
         """Set the socket, and the address of the controller."""
@@ -253,6 +316,8 @@ class Native:
         for name, number in zip(_INFO, cycle.record.info[2], strict=True):
             setattr(memory, name, number)
         memory.is_started, memory.is_ending = guard.is_started, cycle.is_ending
+        memory.q_known = cycle.q_before is not None
+        memory.q_before[:] = cycle.q_before or NAN7
         memory.ticks, memory.started = cycle.record.ticks, cycle.started
         memory.commands_seen, memory.outputs_seen = cycle.commands_seen, cycle.exchange.outputs_seen
         memory.ipo_known = cycle.mirrored is not None
@@ -287,6 +352,7 @@ class Native:
         session.sample.sequence, session.received = memory.sequence, memory.received
         session.waiting, session.sent, session.reflected = memory.waiting, memory.sent, memory.reflected
         cycle.record.ticks, cycle.commands_seen = memory.ticks, memory.commands_seen
+        cycle.q_before = tuple(memory.q_before) if memory.q_known else None
         if cycle.mirrored is not None:
             cycle.mirrored = (tuple(memory.ipo), memory.ipo_sequence)
             cycle.slope = list(memory.slope)

@@ -19,6 +19,17 @@ enum {
     CHECK = 2,
     SOCKET_ERROR = 3,
     CALL_LAW = 4,
+    LAW_FAILED = 5,
+};
+
+/* how a call of a compiled law ended */
+enum {
+    LAW_OK = 0,
+    LAW_REFUSED = 1,
+    LAW_CRASHED = 2,
+    LAW_ENDLESS = 3,
+    LAW_NOT_FINITE = 4,
+    LAW_SLOW = 5,
 };
 
 /* states of a session */
@@ -69,8 +80,12 @@ enum {
 enum {
     H_STATES = 0,
     H_COMMANDS = 1,
+    H_PARAMS = 2,
     H_STOP = 4,
     H_BEAT = 7,
+    H_MEMORY = 13,
+    H_MEMORY_SET = 14,
+    H_OVERRUNS = 15,
     H_COUNTS = 16,
     H_LIMITED_COUNTS = 32,
     H_LIMITED_WORST = 81,
@@ -168,6 +183,8 @@ enum {
     AXES = 7,
     MAX_NAME = 63,
     BUFFER = 2048,
+    PARAM_SLOTS = 8,
+    MEMORY_SLOTS = 8,
 };
 
 #define MONITORING_ID 2380098LL
@@ -178,6 +195,8 @@ enum {
 #define MIN_GAP 25000000LL
 #define GRACE 50000000LL
 #define LONGEST 1000000000000000LL
+#define LAW_PATIENCE 10LL
+#define LAW_CUT 20000000LL
 
 struct loop {
     word *header, *latency, *jitter, *states, *commands, *outputs;
@@ -202,6 +221,15 @@ struct loop {
     double patience, over;
     double out_q[7], out_tau[7];
     double out_wrench[6];
+    double out_pose[7];
+    double out_e1;
+    word *law, *params, *memory, *memory_written, *law_buffer;
+    word *params_ring, *memory_ring, *memory_set_ring;
+    word params_size, memory_size, params_seen, memory_seen;
+    word law_success, law_status, law_code, law_reported, law_late, law_not_finite;
+    double law_share;
+    word q_known;
+    double q_before[7], dq[7];
     word t_flags, t_received, t_answer, t_size, t_stamp, t_known;
     double t_tracking;
     double t_arrays[42];

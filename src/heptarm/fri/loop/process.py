@@ -31,11 +31,23 @@ from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import LOOP_FAILED, Cycle, Law, describe
-from heptarm.fri.loop.native import CALL_LAW, CHECK, HANDED_BACK, SOCKET_ERROR, TIMEOUT, Native, Unavailable
+from heptarm.fri.loop.law_interface import Memory
+from heptarm.fri.loop.native import (
+    CALL_LAW,
+    CHECK,
+    HANDED_BACK,
+    LAW_FAILED,
+    SOCKET_ERROR,
+    TIMEOUT,
+    Native,
+    library,
+)
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version
+from heptarm.io.compiled import Unavailable
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import Address, UdpSocket
 
@@ -100,7 +112,7 @@ def _reason(error: BaseException) -> str:
     return f"{sys.platform} has none"
 
 
-def importable(law: Law | None) -> str | None:
+def importable(law: Law | CompiledLaw | None) -> str | None:
     """Name "module:function" by which a new process can import a law; None if it cannot."""
     module, name = getattr(law, "__module__", None), getattr(law, "__qualname__", "<")
     if module is None or module == "__main__" or "<" in name:
@@ -113,7 +125,7 @@ def importable(law: Law | None) -> str | None:
     return f"{module}:{name}" if found is law else None
 
 
-def by_value(law: Law) -> bytes:
+def by_value(law: Law | CompiledLaw) -> bytes:
     """Serialise a law that a new process cannot import, with the values that it uses.
 
     Raises:
@@ -217,13 +229,37 @@ class Loop:
         layout: the shared memory.
         config: configuration that `heptarm.fri.loop.client` wrote.
         law: overrides the law of the configuration.
+
+    Raises:
+        CommandRejected: the law cannot be compiled or loaded.
+        ConnectFailed: the port cannot be bound.
     """
 
-    def __init__(self, layout: at.Layout, config: dict[str, Any], *, law: Law | None = None) -> None:
+    def __init__(
+        self, layout: at.Layout, config: dict[str, Any], *, law: Law | CompiledLaw | None = None
+    ) -> None:
         self.layout, self.config = layout, config
         self.socket = UdpSocket(config["port"], host=config["host"], patience=PATIENCE)
         layout.header[at.PORT] = self.socket.port
-        schema = {name: (tuple(shape), start) for name, (shape, start) in config["params"].items()}
+        schema, memory = (
+            {name: (tuple(shape), start) for name, (shape, start) in config[what].items()}
+            for what in ("params", "memory")
+        )
+        self._why_python = ""
+        try:
+            library()
+        except Unavailable as reason:
+            self._why_python = str(reason)
+        law = law or _imported(config["law"])
+        compiled: CompiledLaw | None = None
+        in_python: Law | None
+        if not isinstance(law, CompiledLaw):
+            in_python = law
+        elif self._why_python:
+            in_python = _without_native(law, self._why_python)
+        else:
+            compiled, in_python = law, None
+        values = np.array(config["remembered"], dtype=np.float64)
         version = config["version"]
         self.cycle = Cycle(
             layout,
@@ -233,10 +269,16 @@ class Loop:
             policy=Policy(
                 Missing(config["policy"]["missing"]), config["policy"]["patience"], config["policy"]["over"]
             ),
-            law=law or _imported(config["law"]),
+            law=in_python,
             params=Params(np.zeros(config["size"]), schema),
+            memory=Memory(values, memory) if in_python and arity(in_python) >= WITH_MEMORY else None,
+            memory_values=values,
             positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
         )
+        self._native = None if self._why_python else Native(self.cycle)
+        if compiled is not None and self._native is not None:
+            address, kept = compiled.load(schema, memory)
+            self._native.set_law(address, kept, success=compiled.success)
         self._parent: int = config["parent"]
         self._peer: Address | None = None
         self._deadline = 0
@@ -248,14 +290,12 @@ class Loop:
         Raises:
             ConnectionLost: the port or the loop itself has failed; the text gives the cause.
         """
-        try:
-            native = Native(self.cycle)
-        except Unavailable as reason:
-            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python: {reason}")
+        if self._native is None:
+            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python: {self._why_python}")
             self._run_in_python()
         else:
             self.layout.header[at.NATIVE] = 1
-            self._run_native(native)
+            self._run_native(self._native)
         if self.cycle.failure:
             raise ConnectionLost(self.cycle.failure)
 
@@ -265,15 +305,24 @@ class Loop:
         run, send, now_ns = native.library.hf_run, native.library.hf_send, time.monotonic_ns
         memory, reference = native.memory, native.reference
         out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench)
+        dq = np.frombuffer(memory.dq, dtype=np.float64)
+        sys.unraisablehook = native.note_error
         native.listen(self.socket.sock, None)
         history = len(states.ints)
         while True:
             code = run(reference, _CHECK_EVERY, native.sender)
             if code == CALL_LAW:
-                cycle.call_law(State(states.floats[header[at.STATES] % history]), out, memory.received)
+                state = State(states.floats[header[at.STATES] % history], dq=dq)
+                cycle.call_law(state, out, memory.received)
                 memory.is_ending = cycle.is_ending
                 send(reference)
                 code = CHECK if header[at.STOP] else CALL_LAW
+            elif code == LAW_FAILED:
+                memory.law_reported = 1
+                native.sync_to_python()
+                cycle.law_failed(native.law_failure, memory.received)
+                native.sync_from_python(self._last)
+                code = CHECK if header[at.STOP] else LAW_FAILED
             elif code == HANDED_BACK:
                 native.sync_to_python()
                 datagram, sender = native.datagram, native.sender_address
@@ -360,7 +409,22 @@ class Loop:
         self.socket.close()
 
 
-def _imported(name: str | None) -> Law | None:
+def _without_native(law: CompiledLaw, reason: str) -> Law:
+    """The Python form of a compiled law, for a loop in pure Python.
+
+    Raises:
+        CommandRejected: it has none.
+    """
+    if law.python is None:
+        raise CommandRejected(
+            f"a law from a library needs the native part of the loop: {reason}",
+            parameter="law",
+            hint="install gcc, or write the law in Python",
+        )
+    return law.python
+
+
+def _imported(name: str | None) -> Law | CompiledLaw | None:
     """Import the law "module:function"."""
     if name is None:
         return None
@@ -368,14 +432,14 @@ def _imported(name: str | None) -> Law | None:
     found: Any = importlib.import_module(module)
     for part in function.split("."):
         found = getattr(found, part)
-    law: Law = found
+    law: Law | CompiledLaw = found
     return law
 
 
-def _received_law() -> Law | None:
+def _received_law() -> Law | CompiledLaw | None:
     """Read the law that `Worker` sent by value; None if it sent none."""
     (size,) = _SIZE.unpack(sys.stdin.buffer.read(_SIZE.size))
-    law: Law | None = pickle.loads(sys.stdin.buffer.read(size)) if size else None
+    law: Law | CompiledLaw | None = pickle.loads(sys.stdin.buffer.read(size)) if size else None
     return law
 
 
@@ -398,12 +462,18 @@ def main(path: str) -> int:
 
     signal.signal(signal.SIGTERM, stop)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the user's process handles Ctrl-C and stops this one
-    first = at.Layout(block, history=header[at.HISTORY], params=header[at.SIZE])
+    first = at.Layout(
+        block, history=header[at.HISTORY], params=header[at.SIZE], memory=header[at.MEMORY_SIZE]
+    )
     config = json.loads(first.config.read() or "{}")
     header[at.PID] = os.getpid()
     try:
         loop = Loop(first, config, law=_received_law())
     except BaseException as error:  # also of the module of the law, which may do anything when it is imported
+        if isinstance(error, CommandRejected) and error.parameter == "law":
+            first.trouble.write(json.dumps([error.text, error.hint]))
+            header[at.STATUS] = at.Status.BAD_LAW
+            return 1
         first.trouble.write(str(error) if isinstance(error, HeptarmError) else describe(error))
         has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
         header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT

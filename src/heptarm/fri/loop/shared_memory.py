@@ -15,6 +15,8 @@ from heptarm.io.shared import MemoryBlock, Note, Ring
 
 # words of the header
 STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, NATIVE, HISTORY, SIZE = range(12)
+# of the law: number of words of its memory, heads of the rings of its memory, calls that took longer than their budget
+MEMORY_SIZE, MEMORY, MEMORY_SET, OVERRUNS = range(12, 16)
 COUNTS = 16
 LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED = 32, 81, 130
 LATENCY = 192
@@ -77,7 +79,7 @@ C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1 = 1, 2, 3, 10, 17, 23, 30
 COMMAND_WORDS, COMMAND_SLOTS = 31, 8
 GIVEN_Q, GIVEN_TAU, GIVEN_WRENCH, GIVEN_POSE, GIVEN_E1 = 1, 2, 4, 8, 16
 
-PARAM_SLOTS = 8
+PARAM_SLOTS = MEMORY_SLOTS = 8
 # words of an event: sequence, time [ns], kind, then its text
 EVENT_WORDS, EVENT_SLOTS = 48, 128
 EVENT_TEXT = 8 * (EVENT_WORDS - 3)
@@ -92,6 +94,7 @@ class Status(enum.IntEnum):
     ENDED = 2
     FAILED = 3
     NO_PORT = 4
+    BAD_LAW = 5
 
 
 class Layout:
@@ -101,9 +104,10 @@ class Layout:
         block: the memory.
         history: number of slots of the ring of states.
         params: number of values of the law's parameters.
+        memory: number of values of the law's memory.
     """
 
-    def __init__(self, block: MemoryBlock, *, history: int, params: int) -> None:
+    def __init__(self, block: MemoryBlock, *, history: int, params: int, memory: int = 0) -> None:
         at = HEADER_WORDS
         self.block = block
         self.states_at = at
@@ -112,8 +116,16 @@ class Layout:
         self.commands_at = at
         self.commands = Ring(block, head=COMMANDS, start=at, slots=COMMAND_SLOTS, width=COMMAND_WORDS)
         at += COMMAND_SLOTS * COMMAND_WORDS
+        self.params_at = at
         self.params = Ring(block, head=PARAMS, start=at, slots=PARAM_SLOTS, width=1 + params)
         at += PARAM_SLOTS * (1 + params)
+        # the law's memory after each call; what the user's process has written to it, with a count for each value
+        self.memory_at = at
+        self.memory = Ring(block, head=MEMORY, start=at, slots=MEMORY_SLOTS, width=1 + memory)
+        at += MEMORY_SLOTS * (1 + memory)
+        self.memory_set_at = at
+        self.memory_set = Ring(block, head=MEMORY_SET, start=at, slots=MEMORY_SLOTS, width=1 + 2 * memory)
+        at += MEMORY_SLOTS * (1 + 2 * memory)
         self.events = Ring(block, head=EVENTS, start=at, slots=EVENT_SLOTS, width=EVENT_WORDS)
         at += EVENT_SLOTS * EVENT_WORDS
         notes = []
@@ -127,9 +139,10 @@ class Layout:
         self.jitter = block.view(JITTER, BINS + 1)
 
     @staticmethod
-    def words(*, history: int, params: int) -> int:
+    def words(*, history: int, params: int, memory: int = 0) -> int:
         """Size of a block in words."""
         rings = history * STATE_WORDS + COMMAND_SLOTS * COMMAND_WORDS + PARAM_SLOTS * (1 + params)
+        rings += MEMORY_SLOTS * (2 + 3 * memory)
         return HEADER_WORDS + rings + EVENT_SLOTS * EVENT_WORDS + 5 * NOTE_WORDS
 
 

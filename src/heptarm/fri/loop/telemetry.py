@@ -64,6 +64,7 @@ class Record:
 
     Attributes:
         info: robot and connection of the last message, and the values derived from them.
+        dq: velocities by differences, shape (7,) [rad/s].
         state: state filled last, as a law sees it.
         flags: flags of the cycle.
         ticks: messages since commands became effective.
@@ -76,7 +77,8 @@ class Record:
     def __init__(self, layout: at.Layout, session: Session) -> None:
         self._layout, self._session = layout, session
         self._slot = memoryview(bytearray(8 * at.STATE_WORDS))
-        self.state = State(np.frombuffer(self._slot, dtype=np.float64))
+        self.dq = np.zeros(7)
+        self.state = State(np.frombuffer(self._slot, dtype=np.float64), dq=self.dq)
         self.info: tuple[object, object, tuple[int, ...]] = (None, None, ())
         self.flags = 0
         self.ticks = 0

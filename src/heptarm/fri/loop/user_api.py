@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.law_interface import Fields, Schema, flat
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import (
     CommandMode,
@@ -29,7 +30,7 @@ from heptarm.fri.protocol.messages import (
     SessionState,
 )
 from heptarm.fri.session.statistics import Counters, Histogram
-from heptarm.values.arrays import finite_entries, instance, numbers, scalar, shown
+from heptarm.values.arrays import instance, numbers, scalar, shown
 from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.pose import Pose
@@ -40,6 +41,10 @@ Floats = npt.NDArray[np.float64]
 
 _KINDS = {m.IoType.BOOLEAN: "boolean", m.IoType.DIGITAL: "unsigned", m.IoType.ANALOG: "analog"}
 _RANGES = {"boolean": (0.0, 1.0), "unsigned": (0.0, 2.0**64 - 1), "analog": (-math.inf, math.inf)}
+
+
+_UNKNOWN: Floats = np.full(7, np.nan)
+_UNKNOWN.flags.writeable = False
 
 
 class Signals:
@@ -246,7 +251,7 @@ class Output:
         return made
 
 
-class Params:
+class Params(Fields):
     """Parameters of a law: numbers and arrays by name, updated all at once.
 
     Args:
@@ -255,30 +260,16 @@ class Params:
         changed: called after an assignment; None makes them read-only.
     """
 
-    __slots__ = ("_changed", "_schema", "_values")
+    __slots__ = ("_changed",)
 
-    def __init__(
-        self,
-        values: Floats,
-        schema: Mapping[str, tuple[tuple[int, ...], int]],
-        *,
-        changed: Callable[[], None] | None = None,
-    ) -> None:
-        object.__setattr__(self, "_values", values)
-        object.__setattr__(self, "_schema", dict(schema))
+    def __init__(self, values: Floats, schema: Schema, *, changed: Callable[[], None] | None = None) -> None:
+        super().__init__(values, schema, "parameter")
         object.__setattr__(self, "_changed", changed)
 
     def __getattr__(self, name: str) -> Any:
-        try:
-            shape, start = self._schema[name]
-        except KeyError:
-            raise AttributeError(
-                f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}"
-            ) from None
-        if not shape:
-            return float(self._values[start])
-        part = self._values[start : start + int(np.prod(shape))].reshape(shape)
-        part.flags.writeable = False
+        part = self._view(name)
+        if isinstance(part, np.ndarray):
+            part.flags.writeable = False
         return part
 
     def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
@@ -293,19 +284,7 @@ class Params:
         """
         if self._changed is None:
             raise AttributeError("parameters are read-only in a law")
-        checked = []
-        for name, value in values.items():
-            given = finite_entries(numbers(value, name), name, nan=True)
-            if name not in self._schema:
-                raise AttributeError(f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}")
-            shape, start = self._schema[name]
-            if given.shape != tuple(shape):
-                raise ShapeError(
-                    f"{name} must have shape {tuple(shape)}, as initially, got {given.shape}",
-                    parameter=name,
-                )
-            checked.append((start, given.reshape(-1)))
-        for start, given in checked:
+        for start, given in self._checked(values):
             self._values[start : start + given.size] = given
         self._changed()
 
@@ -320,21 +299,7 @@ class Params:
         Raises:
             ShapeError: a value is neither a number nor an array of numbers.
         """
-        if not isinstance(values, Mapping):
-            raise ShapeError(
-                f"params must be numbers and arrays by name, got {shown(values)}",
-                parameter="params",
-                value=values,
-            )
-        parts: list[Floats] = []
-        schema: dict[str, tuple[tuple[int, ...], int]] = {}
-        start = 0
-        for name, value in values.items():
-            given = numbers(value, name, "a number or an array of numbers")
-            schema[name] = (given.shape, start)
-            parts.append(given.reshape(-1))
-            start += given.size
-        return (np.concatenate(parts) if parts else np.zeros(0)), schema
+        return flat(values, "params")
 
 
 class State:
@@ -343,22 +308,34 @@ class State:
     Args:
         words: slot of the ring of states, shape (122,); it is not copied.
         signals: signals of the session.
+        dq: velocities, shape (7,) [rad/s], of a state that a law sees.
 
     Attributes:
         signals: signals of the session.
     """
 
-    __slots__ = ("_floats", "_ints", "signals")
+    __slots__ = ("_dq", "_floats", "_ints", "signals")
 
-    def __init__(self, words: Floats, signals: Signals | None = None) -> None:
+    def __init__(self, words: Floats, signals: Signals | None = None, dq: Floats | None = None) -> None:
         self._floats = words
+        self._dq = _UNKNOWN if dq is None else dq
         self._ints: Ints = words.view(np.int64)
         self.signals = Signals() if signals is None else signals
+
+    @property
+    def words(self) -> Floats:
+        """All words, as in `shared_memory`."""
+        return self._floats
 
     @property
     def q(self) -> Floats:
         """Measured position, shape (7,) [rad]."""
         return self._floats[at.ARRAYS["q"]]
+
+    @property
+    def dq(self) -> Floats:
+        """Velocities by the difference to the previous message, shape (7,) [rad/s]; in laws only, NaN elsewhere."""
+        return self._dq
 
     @property
     def tau(self) -> Floats:
@@ -539,6 +516,11 @@ class State:
         return float(self._ints[at.S_PERIOD]) * 1e-9
 
     @property
+    def dt(self) -> float:
+        """Command period [s]: the send period times the number of messages that one answer is for."""
+        return float(self._ints[at.S_PERIOD] * max(1, int(self._ints[at.S_MULTIPLIER]))) * 1e-9
+
+    @property
     def t(self) -> float:
         """Controller's time since commands became effective [s]; 0 before."""
         return float(self._ints[at.S_TICKS]) * self.period
@@ -610,6 +592,7 @@ class Stats:
         commanded: answers whose commands were effective.
         filled: of those, made by the policy without a fresh command.
         limited: of those, limited by the guard.
+        overruns: calls of the law that took longer than its time budget.
         quality: number of messages by their quality.
         latency: time from receipt to answer [s]: median, 99 %, 99.9 %, longest.
         jitter: deviation from the send period [s]: median, 99 %, 99.9 %, longest.
@@ -626,6 +609,7 @@ class Stats:
     commanded: int
     filled: int
     limited: int
+    overruns: int
     quality: dict[str, int]
     latency: tuple[float, ...]
     jitter: tuple[float, ...]
@@ -638,7 +622,8 @@ class Stats:
             "messages": f"{self.received} received, {self.lost} lost, {self.duplicated} twice, "
             f"{self.reordered} late, {self.malformed} malformed, {self.restarts} restarts",
             "answers": f"{self.answered} sent, {self.missed} missed; {self.commanded} commanded, "
-            f"{self.filled} filled by the policy, {self.limited} limited by the guard",
+            f"{self.filled} filled by the policy, {self.limited} limited by the guard"
+            + (f", {self.overruns} calls of the law over its time budget" if self.overruns else ""),
             "quality": ", ".join(f"{name} {count}" for name, count in self.quality.items() if count),
             "latency": spread[0],
             "jitter": spread[1],
@@ -668,6 +653,7 @@ class Stats:
             commanded=counts.commanded,
             filled=counts.filled,
             limited=counts.limited,
+            overruns=layout.header[at.OVERRUNS],
             quality={name: getattr(counts, name) for name in ("poor", "fair", "good", "excellent")},
             latency=(*latency.percentiles(*fractions), latency.longest),
             jitter=(*jitter.percentiles(*fractions), jitter.longest),

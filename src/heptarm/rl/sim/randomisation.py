@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.arrays import Array, integer, numbers, shown, within
 
+#: Largest relative error of a velocity.
+_NOISIEST = 0.99
 #: Most decisions by which a command may be late.
 LATEST = 8
 
@@ -33,6 +35,7 @@ class Randomisation:
 
     Raises:
         LimitError: a range is empty or exceeds its bounds.
+        ShapeError: something else than numbers.
     """
 
     _: KW_ONLY
@@ -50,7 +53,7 @@ class Randomisation:
             "stiffness": (10.0, inf),
         }
         for name, (least, most) in bounds.items():
-            low, high = getattr(self, name)
+            low, high = _range(getattr(self, name), name)
             if not least <= low <= high <= most:
                 raise LimitError(
                     f"{name} must be two ascending numbers in [{least:g}, {most:g}], got ({low}, {high})",
@@ -59,20 +62,15 @@ class Randomisation:
                     value=(low, high),
                     allowed=f"[{least:g}, {most:g}]",
                 )
+        for end in self.latency:
+            integer(end, "latency", 0, LATEST)
         if isfinite(self.stiffness[0]) != isfinite(self.stiffness[1]):
             raise LimitError(
                 f"stiffness must have two finite ends or none, got {self.stiffness}",
                 code=2,
                 parameter="stiffness",
             )
-        if not 0.0 <= self.velocity_noise < 1.0:
-            raise LimitError(
-                f"velocity_noise must be in [0, 1), got {self.velocity_noise}",
-                code=2,
-                parameter="velocity_noise",
-                value=self.velocity_noise,
-                allowed="[0, 1)",
-            )
+        within(self.velocity_noise, "velocity_noise", 0.0, _NOISIEST)
 
     def draw_latency(self, random: np.random.Generator, count: int) -> npt.NDArray[np.int64]:
         """Decisions, shape (count,)."""
@@ -93,6 +91,13 @@ class Randomisation:
     def as_dict(self) -> dict[str, Any]:
         """For a file."""
         return asdict(self)
+
+
+def _range(value: npt.ArrayLike, name: str) -> tuple[float, float]:
+    ends = numbers(value, name, "two numbers")
+    if ends.shape != (2,):
+        raise ShapeError(f"{name} must be two numbers, got {shown(value)}", parameter=name, value=value)
+    return float(ends[0]), float(ends[1])
 
 
 def _logarithmic(random: np.random.Generator, bounds: tuple[float, float], count: int) -> Array:

@@ -72,7 +72,7 @@ class RosAction:
 
     Attributes:
         name: as in ROS 2, "~/" for the node's own.
-        type: "package/Type"; its result has `success` and `message`.
+        type: "package/Type"; a result of our own has `success` and `message`.
         begin: begins a goal; raises HeptarmError to refuse it.
     """
 

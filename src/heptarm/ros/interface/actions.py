@@ -29,6 +29,7 @@ from heptarm.ros.interface.action import (
 from heptarm.ros.interface.conditions import condition_of, reaction_of
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.events import event_message, with_triggers
+from heptarm.ros.interface.gripper import gripper_command
 from heptarm.ros.interface.messages import pose_message
 from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.skills.replay import Replay
@@ -503,4 +504,5 @@ ACTIONS = (
     RosAction("~/guide", "heptarm_msgs/Guide", guide),
     RosAction("~/teach", "heptarm_msgs/Teach", teach),
     RosAction("~/replay", "heptarm_msgs/Replay", replay),
+    RosAction("~/gripper_cmd", "control_msgs/GripperCommand", gripper_command),
 )

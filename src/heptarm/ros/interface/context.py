@@ -8,6 +8,7 @@ from heptarm.arm.arm import Arm
 from heptarm.errors import NotReady, Timeout
 from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.node.driver import Driver
+from heptarm.skills.gripper import TwoSignalGripper
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.tool import Workpiece
@@ -28,6 +29,8 @@ class NodeContext:
         ros: see above.
         workpiece: attached by a service; None: none is.
         taught: trajectories recorded by the action `teach`, by name.
+        gripper: of the action `gripper_cmd`; None: it has had no goal yet.
+        gripper_goal: number of its newest goal; 0: none.
     """
 
     def __init__(self, driver: Driver, ros: RosAdapter) -> None:
@@ -35,6 +38,8 @@ class NodeContext:
         self.ros = ros
         self.workpiece: Workpiece | None = None
         self.taught: dict[str, Trajectory] = {}
+        self.gripper: TwoSignalGripper | None = None
+        self.gripper_goal = 0
         self._mode = contextlib.ExitStack()
 
     @property

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, Protocol
+
+import numpy as np
 
 from heptarm.model.kinematics import forward
 from heptarm.ros.interface import messages
@@ -14,7 +16,7 @@ from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.trajectory import TrajectorySample
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
-from heptarm.values.state import State
+from heptarm.values.state import OperationMode, State
 
 
 class TransformMessages:
@@ -201,14 +203,59 @@ def _stamped(message: Any, stamp: Any, frame: str = "") -> Any:
     return message
 
 
-def preset_message(ros: RosAdapter, entry: PresetName, state: State, names: Sequence[str]) -> Any:
-    """Make a message for a topic of another driver; None: the state lacks what it needs."""
+def preset_message(
+    ros: RosAdapter, entry: PresetName, kind: Any, state: State, names: NodeConfiguration
+) -> Any:
+    """Make a message for a topic of another driver; None: the state lacks what it needs.
+
+    Args:
+        ros: types and time of the ROS.
+        entry: which topic.
+        kind: type of the message.
+        state: the state.
+        names: of joints and frames.
+    """
+    stamp = ros.time(_measured(ros, state, state.groups.joints))
     if entry.role is NameRole.POSE:
         return None if state.groups.pose is None else messages.pose_message(ros, state.pose)
-    if entry.role is NameRole.WRENCH:
-        return None if state.groups.wrench is None else messages.wrench_message(ros, state)
-    message = messages.joint_state(ros, state, names, external=entry.external)
-    return _stamped(message, ros.time(_measured(ros, state, state.groups.joints)))
+    if entry.role in (NameRole.WRENCH, NameRole.STAMPED_WRENCH):
+        if state.groups.wrench is None:
+            return None
+        wrench = messages.wrench_message(ros, state)
+        stamped = entry.role is NameRole.STAMPED_WRENCH
+        return _stamped(kind(wrench=wrench), stamp, names.frame("base")) if stamped else wrench
+    if entry.role is NameRole.LBR_STATE:
+        return _lbr_state(kind(), state, max(0, ros.now() - max(0, round(state.age * 1e9))))
+    message = messages.joint_state(ros, state, names.joints, external=entry.external)
+    return _stamped(message, stamp)
+
+
+#: Codes of FRI: of operation modes, safety states (normal, stop 1, stop 2) and drive states (off, active).
+_OPERATION_MODES = {OperationMode.T1: 0, OperationMode.T2: 1, OperationMode.AUT: 2}
+_SAFE, _EMERGENCY, _PROTECTIVE = 0, 2, 3
+_DRIVE_OFF, _DRIVE_ON = 0, 2
+
+
+def _lbr_state(message: Any, state: State, stamp: int) -> Any:
+    """Fill a lbr_fri_idl/LBRState with what the cabinet reports without FRI; sessions have a topic of our own.
+
+    The codes are those of FRI's enumerations: 0 is an idle session of poor quality that commands nothing.
+    """
+    message.time_stamp_sec, message.time_stamp_nano_sec = stamp // 10**9, stamp % 10**9
+    message.measured_joint_position = state.q.tolist()
+    message.ipo_joint_position = state.q_cmd.tolist()
+    if state.torques is not None:
+        message.measured_torque = state.tau.tolist()
+        message.external_torque = state.tau_ext.tolist()
+        message.commanded_torque = np.nan_to_num(state.torques.tau_cmd).tolist()
+    safety = state.groups.safety
+    if safety is not None:
+        message.operation_mode = _OPERATION_MODES[safety.mode]
+        message.drive_state = _DRIVE_ON if safety.brakes_open else _DRIVE_OFF
+        message.safety_state = (
+            _EMERGENCY if safety.emergency_stop else _PROTECTIVE if safety.protective_stop else _SAFE
+        )
+    return message
 
 
 def _measured(ros: RosAdapter, state: State, group: _Sampled | None) -> int:

@@ -1,10 +1,6 @@
 """The topics that both nodes subscribe to: handlers, and `TOPICS`, the table of them.
 
-A new topic is a function and a row of the table. A node subscribes to every row of `topics_of`::
-
-    topics = TopicDispatcher(context)
-    for row in topics_of(values):
-        ...                       # under row.name with row.type: topics.handle(row, message); log a refusal
+A new topic is a function and a row of the table. Which rows a node subscribes to: `heptarm.ros.interface.offered`.
 """
 
 from __future__ import annotations
@@ -22,9 +18,7 @@ from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import trajectory_goal
 from heptarm.ros.interface.motions import (
-    joint_target,
     partial_joints,
-    pose_target,
     positions,
     stamped_pose,
     velocities,
@@ -114,18 +108,6 @@ def joint_trajectory(context: NodeContext, message: Any) -> None:
     context.driver.accept(replace(goal, from_topic=True))
 
 
-def libiiwa_joint(context: NodeContext, message: Any) -> None:
-    """Move to the positions of a sensor_msgs/JointState by the rules of libiiwa."""
-    context.driver.start(ptp(joint_target(context.driver, message.name, message.position)))
-
-
-def libiiwa_pose(context: NodeContext, message: Any) -> None:
-    """Move to a geometry_msgs/Pose by the rules of libiiwa."""
-    place, turn = message.position, message.orientation
-    xyz, quat = (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
-    context.driver.start(ptp(pose_target(context.driver, xyz, quat)))
-
-
 # ----------------------------------------------------------------------------------- servo
 
 
@@ -203,6 +185,29 @@ def _seven(message: Any, unit: str) -> Array:
 # ------------------------------------------------------------------------------------- FRI
 
 
+def lbr_position(context: NodeContext, message: Any) -> None:
+    """Follow the positions of a lbr_fri_idl/LBRJointPositionCommand."""
+    context.driver.follow_stream(array(list(message.joint_position), 7, "joint_position [rad]"))
+
+
+def lbr_torque(context: NodeContext, message: Any) -> None:
+    """Command the positions and torques of a lbr_fri_idl/LBRTorqueCommand to the open FRI session."""
+    q, tau = (
+        array(list(values), 7, name)
+        for values, name in (
+            (message.joint_position, "joint_position [rad]"),
+            (message.torque, "torque [Nm]"),
+        )
+    )
+    context.driver.fri.command(q=q, tau=tau)
+
+
+def lbr_wrench(context: NodeContext, message: Any) -> None:
+    """Command the positions and the wrench of a lbr_fri_idl/LBRWrenchCommand to the open FRI session."""
+    q = array(list(message.joint_position), 7, "joint_position [rad]")
+    context.driver.fri.command(q=q, wrench=array(list(message.wrench), 6, "wrench [N, Nm]"))
+
+
 def fri_joint(context: NodeContext, message: Any) -> None:
     """Command positions and torques of a sensor_msgs/JointState; missing joints keep their last command."""
     q, tau = (
@@ -253,9 +258,11 @@ TOPICS = (
 _PRESET_HANDLERS: Mapping[NameRole, Handler] = MappingProxyType(
     {
         NameRole.STOP: stop,
-        NameRole.JOINT: libiiwa_joint,
-        NameRole.CARTESIAN: libiiwa_pose,
         NameRole.TRAJECTORY: joint_trajectory,
+        NameRole.FORWARD: forward_position,
+        NameRole.LBR_POSITION: lbr_position,
+        NameRole.LBR_TORQUE: lbr_torque,
+        NameRole.LBR_WRENCH: lbr_wrench,
     }
 )
 
@@ -271,5 +278,5 @@ def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
     return ours + tuple(
         Topic(entry.name, entry.type, _PRESET_HANDLERS[entry.role], at_once=entry.role is NameRole.STOP)
         for entry in PRESETS[values["names"]].entries
-        if entry.role in _PRESET_HANDLERS
+        if entry.role in _PRESET_HANDLERS and entry.is_available
     )

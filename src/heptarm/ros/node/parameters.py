@@ -15,6 +15,7 @@ from heptarm.ros.trajectory.fri_execution import FriOptions
 from heptarm.ros.trajectory.runner import ExecutionSettings
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.ros.trajectory.tolerances import StateTolerances, TrajectoryTolerances
+from heptarm.skills.gripper import PATIENCE, SETTLE
 from heptarm.values.arrays import frozen, within
 
 Plain = str | bool | int | float | list[str]
@@ -102,8 +103,8 @@ PARAMETERS = (
     Parameter(
         "names",
         "heptarm",
-        "whose names of topics and actions to offer besides heptarm's own",
-        choices=("heptarm", "libiiwa", "iiwa_stack"),
+        "whose names of topics, services and actions to offer besides heptarm's own",
+        choices=("heptarm", "libiiwa", "iiwa_stack", "lbr_stack"),
     ),
     Parameter(
         "forward_controllers",
@@ -179,6 +180,20 @@ PARAMETERS = (
         2.0,
     ),
     Parameter("speed", 0.2, "speed limit of commanded motions, a fraction of each axis' maximum", 0.01, 1.0),
+    Parameter("gripper.open", "", 'output that opens the gripper of ~/gripper_cmd; "": there is no gripper'),
+    Parameter("gripper.close", "", "output that closes it"),
+    Parameter("gripper.is_open", "", "input of the switch at its open end"),
+    Parameter("gripper.is_closed", "", "input of the switch at its closed end: nothing between the fingers"),
+    Parameter("gripper.holds", "", 'input that is on while it holds something; "": there is none'),
+    Parameter("gripper.width", 0.1, "position of the open gripper in goals and results [m]", 0.001, 1.0),
+    Parameter("gripper.timeout", PATIENCE, "longest time for opening or closing it [s]", 0.1, 600.0),
+    Parameter(
+        "gripper.settle",
+        SETTLE,
+        "time with neither switch on before it counts as closed on something [s]",
+        0.0,
+        600.0,
+    ),
     _live("allow_partial_joints_goal", False, "accept goals that lack joints; these hold their positions"),
     _live("allow_nonzero_velocity_at_trajectory_end", False, "accept goals whose last point has a velocity"),
     _live(

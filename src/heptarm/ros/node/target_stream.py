@@ -14,7 +14,7 @@ from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
 from heptarm.model.kinematics import forward
-from heptarm.ros.node.cartesian_velocity import joint_velocity, limited_twist, limited_velocity
+from heptarm.model.velocity import MARGIN, VelocityPath, joint_velocity, limited_twist
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.values.arrays import Array, array
 from heptarm.values.condition.condition import Condition
@@ -25,6 +25,8 @@ _log = logging.getLogger("heptarm.ros")
 
 #: A velocity command becomes a target this far ahead [s]; the cabinet keeps the velocity of a target for longer.
 _AHEAD = 0.05
+#: The first velocity command counts as if the one before had come so long ago [s].
+_FIRST = 0.02
 
 
 class TargetStream:
@@ -54,7 +56,7 @@ class TargetStream:
         self._clock = RealClock()
         self._lock = threading.RLock()
         self._servo: JointServo | PoseServo | None = None
-        self._q = np.zeros(7)
+        self._path: VelocityPath | None = None  # of the velocities of the open servo motion
         self._last = 0
         self._guard: Condition | None = None
         self._blocked = ""  # what ended the last servo motion; setting a guard clears it
@@ -84,12 +86,12 @@ class TargetStream:
         """Follow joint positions, shape (7,) [rad], passed with `dq` [rad/s]."""
         with self._lock:
             target = array(q, 7, "position")
-            self._q = self._joint_servo().set(target, None if dq is None else array(dq, 7, "velocity"))
+            self._joint_servo().set(target, None if dq is None else array(dq, 7, "velocity"))
+            self._path = None
 
     def velocity(self, dq: Array) -> None:
-        """Move with joint velocities, shape (7,) [rad/s], clamped to the limits of the robot."""
-        robot = self._arm.robot
-        command = np.clip(array(dq, 7, "velocity"), -robot.dq_max, robot.dq_max)
+        """Move with joint velocities, shape (7,) [rad/s], slowed down in step to the limits of the robot."""
+        command = array(dq, 7, "velocity")
         self._move(lambda _: command)
 
     def twist(self, twist: Array, frame: Literal["base", "flange", "tool"] = "base") -> None:
@@ -114,25 +116,30 @@ class TargetStream:
                 tool = flange @ offset
                 turn, point = tool[:3, :3], tool[:3, 3]
             axes = np.concatenate([turn @ wanted[:3], turn @ wanted[3:]])
-            dq = joint_velocity(robot, q, axes, point)
-            return limited_velocity(robot, q, dq, self._options.speed)
+            return joint_velocity(robot, q, axes, point)
 
         self._move(command)
 
     def _move(self, command_at: Callable[[Array], Array]) -> None:
         """Move with the joint velocities [rad/s] that a function returns for the commanded positions [rad]."""
         with self._lock:
-            robot = self._arm.robot
-            was_active = self.active
+            robot, options = self._arm.robot, self._options
+            before = self._servo
             servo = self._joint_servo()
             now = self._clock.nanos()
-            if not was_active:
-                self._q, self._last = servo.start.q.copy(), now
-            command = command_at(self._q)
+            if servo is not before or self._path is None:
+                self._path = VelocityPath(
+                    self._arm.state.q if servo is before else servo.start.q,
+                    speed=options.speed * robot.dq_max,
+                    acceleration=options.acceleration * robot.ddq_max,
+                    q_min=robot.q_min + MARGIN,
+                    q_max=robot.q_max - MARGIN,
+                )
+                self._last = now - round(_FIRST * 1e9)
             passed = min((now - self._last) * 1e-9, self._timeout)
             self._last = now
-            self._q = np.clip(self._q + command * passed, robot.q_min, robot.q_max)
-            servo.set(self._q + command * _AHEAD, command)
+            self._path.advance(command_at(self._path.q), passed)
+            servo.set(*self._path.target(_AHEAD))
 
     def pose(self, pose: Pose, *, straight: bool = False) -> None:
         """Follow a pose of the flange in the base, on straight lines or by interpolating joints."""

@@ -154,6 +154,7 @@ class CartesianImpedanceLaw:
     """
 
     is_stiff = False
+    is_plain = False
 
     def __init__(
         self,

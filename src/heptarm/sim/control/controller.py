@@ -42,6 +42,11 @@ class ActiveLaw:
         return self._law.is_stiff
 
     @property
+    def is_plain(self) -> bool:
+        """Whether the law is position control without anything left of a preload."""
+        return self._law.is_plain
+
+    @property
     def stays(self) -> bool:
         """Whether a motion must not end yet, because its overlaid force has not ended."""
         return self._law.stays

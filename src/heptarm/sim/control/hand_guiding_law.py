@@ -48,6 +48,7 @@ class HandGuidingLaw:
     """
 
     is_stiff = False
+    is_plain = False
     stays = False
     violation = ""
 

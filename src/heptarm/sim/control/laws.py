@@ -80,6 +80,10 @@ class ControlLaw(Protocol):
     is_stiff: bool
 
     @property
+    def is_plain(self) -> bool:
+        """Whether it is position control, without preload."""
+
+    @property
     def stays(self) -> bool:
         """Whether a motion must not end yet."""
 
@@ -109,6 +113,7 @@ class PositionLaw:
 
     def __init__(self, preload: Array | None = None, *, is_locked: bool = False) -> None:
         self._preload = preload
+        self.is_plain = preload is None
         self._keeps = 1.0 if is_locked else exp(-TICK / PRELOAD_FADING)
 
     @classmethod
@@ -150,6 +155,7 @@ class JointImpedanceLaw:
     """
 
     is_stiff = False
+    is_plain = False
     stays = False
     violation = ""
 

@@ -12,6 +12,7 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, Superposition
+from heptarm.sim.controller.ahead import SetPointsAhead
 from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstimate, WatchedCondition
 from heptarm.sim.controller.hand_guiding import GuidedMotion
 from heptarm.sim.controller.queue import Cancellation, MotionQueue
@@ -47,6 +48,7 @@ class RunningMotion:
     """
 
     __slots__ = (
+        "ahead",
         "braking",
         "broken",
         "cancelled",
@@ -54,13 +56,16 @@ class RunningMotion:
         "failure",
         "follower",
         "guided",
+        "is_direct",
         "part",
         "path",
+        "place",
         "plan",
         "profile",
         "serial",
         "settling",
         "started",
+        "step",
         "still",
         "stop",
         "time",
@@ -73,6 +78,9 @@ class RunningMotion:
         self.watches = watches
         self.path: JointPath | None = planned.path
         self.profile: TimeLaw | None = None if planned.timing is None else planned.timing.profile
+        self.is_direct = planned.path is not None and planned.path.is_direct
+        self.ahead: SetPointsAhead | None = None
+        self.step = self.place = 0.0
         self.failure = ""
         self.part = 0
         self.time = 0.0
@@ -357,7 +365,11 @@ class Interpolator:
         if self.is_overlaid:
             self.is_overlaid = False
             self._halt(run)
-        run.time += TICK if run.braking else TICK * self._speed_override.factor
+        step = TICK if run.braking else TICK * self._speed_override.factor
+        if run.is_direct and not run.braking and self._follow_ahead(run, step):
+            s = run.place
+            return (nan if run.failure else planned.progress(s, run.part)), planned.duration - run.time
+        run.time += step
         if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
                 run.ended = True
@@ -374,6 +386,30 @@ class Interpolator:
         else:
             self._follow_path(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
+
+    def _follow_ahead(self, run: RunningMotion, step: float) -> bool:
+        """Take the next set-point from those that are computed ahead; False: there is none.
+
+        Args:
+            run: the motion.
+            step: by which its time grows in this tick [s].
+        """
+        command, ahead = self.command, run.ahead
+        time = -1.0 if ahead is None else ahead.take(run.time, step, command.after)
+        if time < 0.0:
+            if step != run.step or step <= 0.0:  # the speed changes, or the motion pauses
+                run.step, run.ahead = step, None
+                return False
+            assert run.path is not None and run.profile is not None
+            run.ahead = ahead = SetPointsAhead(run.path, run.profile, run.time, step, command)
+            time = ahead.take(run.time, step, command.after)
+            if time < 0.0:
+                run.is_direct = False
+                return False
+        assert ahead is not None
+        run.time, run.place, command.after = time, ahead.place, ahead.last
+        self._reach(run, ahead.place)
+        return True
 
     def _reach(self, run: RunningMotion, s: float) -> None:
         """Report the parts that have begun at s."""

@@ -80,6 +80,12 @@ class SetPoints:
         leap = np.abs(step) > self._leap
         return int(leap.argmax()) if leap.any() else None
 
+    def followable(self, row: Array) -> int:
+        """How many of the next set-points, shape (n, 7) [rad], `leap` finds nothing in."""
+        steps = np.diff(row, axis=0, prepend=self.after[None])
+        leaps = (np.abs(steps) > self._leap).any(axis=1)
+        return int(leaps.argmax()) if leaps.any() else len(row)
+
     def beyond(self, there: Array) -> int | None:
         """The first axis that a set-point would move beyond its limits, from 0; None: there is none."""
         beyond = (there > self._highest) | (there < self._lowest)

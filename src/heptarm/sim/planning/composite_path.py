@@ -90,6 +90,16 @@ class CompositePath:
         self.total = float(ends[-1])
         self.marks: list[float] = [0.0, *(ends / self.total).tolist()]
         self.marks[-1] = 1.0
+        self.is_direct = all(segment.path.is_direct for segment in segments)
+
+    def row(self, s: Array) -> Array:
+        """See `JointPath`."""
+        indices = np.minimum(np.searchsorted(self.marks, s, side="right"), len(self.segments)) - 1
+        found = np.empty((len(s), 7))
+        for index in np.unique(indices).tolist():
+            chosen, low, high = indices == index, self.marks[index], self.marks[index + 1]
+            found[chosen] = self.segments[index].path.row(np.minimum(1.0, (s[chosen] - low) / (high - low)))
+        return found
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad].
@@ -105,10 +115,15 @@ class CompositePath:
 class SubPath:
     """The part of a path between two values of its parameter."""
 
-    __slots__ = ("_first", "_path", "_span")
+    __slots__ = ("_first", "_path", "_span", "is_direct")
 
     def __init__(self, path: JointPath, first: float, last: float) -> None:
         self._path, self._first, self._span = path, first, last - first
+        self.is_direct = path.is_direct
+
+    def row(self, s: Array) -> Array:
+        """See `JointPath`."""
+        return self._path.row(self._first + s * self._span)
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad]."""

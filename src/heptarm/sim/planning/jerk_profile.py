@@ -8,7 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Trajectory
+
+from heptarm.values.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +43,21 @@ class TimeLaw(Protocol):
     def at(self, time: float) -> tuple[float, float, float]:
         """s, ds/dt, d²s/dt² at a time [s]; constant after the end."""
 
+    def places(self, times: Array) -> Array:
+        """Values of s at the first of ascending times [s], shape (n,), as `at` has them: as many as it has at once."""
 
-class ScaledProfile:
+
+class _OneByOne:
+    """A profile that has no places at once."""
+
+    __slots__ = ()
+
+    def places(self, times: Array) -> Array:
+        """None."""
+        return times[:0]
+
+
+class ScaledProfile(_OneByOne):
     """The remainder of a profile between two times [s], at a fraction of its speed."""
 
     __slots__ = ("_begin", "_profile", "_scale", "duration")
@@ -94,6 +110,19 @@ class JerkProfile:
         position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))
         unit = self._unit
         return position[0] * unit, velocity[0] * unit, acceleration[0] * unit
+
+    def places(self, times: Array) -> Array:
+        """See `TimeLaw`."""
+        pieces = self._trajectory.profiles[0][0]
+        if pieces.brake.duration > 0.0 or pieces.accel.duration > 0.0:  # pieces before the seven
+            return times[:0]
+        ends = np.cumsum(pieces.t)
+        times = times[times < ends[-1]]
+        index = np.searchsorted(ends, times, side="right")
+        since = times - np.concatenate([[0.0], ends])[index]
+        p, v, a, j = (np.array(one)[index] for one in (pieces.p, pieces.v, pieces.a, pieces.j))
+        found: Array = (p + since * (v + since * (a / 2 + since * j / 6))) * self._unit
+        return found
 
 
 def _parameters(state: tuple[float, float, float], limits: ProfileLimits) -> InputParameter:

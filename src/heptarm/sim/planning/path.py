@@ -12,6 +12,7 @@ import numpy as np
 from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import Vec
 from heptarm.sim.planning.geometry import Geometry, Quat, blend_weight, product
+from heptarm.sim.planning.native_inverse import NativeInverse, inverse_library
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
@@ -19,6 +20,13 @@ from heptarm.values.robot import RobotModel
 
 class JointPath(Protocol):
     """Joint positions over s."""
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether joint positions follow from s alone, so that there is a `row` of them."""
+
+    def row(self, s: Array) -> Array:
+        """Joint positions at values of s, shape (n,), as `at` computes them; shape (n, 7) [rad]."""
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad].
@@ -33,8 +41,14 @@ class JointLine:
 
     __slots__ = ("_span", "_start")
 
+    is_direct = True
+
     def __init__(self, start: Array, end: Array) -> None:
         self._start, self._span = start, end - start
+
+    def row(self, s: Array) -> Array:
+        """See `JointPath`."""
+        return self._start + s[:, None] * self._span
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions, shape (7,) [rad]; `near` is not used."""
@@ -54,13 +68,19 @@ class TcpInverseKinematics:
         e1: its arm angle [rad].
     """
 
-    __slots__ = ("_offset", "_robot", "_turned", "e1", "status")
+    __slots__ = ("_native", "_offset", "_robot", "_turned", "e1", "status")
 
     def __init__(self, robot: RobotModel, start: Array, tcp: Pose) -> None:
         self._robot = robot
         to_flange = tcp.inverse()
         self._offset: Vec = tuple(to_flange.xyz.tolist())
         self._turned: Quat | None = tuple(to_flange.quat.tolist()) if to_flange.quat[3] < 1.0 else None
+        library = inverse_library()
+        self._native = (
+            None
+            if library is None
+            else NativeInverse(library, robot, self._offset, self._turned or (0.0, 0.0, 0.0, 1.0))
+        )
         self.status = inverse_kinematics.status_of(robot, start.tolist())
         self.e1 = inverse_kinematics.arm_angle(robot, start.tolist(), bool(self.status & 1))
 
@@ -70,6 +90,10 @@ class TcpInverseKinematics:
         Raises:
             Unreachable: out of reach.
         """
+        if self._native is not None:
+            found = self._native.joints(point, quat, e1, self.status, near)
+            if found is not None:
+                return found
         r, (x, y, z), (u, v, w) = _rows(quat), point, self._offset
         p = (
             x + r[0][0] * u + r[0][1] * v + r[0][2] * w,
@@ -83,7 +107,19 @@ class TcpInverseKinematics:
         )
 
 
-class CartesianPath:
+class Sequential:
+    """A path whose joint positions have to be computed one after the other."""
+
+    __slots__ = ()
+
+    is_direct = False
+
+    def row(self, s: Array) -> Array:
+        """There is none."""
+        raise NotImplementedError
+
+
+class CartesianPath(Sequential):
     """Path of the tool frame in space, the arm angle linear with s.
 
     Args:

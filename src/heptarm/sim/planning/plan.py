@@ -56,7 +56,9 @@ class Plan:
         return (0.0, 1.0) if part < 0 else (marks[part], marks[part + 1])
 
     def progress(self, s: float, part: int) -> float:
-        """Progress of the running motion of a batch at s, 0 to 1; any other motion is its only part."""
+        """Progress of the running motion of a batch at s in [0, 1]; any other motion is its only part."""
+        if not self.marks:
+            return s
         low, high = self.span(part if self.order.kind == "batch" else -1)
         return min(1.0, max(0.0, (s - low) / (high - low))) if high > low else 1.0
 

@@ -18,7 +18,7 @@ from heptarm.sim.planning.composite_path import (
     sample,
 )
 from heptarm.sim.planning.geometry import Geometry, Quat, blend_weight, product
-from heptarm.sim.planning.path import CartesianPath, JointLine, JointPath
+from heptarm.sim.planning.path import CartesianPath, JointLine, JointPath, Sequential
 from heptarm.sim.planning.plan import Plan, timed
 from heptarm.sim.planning.targets import (
     LINES,
@@ -34,7 +34,7 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
 
-class JointBlend:
+class JointBlend(Sequential):
     """Blend of two paths by their joint positions.
 
     Args:

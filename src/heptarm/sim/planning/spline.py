@@ -13,7 +13,7 @@ from heptarm.model.kinematics import Vec, forward
 from heptarm.sim.planning.command import Order, PlanError
 from heptarm.sim.planning.composite_path import UNBOUND, CompositePath, Segment, SubPath
 from heptarm.sim.planning.geometry import Arc, Quat, Slerp, Straight
-from heptarm.sim.planning.path import CartesianPath
+from heptarm.sim.planning.path import CartesianPath, Sequential
 from heptarm.sim.planning.plan import Plan, timed
 from heptarm.sim.planning.targets import (
     CARTESIAN_DEFAULT,
@@ -116,7 +116,7 @@ def through(points: Array, lengths: Array) -> Piecewise:
     )
 
 
-class JointCurve:
+class JointCurve(Sequential):
     """Smooth curve through joint positions."""
 
     __slots__ = ("_curve",)

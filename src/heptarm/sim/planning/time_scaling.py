@@ -48,6 +48,8 @@ _LEAST = 0.3
 _EVEN = 0.9
 #: Samples of each phase of a profile when it is checked.
 _CHECKS = 60
+#: Shortest time between two of them, as a fraction of the duration.
+_APART = 1e-9
 _AXES = 7
 #: A motion slower than this fraction of its full speed stops at once.
 _BARELY = 1e-3
@@ -133,6 +135,18 @@ class TabulatedProfile:
         place = self._place[index] + self._step * k * (v + 0.5 * k * (w - v))
         return place, v + k * (w - v), a + k * (b - a)
 
+    def places(self, times: Array) -> Array:
+        """See `TimeLaw`."""
+        low, high = int(times[0] / self._step), int(times[-1] / self._step) + 2
+        place, speed = np.array(self._place[low:high]), np.array(self._speed[low:high])
+        steps = times / self._step
+        index = steps.astype(np.int64)
+        index = index[index < len(self._place) - 1] - low
+        k = steps[: len(index)] - (index + low)
+        v, w = speed[index], speed[index + 1]
+        found: Array = place[index] + self._step * k * (v + 0.5 * k * (w - v))
+        return found
+
 
 class ProfileSequence:
     """Profiles one after the other; each begins where the one before it came to rest."""
@@ -150,6 +164,13 @@ class ProfileSequence:
             if time < end:
                 return profile.at(time - begin)
         return self._profiles[-1].at(self._profiles[-1].duration)
+
+    def places(self, times: Array) -> Array:
+        """See `TimeLaw`."""
+        for begin, end, profile in zip(self._begins, self._begins[1:], self._profiles, strict=False):
+            if times[0] < end:
+                return profile.places(times[times < end] - begin)
+        return times[:0]
 
     def next_rest(self, time: float) -> float:
         """Time of the first rest after a time [s]."""
@@ -241,6 +262,8 @@ def _axis_excess(path: PathConstraints, profile: JerkProfile, limits: ProfileLim
     ramp = min(ramp, profile.duration / 2)
     edges = (0.0, ramp, profile.duration - ramp, profile.duration)
     times = np.unique(np.concatenate([np.linspace(a, b, _CHECKS) for a, b in pairwise(edges)]))
+    # without a constant phase two of them differ by rounding only, and the difference quotient below would be noise
+    times = times[np.concatenate([[True], np.diff(times) > _APART * profile.duration])]
     s, speed, acceleration = np.array([profile.at(time) for time in times.tolist()]).T
     v, a = speed[:, None], acceleration[:, None]
     j = np.gradient(acceleration, times)[:, None]

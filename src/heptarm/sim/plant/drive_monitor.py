@@ -27,12 +27,15 @@ class DriveMonitor:
 
     Args:
         robot: its ranges hold.
+
+    Attributes:
+        scales: reciprocals of the ranges of speed, position, torque and lag, shape (4, 7); always the same array.
     """
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
         self._reach = np.maximum(robot.q_max, -robot.q_min) + BEYOND
-        self._inverse = np.array(
+        self.scales = np.array(
             (
                 1.0 / (SPEED * robot.dq_max),
                 1.0 / self._reach,
@@ -44,6 +47,11 @@ class DriveMonitor:
         self._overloaded = 0
         self._outside: Array | None = None  # which axes are outside since their drives tripped
 
+    @property
+    def is_strained(self) -> bool:
+        """Whether it remembers something: a torque beyond its range, or axes outside their limits."""
+        return self._overloaded > 0 or self._outside is not None
+
     def acknowledge(self, q: Array) -> None:
         """Let axes that are outside their limits stay there until they are back inside; further out they trip again.
 
@@ -52,7 +60,7 @@ class DriveMonitor:
         """
         outside = np.abs(q) > self._reach
         self._outside = outside if outside.any() else None
-        self._inverse[1] = 1.0 / np.where(outside, np.abs(q) + BEYOND, self._reach)
+        self.scales[1] = 1.0 / np.where(outside, np.abs(q) + BEYOND, self._reach)
         self._overloaded = 0
 
     def check(self, dq: Array, q: Array, tau: Array, lag: Array | None) -> str:
@@ -67,12 +75,12 @@ class DriveMonitor:
         loads = self._loads
         loads[0], loads[1], loads[2] = dq, q, tau
         loads[3] = 0.0 if lag is None else lag
-        loads *= self._inverse
+        loads *= self.scales
         np.abs(loads, out=loads)
         if loads.max() <= 1.0:
             self._overloaded = 0
             if self._outside is not None and not (np.abs(q) > self._reach)[self._outside].any():
-                self._outside, self._inverse[1] = None, 1.0 / self._reach
+                self._outside, self.scales[1] = None, 1.0 / self._reach
             return ""
         speed, position, torque, distance = loads.max(axis=1).tolist()
         self._overloaded = self._overloaded + 1 if torque > 1.0 else 0

@@ -24,6 +24,8 @@ class ExternalLoad:
         torque: external load acting on the joints, shape (7,) [Nm].
         wrench: force and torque acting on the flange, base axes, shape (6,) [N, Nm].
         is_misjudged: whether the controller's load data differ from the true payload.
+
+    The arrays stay the same.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -38,6 +40,8 @@ class ExternalLoad:
         self.is_misjudged = False
         self.torque = np.zeros(7)
         self.wrench = np.zeros(6)
+        self._has_wrench = False
+        self._jacobian = np.zeros((6, 7))
 
     def push(self, wrench: Array, until: float) -> None:
         """Push the flange with a force and a torque, base axes, shape (6,), until a plant time [s]."""
@@ -54,21 +58,25 @@ class ExternalLoad:
         mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
         self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
 
-    def measure(self, inertial: Array, *, error: Array | None = None) -> None:
-        """After the dynamics of a tick: torques and wrench; zero without any load.
+    def measure(self, inertial: Array) -> None:
+        """After the dynamics of a tick: the torques.
 
         Args:
             inertial: M q̈ + h - τ, the residual of the controller's model, shape (7,) [Nm].
-            error: of the torque sensors, shape (7,) [Nm]; what they show too much, no load explains.
         """
         # forces on bodies and unknown payloads appear in no vector of MuJoCo, only in the residual
         explained = not self.is_misjudged and not self._pulled.any()
-        self.torque = self._applied + self._constraint if explained else inertial
-        if error is not None:
-            self.torque = self.torque - error
-        if not self.torque.any():
-            self.wrench[:] = 0.0
+        self.torque[:] = self._applied + self._constraint if explained else inertial
+
+    def resolve(self, *, is_loaded: bool) -> None:
+        """The wrench of the torques; zero without any load."""
+        if not (is_loaded and self.torque.any()):
+            if self._has_wrench:
+                self.wrench[:] = 0.0
+                self._has_wrench = False
             return
+        self._has_wrench = True
         mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
-        j = np.vstack([self._jp[:, :7], self._jr[:, :7]])
-        self.wrench = np.linalg.solve(j @ j.T + _DAMPED, j @ self.torque)
+        self._jacobian[:3], self._jacobian[3:] = self._jp[:, :7], self._jr[:, :7]
+        j = self._jacobian
+        self.wrench[:] = np.linalg.solve(j @ j.T + _DAMPED, j @ self.torque)

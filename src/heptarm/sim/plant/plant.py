@@ -11,6 +11,7 @@ from math import atan2, cos, inf, nan, sin, sqrt
 import mujoco
 import numpy as np
 
+from heptarm.io.compiled import Unavailable
 from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import flange
 from heptarm.sim.control.controller import ActiveLaw
@@ -22,6 +23,7 @@ from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
+from heptarm.sim.plant.native import NativeTick
 from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
@@ -72,12 +74,24 @@ BRAKE_TICKS = 400
 #: A brake that cannot hold its axis slips as far behind it [rad]; no drive trips at once when the brakes open.
 BRAKE_SLIP = 0.8 * LAG
 
+#: Flags as plain integers: an operation on two flags of an enumeration takes a microsecond.
+_MOVING, _MASTERED, _BRAKES_OPEN = (
+    int(SafetyFlags.MOVING),
+    int(SafetyFlags.MASTERED),
+    int(SafetyFlags.BRAKES_OPEN),
+)
+_PAUSED, _ENABLED, _HAND_GUIDING = (
+    int(SafetyFlags.PAUSED),
+    int(SafetyFlags.ENABLED),
+    int(SafetyFlags.HAND_GUIDING),
+)
+_READY, _PROTECTIVE_STOP = int(SafetyFlags.READY), int(SafetyFlags.PROTECTIVE_STOP)
 _REQUEST_FLAGS = {
-    StopRequest.EMERGENCY_STOP: SafetyFlags.EMERGENCY_STOP,
-    StopRequest.EXTERNAL_EMERGENCY_STOP: SafetyFlags.EXTERNAL_STOP,
-    StopRequest.OPERATOR_SAFETY: SafetyFlags.SAFEGUARD_OPEN,
-    StopRequest.PROTECTIVE_STOP: SafetyFlags.PROTECTIVE_STOP,
-    StopRequest.DRIVE_ERROR: SafetyFlags.DRIVE_ERROR,
+    StopRequest.EMERGENCY_STOP: int(SafetyFlags.EMERGENCY_STOP),
+    StopRequest.EXTERNAL_EMERGENCY_STOP: int(SafetyFlags.EXTERNAL_STOP),
+    StopRequest.OPERATOR_SAFETY: int(SafetyFlags.SAFEGUARD_OPEN),
+    StopRequest.PROTECTIVE_STOP: int(SafetyFlags.PROTECTIVE_STOP),
+    StopRequest.DRIVE_ERROR: int(SafetyFlags.DRIVE_ERROR),
 }
 
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
@@ -180,6 +194,7 @@ class Plant:
         self._braked = self._sensed
         self._halted = 0  # ticks for which a stop on the path has been in force
         self._monitor = DriveMonitor(self.robot) if monitored else None
+        self._native = self._in_c()
         self._tripped = False  # by a drive's own supervision
         self.interpolator = Interpolator(
             self.robot, _Inputs(self.shared), self._sensed, self._load, self._control, self.safety
@@ -198,9 +213,39 @@ class Plant:
         self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
         self._mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, d, self._mass)
-        self._measured = self._q  # positions that the sensors show
-        self._tau = np.zeros(7)
-        self._tau_cmd = np.zeros(7)
+        self._measured = (
+            self._q if self._errors is None else self._q.copy()
+        )  # positions that the sensors show
+        self._torque, self._tau, self._tau_cmd = np.zeros(7), np.zeros(7), np.zeros(7)
+
+    def _in_c(self) -> NativeTick | None:
+        """The arithmetic of a tick in C; None: where it is not available."""
+        d, monitor = self.data, self._monitor
+        try:
+            return NativeTick(
+                self.robot,
+                self.shared,
+                on_axis=_ON_AXIS,
+                straight=_STRAIGHT,
+                ranges=None if monitor is None else monitor.scales,
+                q=self._q,
+                dq=self._dq,
+                acceleration=self._acc,
+                passive=self._passive,
+                applied=d.qfrc_applied[:7],
+                constraint=d.qfrc_constraint[:7],
+                pulled=d.xfrc_applied,
+                actuators=self._ctrl,
+                armature=self._armature,
+                shown=self._measured,
+                torque=self._torque,
+                tau_cmd=self._tau_cmd,
+                tau=self._tau,
+                load=self._load.torque,
+                wrench=self._load.wrench,
+            )
+        except Unavailable:
+            return None
 
     @property
     def time_ns(self) -> int:
@@ -276,6 +321,8 @@ class Plant:
             take, load = self._payloads.popleft()
             take(load)
         sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
+        if self._native is not None:
+            self._native.believe(payload.mass, payload.bias, is_misjudged=payload.differs)
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
         """Change the parameters of the running command's control mode; does nothing for another command or mode."""
@@ -321,32 +368,58 @@ class Plant:
         mujoco.mj_fullM(m, d, self._mass)
         if self._payload.differs:
             self._payload.believe()
-        sensed = self._sensed
-        sensed.before, sensed.now, sensed.after = interpolator.command
-        sensed.is_overlaid = interpolator.is_overlaid
-        torque = self._control.torque(sensed) if self._brakes is None else self._brakes.torque(self._braked)
-        if interpolator.is_overlaid and interpolator.action is not None:
-            self._control.superpose(torque, interpolator.action)
-        np.minimum(torque, self._limit, out=torque)
-        np.maximum(torque, self._least, out=torque)
-        self._tau_cmd = torque if self._brakes is None else np.zeros(7)
-        if self._errors is not None:
-            torque = torque - self._errors.friction(self._dq)
-        self._ctrl[:] = torque
+        self._drive()
         mujoco.mj_step2(m, d)
-        # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
-        self._tau = torque - self._armature * self._acc + self._passive
-        inertial = sensed.mass @ self._acc + sensed.bias - self._passive - torque
-        if self._errors is None:
-            self._load.measure(inertial)
-        else:
-            reading = self._errors.read(self._q, self._tau)
-            self._measured, self._tau = reading.q, reading.tau
-            self._load.measure(inertial, error=reading.tau_error)
+        self._sense()
         if self._monitor is not None and not self._tripped:
             self._supervise(self._monitor)
         self.tick_count += 1
         self._write(interpolator.order, progress, remaining)
+
+    def _drive(self) -> None:
+        """The control law in force: torques of the motors."""
+        interpolator, native = self.interpolator, self._native
+        command = interpolator.command
+        if (
+            native is not None
+            and self._control.is_plain
+            and self._brakes is None
+            and not interpolator.is_overlaid
+        ):
+            native.command(command.before, command.now, command.after)
+        else:
+            sensed = self._sensed
+            sensed.before, sensed.now, sensed.after = command
+            sensed.is_overlaid = interpolator.is_overlaid
+            torque = (
+                self._control.torque(sensed) if self._brakes is None else self._brakes.torque(self._braked)
+            )
+            if interpolator.is_overlaid and interpolator.action is not None:
+                self._control.superpose(torque, interpolator.action)
+            np.minimum(torque, self._limit, out=torque)
+            np.maximum(torque, self._least, out=self._torque)
+            self._tau_cmd[:] = self._torque if self._brakes is None else 0.0
+            self._ctrl[:] = self._torque
+        if self._errors is not None:
+            self._torque -= self._errors.friction(self._dq)
+            self._ctrl[:] = self._torque
+
+    def _sense(self) -> None:
+        """What the sensors show after the dynamics, and the external load."""
+        load, sensed = self._load, self._sensed
+        if self._native is not None:
+            is_loaded = self._native.sense()
+        else:
+            # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
+            self._tau[:] = self._torque - self._armature * self._acc + self._passive
+            load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - self._torque)
+            is_loaded = bool(load.torque.any())
+        if self._errors is not None:
+            reading = self._errors.read(self._q, self._tau)
+            self._measured[:], self._tau[:] = reading.q, reading.tau
+            load.torque -= reading.tau_error
+            is_loaded = True
+        load.resolve(is_loaded=is_loaded)
 
     def _advance(self) -> tuple[float, float]:
         """Compute the next set-point; returns progress and remaining time."""
@@ -357,6 +430,13 @@ class Plant:
     def _supervise(self, monitor: DriveMonitor) -> None:
         """Let a drive trip: its brakes close at once, wherever the arm is."""
         is_stiff = self._brakes is None and self._control.is_stiff
+        native = self._native
+        if (
+            native is not None
+            and not monitor.is_strained
+            and not native.strained(self.interpolator.command.after, is_stiff=is_stiff)
+        ):
+            return
         lag = self.interpolator.command.after - self._q if is_stiff else None
         reason = monitor.check(self._dq, self._q, self._tau, lag)
         if reason:
@@ -391,9 +471,31 @@ class Plant:
         self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
-        k, r = self.tick_count, self.shared
-        slot = k % SLOTS
-        words, reals = r.ints[slot], r.floats[slot]
+        k, shared, mode = self.tick_count, self.shared, int(self.safety.mode)
+        flags = self._safety_flags()
+        words = (flags | _MOVING if order else flags, mode, order)
+        if self._native is not None:
+            after, times = self.interpolator.command.after, (progress, remaining)
+            is_awaited = self._native.publish(k, after, self._e1, words=words, times=times)
+        else:
+            self._publish(shared.ints[k % SLOTS], shared.floats[k % SLOTS], words, (progress, remaining))
+            is_awaited = k * TICK_NS >= shared.header[HeaderWords.WAKE]
+        if is_awaited and self.on_wake is not None:
+            self.on_wake(k * TICK_NS)
+        flags |= mode << 32  # a change of the mode alone is reported, too
+        if flags != self._flags:
+            self._flags = flags
+            if self.on_safety is not None:
+                self.on_safety(flags, mode)
+
+    def _e1(self) -> float:
+        return posture(self.robot, self._measured.tolist())[0]
+
+    def _publish(
+        self, words: Array, reals: Array, given: tuple[int, int, int], times: tuple[float, float]
+    ) -> None:
+        """Write a state: flags, mode and order, progress and remaining time are given."""
+        k = self.tick_count
         words[StateWords.SEQ] = 2 * k + 1
         words[StateWords.TIME] = k * TICK_NS
         q = self._measured
@@ -407,39 +509,27 @@ class Plant:
         (x, y, z), p = flange(self.robot, values)
         reals[StateWords.POSE] = (*p, *_quaternion(x, y, z))
         reals[StateWords.WRENCH] = self._load.wrench
-        flags = self._safety_flags()
-        words[StateWords.FLAGS] = flags | SafetyFlags.MOVING if order else flags
-        words[StateWords.MODE] = self.safety.mode
-        words[StateWords.ORDER] = order
-        reals[StateWords.PROGRESS] = progress
-        reals[StateWords.REMAINING] = remaining
+        words[StateWords.FLAGS], words[StateWords.MODE], words[StateWords.ORDER] = given
+        reals[StateWords.PROGRESS], reals[StateWords.REMAINING] = times
         reals[StateWords.E1], words[StateWords.STATUS] = posture(self.robot, values)
         words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
         words[StateWords.SEQ] = 2 * k + 2
-        r.header[HeaderWords.NEWEST] = k
-        wake = self.on_wake
-        if wake is not None and k * TICK_NS >= r.header[HeaderWords.WAKE]:
-            wake(k * TICK_NS)
-        flags |= int(self.safety.mode) << 32  # a change of the mode alone is reported, too
-        if flags != self._flags:
-            self._flags = flags
-            if self.on_safety is not None:
-                self.on_safety(flags, int(self.safety.mode))
+        self.shared.header[HeaderWords.NEWEST] = k
 
     def _safety_flags(self) -> int:
         safety = self.safety
-        flags = SafetyFlags.MASTERED
+        flags = _MASTERED
         if self._brakes is None:
-            flags |= SafetyFlags.BRAKES_OPEN
+            flags |= _BRAKES_OPEN
         if self.interpolator.is_paused or safety.latched:
-            flags |= SafetyFlags.PAUSED
+            flags |= _PAUSED
         if safety.enabled:
-            flags |= SafetyFlags.ENABLED
+            flags |= _ENABLED
         if safety.guides:
-            flags |= SafetyFlags.HAND_GUIDING
+            flags |= _HAND_GUIDING
         if not safety.stop_requested:
-            return flags | SafetyFlags.READY
-        flags |= SafetyFlags.PROTECTIVE_STOP
+            return flags | _READY
+        flags |= _PROTECTIVE_STOP
         for request in safety.stop_requests:
             flags |= _REQUEST_FLAGS[request]
         return flags

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import mujoco
 
+from heptarm.sim.plant.appearance import ArmMeshes, undress
 from heptarm.sim.plant.scene import Scene
 from heptarm.values.robot import robot
 
@@ -51,12 +52,20 @@ class Box:
         return Box((x, y, z), (length, width, height))
 
 
-def specification(model: str) -> mujoco.MjSpec:
+def specification(model: str, meshes: ArmMeshes | None = None) -> mujoco.MjSpec:
     """MuJoCo's description of a robot: "iiwa7", "iiwa14", "med7" or "med14".
 
     The Med robots have the shapes of the iiwa ones, and the masses of their own links.
+
+    Args:
+        model: name of the robot.
+        meshes: in which it is drawn; None: nobody looks, it has the shapes that meet others alone.
     """
     spec = mujoco.MjSpec.from_file(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+    if meshes is None:
+        undress(spec)
+    else:
+        meshes.dress(spec)
     if model.startswith("med"):
         links = robot(model).links
         for index in range(7):
@@ -66,13 +75,15 @@ def specification(model: str) -> mujoco.MjSpec:
     return spec
 
 
-def compiled(model: str, boxes: Sequence[Box] = (), scene: Scene | None = None) -> mujoco.MjModel:
+def compiled(
+    model: str, boxes: Sequence[Box] = (), scene: Scene | None = None, meshes: ArmMeshes | None = None
+) -> mujoco.MjModel:
     """MuJoCo's model of a robot among boxes and in a scene, see `specification`; its first seven joints are the arm's.
 
     Raises:
         ValueError: the file of the scene is not in MuJoCo's format.
     """
-    spec = specification(model)
+    spec = specification(model, meshes)
     if scene is not None:
         scene.attach_to(spec)
     for number, box in enumerate(boxes):

@@ -36,7 +36,7 @@ from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
-from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
+from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled, share_memory_pools
 from heptarm.sim.runtime.rest import Rest
 from heptarm.values.robot import robot
 from heptarm.values.simulator_options import RealTime, SimulatorOptions, flag
@@ -346,6 +346,7 @@ def main(argv: list[str] | None = None) -> int:
     except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
+    share_memory_pools()
     try:
         with batch_scheduled():
             cabinet = VirtualCabinet(options, data)

@@ -242,7 +242,11 @@ class SimulatedOperator:
         Two lines that come at once, `set Start 0` and `set Start 1`, are a rising edge then. The ticks never call this.
         """
         until = time.monotonic() + LONGEST_WAIT
-        while words[:4].lower() == "set " and self._plant.tick_count < self._set_at + SEEN and time.monotonic() < until:
+        while (
+            words[:4].lower() == "set "
+            and self._plant.tick_count < self._set_at + SEEN
+            and time.monotonic() < until
+        ):
             time.sleep(0.5 * TICK)
 
     def _set(self, name: str, value: float) -> None:

@@ -145,7 +145,8 @@ def project_home(arm: Arm) -> None:
 def position_hold(arm: Arm) -> None:
     """A hold lasts for its duration and keeps the position."""
     recording = record(arm, hold(0.5))
-    near(recording.result.duration, 0.5, 0.1, "duration", unit="s")
+    above(recording.result.duration, 0.45, "duration", unit="s")
+    below(recording.result.duration, 1.0, "duration", unit="s")
     below(float(np.abs(recording.q - recording.q[0]).max()), 1e-3, "no joint moves by more than", unit="rad")
 
 
@@ -176,7 +177,7 @@ def joint_speeds(arm: Arm) -> None:
     there = HOME + deg(0, 0, 0, 0, 0, 0, 12)
     arm.move(ptp(HOME))
     times = [
-        arm.move(ptp(target, speed=fraction, acceleration=acceleration, jerk=jerk)).duration
+        record(arm, ptp(target, speed=fraction, acceleration=acceleration, jerk=jerk)).moving
         for target, acceleration, jerk in ((there, 1.0, 1.0), (HOME, 0.1, 1.0), (there, 1.0, 0.03))
     ]
     above(times[1], times[0] + 0.1, "with a tenth of the acceleration it takes", unit="s")
@@ -190,18 +191,17 @@ def path_speeds(arm: Arm) -> None:
         arm, lin_rel(y=0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=50.0)
     )
     near(float(recording.speeds.max()), 0.07, 0.003, "top speed", unit="m/s")
-    rates = np.diff(recording.speeds[::3]) / np.diff(recording.t_pose[:-1][::3])
+    middles = (recording.t_pose[1:] + recording.t_pose[:-1]) / 2  # a state may be missing: a longer interval
+    rates = np.diff(recording.speeds[::3]) / np.diff(middles[::3])
     near(float(np.abs(rates).max()), 0.2, 0.03, "largest acceleration", unit="m/s²")
     gentle = record(arm, lin_rel(y=-0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=0.5))
-    above(gentle.result.duration, recording.result.duration + 0.2, "with a small jerk it takes", unit="s")
+    above(gentle.moving, recording.moving + 0.2, "with a small jerk it takes", unit="s")
     turning = record(arm, lin_rel(a=0.25, speed_radps=0.3, acceleration_radps2=1.0, jerk_radps3=50.0))
     near(float(turning.turns.max()), 0.3, 0.015, "top speed of the rotation", unit="rad/s")
-    slow = arm.move(lin_rel(a=-0.25, speed_radps=0.3, acceleration_radps2=0.4, jerk_radps3=50.0)).duration
-    above(slow, turning.result.duration + 0.2, "with less acceleration of it", unit="s")
-    gentle_turn = arm.move(
-        lin_rel(a=0.25, speed_radps=0.3, acceleration_radps2=1.0, jerk_radps3=1.0)
-    ).duration
-    above(gentle_turn, turning.result.duration + 0.2, "with a small jerk of it", unit="s")
+    slow = record(arm, lin_rel(a=-0.25, speed_radps=0.3, acceleration_radps2=0.4, jerk_radps3=50.0))
+    above(slow.moving, turning.moving + 0.2, "with less acceleration of it", unit="s")
+    smooth = record(arm, lin_rel(a=0.25, speed_radps=0.3, acceleration_radps2=1.0, jerk_radps3=1.0))
+    above(smooth.moving, turning.moving + 0.2, "with a small jerk of it", unit="s")
 
 
 @scenario(line=1, rows="F12", space=0.2, needs=("ptp", "override"))

@@ -7,7 +7,7 @@ import numpy as np
 from heptarm.arm.arm import Arm
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.errors import HeptarmError, MotionAborted, NeedsOperator
-from heptarm.testing.measure import below, holds, near, note
+from heptarm.testing.measure import below, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.motion.ptp import ptp
@@ -105,9 +105,9 @@ def errors(arm: Arm) -> None:
 def manual_override(arm: Arm) -> None:
     """The override of the smartPAD also slows motions down."""
     there = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=0.3)
-    full = arm.move(there).duration
+    full = record(arm, there).moving
     arm.operator.override(0.3)
-    slow = arm.move(ptp(HOME, speed=0.3)).duration
+    slow = record(arm, ptp(HOME, speed=0.3)).moving
     arm.operator.override(1.0)
     near(slow / full, 2.5, 1.0, "at 0.3 it takes as many times as long")
 

@@ -29,6 +29,12 @@ class PersonTask(Enum):
         "Turn the emergency stop to release it, acknowledge it at the smartPAD, hold the enabling switch.",
         "clear",
     )
+    HANG = (
+        "Hang a weight of 1 kg by a string on the flange, let it come to rest, and take your hands off.",
+        "push 0 0 -9.81",
+    )
+    DROP = ("Let the weight drop: cut the string, or open your knot.", "push 0 0 0")
+    PLACE_BLOCK = ("Put a firm block, a pile of books for example, 5 to 30 cm below the flange.", "")
     FIND_DRIVE_ERROR = ("Does the smartPAD show an error of a drive now?", "drive_error 3")
 
     @property
@@ -38,7 +44,7 @@ class PersonTask(Enum):
 
     @property
     def command(self) -> str:
-        """For a simulated operator."""
+        """For a simulated operator; empty: the stage has it already."""
         return self.value[1]
 
 
@@ -84,7 +90,8 @@ class SimulatedPerson:
         """
         if not has_operator(self.arm):
             raise Unfit(f"only a person beside this simulator can do that: {action.words}")
-        self.arm.operator.do(action.command)
+        if action.command:
+            self.arm.operator.do(action.command)
 
     def finds(self, action: PersonTask) -> bool:
         """Make it so."""

@@ -20,7 +20,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.state import OperationMode
 
 #: Modules of this package with steps, in the order in which they run: what does not move comes first.
-GROUPS = ("sunrise", "sensors", "dynamics", "drives", "safety", "fri")
+GROUPS = ("sunrise", "sensors", "dynamics", "contact", "drives", "safety", "fri")
 #: At home the joints are within this [rad].
 _AT_HOME = 1e-3
 #: Longest approach to the home position [s].
@@ -104,7 +104,7 @@ def commission(
     finally:
         arm.speed = before
         if has_operator(arm):
-            for words in ("clear", "release", "aut"):
+            for words in ("clear", "push 0 0 0", "release", "aut"):
                 arm.operator.do(words)
     return report()
 

@@ -79,7 +79,7 @@ public class SunriseProbe extends RoboticsAPIApplication {
     private static String builder(String name) {
         try {
             for (Method one : Class.forName(name).getMethods()) {
-                if (one.getName().equals("parametrize") && one.getDeclaringClass().getName().equals(name)) {
+                if (one.getName().equals("parametrize") && one.getDeclaringClass().getName().equals(name) && !one.isBridge()) {
                     String full = one.getReturnType().getName();
                     return full.substring(full.lastIndexOf('.') + 1);
                 }

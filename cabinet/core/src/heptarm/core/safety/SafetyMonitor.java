@@ -104,9 +104,9 @@ public final class SafetyMonitor implements Watchdog.Check {
         return holding;
     }
 
-    /** Whether a safety function stopped the robot in the last known state. */
-    public synchronized boolean isStopped() {
-        return seen != null && seen.isStop();
+    /** Whether a safety function has stopped the robot, by its present state: a motion may fail before a periodic check. */
+    public boolean isStopped() {
+        return update().isStop();
     }
 
     /** Refuses a motion that could not begin. */

@@ -34,6 +34,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
     private static final long LINGER_MS = 500;
+    /** A write that takes longer has waited for the client [ns]; for so long the sampler then does not write itself [ns]. */
+    private static final long SLOW_WRITE_NS = 5000000L;
+    private static final long UNHURRIED_NS = 10000000000L;
     /** Most silence that unread bytes excuse [client's ns]: a stuck reader must not hide a dead client. */
     private static final double UNREAD_NS = 1e9;
 
@@ -54,6 +57,8 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private final ArrayDeque<byte[]> events = new ArrayDeque<byte[]>();
     private final ArrayDeque<byte[]> states = new ArrayDeque<byte[]>();
     private boolean writing;
+    /** System time until which the sampler's thread does not write; only that thread uses it. */
+    private long unhurried = Long.MIN_VALUE;
     private volatile boolean open;
     private volatile boolean ending;
     private long dropped;
@@ -414,11 +419,51 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
 
     /** Send a state by datagram, or queue it; drops the oldest when too many wait. */
     public void receive(State state) {
-        DatagramPeer peer = datagrams;
-        if (peer != null && isOpen() && peer.offer(state)) {
+        if (!sendByDatagram(state)) {
+            queue(frames.frame(state, 0));
+        }
+    }
+
+    /**
+     * Send a state at once in the sampler's thread if the connection is free; waking the writer costs as much as the rest of its
+     * way. After a write that had to wait for the client, the writer has the next states.
+     */
+    public void receiveAlone(State state) {
+        if (sendByDatagram(state)) {
             return;
         }
         byte[] frame = frames.frame(state, 0);
+        long began = System.nanoTime();
+        synchronized (outbox) {
+            if (writing || ending || gone || began < unhurried || !events.isEmpty() || !states.isEmpty()) {
+                queue(frame);
+                return;
+            }
+            writing = true;
+        }
+        try {
+            write(frame);
+        } catch (IOException e) { // the reader reports it
+        } finally {
+            synchronized (outbox) {
+                writing = false;
+                if (ending || !events.isEmpty()) {
+                    outbox.notify();
+                }
+            }
+        }
+        long end = System.nanoTime();
+        if (end - began > SLOW_WRITE_NS) {
+            unhurried = end + UNHURRIED_NS;
+        }
+    }
+
+    private boolean sendByDatagram(State state) {
+        DatagramPeer peer = datagrams;
+        return peer != null && isOpen() && peer.offer(state);
+    }
+
+    private void queue(byte[] frame) {
         synchronized (outbox) {
             if (states.size() >= MAX_STATES) {
                 states.poll();

@@ -1,0 +1,409 @@
+"""Streams of velocities: of the joints, or Cartesian; a thread turns them into the targets of a servo motion.
+
+The thread sends a target in every period, whatever the program does. It ramps to the newest velocity, brakes before
+limits, and ramps to zero when the program falls silent. If the process dies, or hangs as a whole, no more targets
+arrive, and the cabinet's watchdog stops the arm.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.arm.link.connection import Connection
+from heptarm.arm.motion.handle import BreakRule
+from heptarm.arm.motion.servo import Servo, ServoStats
+from heptarm.errors import HeptarmError
+from heptarm.model.boundary import TOLERANCE, Boundary
+from heptarm.model.kinematics import forward, jacobian
+from heptarm.model.velocity import (
+    FREE,
+    MARGIN,
+    Slowdown,
+    VelocityPath,
+    limited_twist,
+    ramped_twist,
+    resolved_twist,
+    wall_velocity,
+)
+from heptarm.values.arrays import Array, array
+from heptarm.values.clearance import ClearanceModel
+from heptarm.values.condition.condition import Condition
+from heptarm.values.pose import Pose
+from heptarm.wire import messages as wire
+
+#: The path stays below the cabinet's own limit of the speed, so that the arm can catch up.
+_BELOW_CEILING = 0.95
+#: Longest time for which a velocity is integrated at once: a late thread is no reason for a jump [s].
+_LONGEST_STEP = 0.1
+#: The path may be so far ahead of the arm: a distance [rad], and one that grows with the velocity [s]. From half of it
+#: on the arm is slowed down, so that a blocked or pushed arm does not have a far target, and a spring no large force.
+_LEAD, _LEAD_TIME = 0.1, 0.25
+#: Largest age of a state that is made up for by the commanded velocity [s].
+_OLDEST = 0.3
+#: Distance to other bodies below which they are looked at [m], and the time over which their approach is measured [s].
+_NEAR, _LOOK_AHEAD = 0.15, 0.05
+#: Longest wait for the thread at the end [s].
+_PATIENCE = 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JogLimits:
+    """What limits a stream of velocities.
+
+    Attributes:
+        speed: largest speed of the joints, a fraction of each axis' maximum.
+        acceleration: likewise.
+        silence: time without a command after which the velocity becomes zero [s].
+        boundary: of the workspace; None: there is none.
+        clear: model of bodies to brake before; None: none.
+    """
+
+    speed: float
+    acceleration: float
+    silence: float
+    boundary: Boundary | None = None
+    clear: ClearanceModel | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistLimits:
+    """What limits a Cartesian velocity.
+
+    Attributes:
+        speed: [m/s].
+        acceleration: [m/s²].
+        turn: angular velocity [rad/s].
+        spin: angular acceleration [rad/s²].
+    """
+
+    speed: float
+    acceleration: float
+    turn: float
+    spin: float
+
+
+class JogServo(Servo):
+    """A stream of velocities; made by `Arm.servo`. Its subclasses define what a velocity is.
+
+    Attributes:
+        period: time between two targets [s].
+        watchdog: longest gap between two targets; a longer one stops the arm [s].
+        timeout: silence after which the velocity becomes zero [s].
+    """
+
+    #: Numbers of a command, and the name of its parameter.
+    size = 7
+    name = "dq"
+
+    def __init__(
+        self,
+        connection: Connection,
+        message: wire.ServoOpen,
+        limits: JogLimits,
+        *,
+        period: float,
+        watchdog: float,
+        until: tuple[Condition, ...] = (),
+        breaks: tuple[BreakRule, ...] = (),
+    ) -> None:
+        super().__init__(
+            connection,
+            message,
+            period=period,
+            watchdog=watchdog,
+            boundary=limits.boundary,
+            until=until,
+            breaks=breaks,
+        )
+        self.timeout = limits.silence
+        self._limits = limits
+        self._command: tuple[Array, int] | None = None  # and when it was set
+        self._slowdown = FREE
+        self._slowdowns: dict[str, Slowdown] = {}
+        self._least_excess = inf
+        self._ending = threading.Event()
+        self._failure: Exception | None = None
+        self._thread: threading.Thread | None = None
+        self._path: VelocityPath | None = None
+
+    # ------------------------------------------------------------------------------------ life
+
+    def __enter__(self) -> JogServo:
+        """Begin at rest; see `Servo.__enter__`."""
+        super().__enter__()
+        robot, limits, boundary = self._connection.robot, self._limits, self._boundary
+        low, high = robot.q_min + MARGIN, robot.q_max - MARGIN
+        self._path = VelocityPath(
+            self.start.q,
+            speed=_BELOW_CEILING * limits.speed * robot.dq_max,
+            acceleration=limits.acceleration * robot.ddq_max,
+            q_min=low if boundary is None else np.maximum(low, boundary.q_min),
+            q_max=high if boundary is None else np.minimum(high, boundary.q_max),
+        )
+        self._thread = threading.Thread(target=self._run, name="heptarm-jog", daemon=True)
+        self._thread.start()
+        return self
+
+    def close(self) -> None:
+        """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
+        self._ending.set()
+        thread, self._thread = self._thread, None
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(_PATIENCE)
+        super().close()
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def _run(self) -> None:
+        """Send a target in every period."""
+        clock = self._clock
+        due = last = clock.nanos()
+        period = round(self.period * 1e9)
+        try:
+            while self._active and not self._ending.is_set():
+                now = clock.nanos()
+                passed = min((now - last) * 1e-9, _LONGEST_STEP)
+                last = now
+                self._step(now, passed * self._connection.real_time_factor)
+                due = max(due + period, clock.nanos())
+                self._ending.wait((due - clock.nanos()) * 1e-9)
+        except Exception as error:  # of the link, or of a model of bodies: no more targets, so the arm stops
+            if not isinstance(error, HeptarmError) or self._connection.is_connected:
+                self._failure = error
+            if self._handle is not None and self._connection.is_connected:
+                self._connection.cancel(self._handle)
+
+    # -------------------------------------------------------------------------------- commands
+
+    def _set(self, value: npt.ArrayLike) -> Array:
+        command = array(value, self.size, self.name)
+        if not self._active:
+            _ = self.start  # raises unless it has begun
+            return command
+        boundary, path = self._boundary, self._path
+        if boundary is not None and boundary.refuses and path is not None:
+            now = path.q
+            ahead = now + self._resolved(now, command)[0] * _LOOK_AHEAD
+            if boundary.excess(ahead) > max(boundary.excess(now), TOLERANCE):
+                self._command = None
+                raise boundary.refusal(ahead, "the velocity", parameter=self.name)
+        self._command = command, self._clock.nanos()
+        return command
+
+    @property
+    def stats(self) -> ServoStats:
+        """Statistics so far; also after the block. `set_median` is the cost of a target here, made by the thread."""
+        return replace(
+            super().stats, slowdown=self._slowdown, slowdowns=tuple(dict(self._slowdowns).values())
+        )
+
+    # --------------------------------------------------------------------------------- the thread
+
+    def _step(self, now: int, dt: float) -> None:
+        """Move the path on by a time of the robot's clock [s], and send it."""
+        path = self._path
+        assert path is not None
+        command = self._command
+        wanted = np.zeros(self.size)
+        if command is not None and (now - command[1]) * 1e-9 <= self.timeout:
+            wanted = command[0]
+        dq, done = self._velocity(path.q, wanted, dt)
+        before = path.q
+        held = [
+            one for one in (self._lag(path, dq, now), self._obstacle(path, dq), self._wall(path, dq)) if one
+        ]
+        least = min((*done, path.advance(dq, dt, held)), key=lambda one: one.factor)
+        if self._leaves(path.q):
+            path.stay_at(before)
+            least = Slowdown("workspace", 0.0)
+        self._slowdown = least
+        if least.reason:
+            known = self._slowdowns.get(least.reason)
+            if known is None or least.factor < known.factor:
+                self._slowdowns[least.reason] = least
+        q, speed = path.target(self._message.timing.min_trajectory_time)
+        self._send(now, wire.ServoJointsVelocity, q.tolist() + speed.tolist())
+
+    def _velocity(self, q: Array, wanted: Array, dt: float) -> tuple[Array, list[Slowdown]]:
+        """Joint velocities of a command [rad/s], and what has slowed them down already."""
+        return self._resolved(q, wanted)
+
+    def _resolved(self, q: Array, wanted: Array) -> tuple[Array, list[Slowdown]]:
+        """The same without a memory."""
+        return wanted, []
+
+    def _lag(self, path: VelocityPath, dq: Array, now: int) -> Slowdown | None:
+        """The arm does not follow: it is blocked, pushed, or its speed override is low."""
+        sample = self._connection.feed.newest
+        state = None if sample is None else self._connection.build(sample)
+        if sample is None or state is None or state.groups.joints is None:
+            return None
+        age = min((now - sample.received) * 1e-9 * self._connection.real_time_factor, _OLDEST)
+        lead = (path.q - state.q - path.dq * age) * np.sign(dq)
+        ratio = lead / (_LEAD + _LEAD_TIME * np.abs(path.dq))
+        index = int(ratio.argmax())
+        if ratio[index] <= 0.5:
+            return None
+        return Slowdown(f"A{index + 1} does not follow", float(np.clip(2.0 - 2.0 * ratio[index], 0.0, 1.0)))
+
+    def _obstacle(self, path: VelocityPath, dq: Array) -> Slowdown | None:
+        """Bodies that come near."""
+        model = self._limits.clear
+        if model is None or not dq.any():
+            return None
+        scale = _LOOK_AHEAD / max(
+            1.0, float(np.max(np.abs(dq)))
+        )  # no joint looks farther ahead than so many radians
+        then = {
+            (one.first, one.second): one.distance
+            for one in model.clearances(path.q + scale * dq, below=_NEAR)
+        }
+        least = None
+        for one in model.clearances(path.q, below=_NEAR):
+            if frozenset((one.first, one.second)) in model.allowed:
+                continue
+            nearing = (one.distance - then.get((one.first, one.second), _NEAR)) / scale
+            left = np.array([one.distance - model.margin])
+            factor = float(path.stopping_factor(dq, left, np.array([nearing]))[0])
+            if factor < 1.0 and (least is None or factor < least.factor):
+                least = Slowdown(f"{one.first} near {one.second}", factor)
+        return least
+
+    def _wall(self, path: VelocityPath, dq: Array) -> Slowdown | None:
+        """Walls of the workspace ahead of the tool."""
+        boundary = self._boundary
+        if boundary is None or boundary.workspace.box is None:
+            return None
+        point = boundary.tool(path.q)
+        below, above = boundary.walls(point)
+        speed = boundary.frame.rotation.T @ (jacobian(boundary.robot, path.q, point)[:3] @ dq)
+        factors = path.stopping_factor(dq, np.concatenate([below, above]), np.concatenate([-speed, speed]))
+        return Slowdown("workspace", float(factors.min())) if factors.min() < 1.0 else None
+
+    def _leaves(self, q: Array) -> bool:
+        """Whether joint positions are outside of the workspace, and farther than any before."""
+        if self._boundary is None:
+            return False
+        excess = self._boundary.excess(q)
+        if excess > self._least_excess + TOLERANCE:
+            return True
+        self._least_excess = min(self._least_excess, excess)
+        return False
+
+
+class VelocityServo(JogServo):
+    """A stream of joint velocities."""
+
+    def __enter__(self) -> VelocityServo:
+        """Begin at rest; see `Servo.__enter__`."""
+        super().__enter__()
+        return self
+
+    def set(self, dq: npt.ArrayLike) -> Array:
+        """Command joint velocities, until the next call, or for `timeout`; after the end it has no effect.
+
+        All joints are slowed down in step where one is too fast, or near its limit, so that the direction stays.
+
+        Args:
+            dq: shape (7,) [rad/s].
+
+        Returns:
+            The same as an array.
+
+        Raises:
+            ShapeError: not seven numbers.
+            LimitError: one is not finite; OutsideWorkspace if `arm.workspace` refuses the velocity.
+        """
+        return self._set(dq)
+
+
+class TwistServo(JogServo):
+    """A stream of Cartesian velocities."""
+
+    size = 6
+    name = "twist"
+
+    def __init__(
+        self,
+        connection: Connection,
+        message: wire.ServoOpen,
+        limits: JogLimits,
+        *,
+        twist: TwistLimits,
+        moving: Pose,
+        axes: Callable[[Pose], Pose],
+        period: float,
+        watchdog: float,
+        until: tuple[Condition, ...] = (),
+        breaks: tuple[BreakRule, ...] = (),
+    ) -> None:
+        super().__init__(
+            connection, message, limits, period=period, watchdog=watchdog, until=until, breaks=breaks
+        )
+        self._twist_limits = twist
+        self._moving = moving  # pose of the motion frame in the flange frame
+        self._axes = axes  # pose of the frame of the twist in the base, by that of the flange
+        self._twist = np.zeros(6)
+
+    def __enter__(self) -> TwistServo:
+        """Begin at rest; see `Servo.__enter__`."""
+        super().__enter__()
+        return self
+
+    def set(self, twist: npt.ArrayLike) -> Array:
+        """Command a Cartesian velocity, until the next call, or for `timeout`; after the end it has no effect.
+
+        Args:
+            twist: velocity of the origin of the motion frame and angular velocity, in the axes of `frame`, shape (6,)
+                [m/s, rad/s]; scaled down to `speed_mps` and `speed_radps`.
+
+        Returns:
+            The same as an array.
+
+        Raises:
+            ShapeError: not six numbers.
+            LimitError: one is not finite; OutsideWorkspace if `arm.workspace` refuses the velocity.
+        """
+        return self._set(twist)
+
+    def _velocity(self, q: Array, wanted: Array, dt: float) -> tuple[Array, list[Slowdown]]:
+        limits = self._twist_limits
+        goal = limited_twist(wanted, limits.speed, limits.turn)
+        if dt > 0.0:
+            self._twist = ramped_twist(self._twist, goal, limits.acceleration * dt, limits.spin * dt)
+        return self._resolved(q, self._twist)
+
+    def _resolved(self, q: Array, wanted: Array) -> tuple[Array, list[Slowdown]]:
+        robot = self._connection.robot
+        flange = Pose.from_matrix(forward(robot, q))
+        turn, point = self._axes(flange).rotation, (flange @ self._moving).xyz
+        twist = np.concatenate([turn @ wanted[:3], turn @ wanted[3:]])
+        slowed, wall = self._along_walls(twist, point, q)
+        dq, singular = resolved_twist(robot, q, slowed, point)
+        return dq, [one for one in (singular, wall) if one.reason]
+
+    def _along_walls(self, twist: Array, point: Array, q: Array) -> tuple[Array, Slowdown]:
+        """The twist of a point of the base, with the tool braking before the walls of the workspace."""
+        boundary = self._boundary
+        if boundary is None or boundary.workspace.box is None:
+            return twist, FREE
+        tool = boundary.tool(q)
+        lever = np.cross(twist[3:], tool - point)
+        turn = boundary.frame.rotation
+        speed = turn.T @ (twist[:3] + lever)
+        clipped = wall_velocity(speed, *boundary.walls(tool), self._twist_limits.acceleration)
+        if np.allclose(clipped, speed, atol=1e-9):
+            return twist, FREE
+        factor = float(np.linalg.norm(clipped) / np.linalg.norm(speed))
+        return np.concatenate([turn @ clipped - lever, twist[3:]]), Slowdown("workspace", min(factor, 1.0))
+
+    def _wall(self, path: VelocityPath, dq: Array) -> Slowdown | None:
+        """None: the tool has been slowed down before each wall, and slides along it."""
+        return None

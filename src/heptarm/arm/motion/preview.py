@@ -1,0 +1,241 @@
+"""The preview of a program: how it would go, before anything moves."""
+
+from __future__ import annotations
+
+import tempfile
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from heptarm.errors import require
+from heptarm.record import plot as plots
+from heptarm.values.arrays import Array, Value, word
+from heptarm.values.clearance import ForeseenCollision
+from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
+from heptarm.values.text import fixed, lines
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DEG = 180.0 / np.pi
+#: Limits of the joints: the name, what a joint has of it, the factor and unit in which people read it.
+LIMITS = {
+    "position": ("range", _DEG, "deg"),
+    "velocity": ("speed", _DEG, "deg/s"),
+    "acceleration": ("acceleration", _DEG, "deg/s²"),
+    "torque": ("torque", 1.0, "Nm"),
+}
+#: Motions that the text of a preview lists.
+_LISTED = 12
+
+
+@dataclass(frozen=True, slots=True)
+class LimitApproach(Value):
+    """Where a program comes closest to a limit of the joints.
+
+    Attributes:
+        limit: "position", "velocity", "acceleration" or "torque".
+        axis: the joint, 1 to 7.
+        fraction: of the limit that is used; a position counts from the middle of the joint's range to its end.
+        value: there [rad, rad/s, rad/s² or Nm].
+        allowed: the limit itself, in the same unit.
+        t: time from the beginning of the program [s].
+    """
+
+    limit: str
+    axis: int
+    fraction: float
+    value: float
+    allowed: float
+    t: float
+
+    def __str__(self) -> str:
+        """In words: "A4 at 97 % of its speed, 1.83 s"."""
+        name, factor, unit = LIMITS[self.limit]
+        numbers = f"{fixed(self.value * factor, 1)} of {fixed(self.allowed * factor, 1)} {unit}"
+        return f"A{self.axis} at {100 * self.fraction:.0f} % of its {name}, {self.t:.2f} s ({numbers})"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreviewedMotion(Value):
+    """One motion of a previewed program.
+
+    Attributes:
+        name: its kind, such as "Lin".
+        begin: time at which it begins [s]; behind a blend the middle of the blend.
+        duration: until the next one begins, or until the program ends [s].
+        is_blended: the next one begins without a stop.
+    """
+
+    name: str
+    begin: float
+    duration: float
+    is_blended: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProgramPreview(Value):
+    """How a program would go: made by `Arm.plan`, which moves nothing. n samples over time.
+
+    It holds at full override, on the path of the commanded position. The arm needs some ten milliseconds more to settle
+    wherever it stops. The torques are those of the nominal model with the load of the attached tool; the forces of
+    contacts and of friction are not in them.
+
+    Attributes:
+        robot: the robot.
+        t: times from its beginning [s], shape (n,).
+        q: joint positions, shape (n, 7) [rad].
+        dq: joint velocities, shape (n, 7) [rad/s].
+        ddq: joint accelerations, shape (n, 7) [rad/s²].
+        tau: joint torques, shape (n, 7) [Nm].
+        tcp: poses of the tool frame in the base, shape (n, 7): x y z [m], quaternion x y z w.
+        motions: its motions, in their order.
+        collisions: where bodies would touch, at most one for each motion; empty if none do, or if nothing checked it.
+        is_checked: whether a collision model has checked it. That is no safety function.
+    """
+
+    robot: RobotModel
+    t: Array
+    q: Array
+    dq: Array
+    ddq: Array
+    tau: Array
+    tcp: Array
+    motions: tuple[PreviewedMotion, ...]
+    collisions: tuple[ForeseenCollision, ...] = ()
+    is_checked: bool = False
+
+    @property
+    def duration(self) -> float:
+        """Its duration at full override [s]."""
+        return float(self.t[-1])
+
+    @property
+    def length(self) -> float:
+        """Length of the path of the tool frame [m]."""
+        return float(np.linalg.norm(np.diff(self.tcp[:, :3], axis=0), axis=1).sum())
+
+    @property
+    def end(self) -> Pose:
+        """Pose of the tool frame at its end, in the base."""
+        return Pose.of(self.tcp[-1, :3], self.tcp[-1, 3:])
+
+    def q_at(self, t: float) -> Array:
+        """Joint positions at a time [s], shape (7,) [rad]; before its beginning and behind its end those there."""
+        return np.array([np.interp(t, self.t, column) for column in self.q.T])
+
+    def closest(self, limit: str = "velocity") -> LimitApproach:
+        """Where it comes closest to a limit of the joints.
+
+        Args:
+            limit: "position", "velocity", "acceleration" or "torque".
+
+        Raises:
+            CommandRejected: no such limit.
+        """
+        word(limit, "limit", tuple(LIMITS))
+        values, middle, room = self._limited(limit)
+        fractions = np.abs(values - middle) / room
+        sample, joint = np.unravel_index(int(fractions.argmax()), fractions.shape)
+        value = float(values[sample, joint])
+        side = 1.0 if value >= middle[joint] else -1.0
+        allowed = float(middle[joint] + side * room[joint])
+        return LimitApproach(
+            limit, int(joint) + 1, float(fractions[sample, joint]), value, allowed, float(self.t[sample])
+        )
+
+    def _limited(self, limit: str) -> tuple[Array, Array, Array]:
+        """Values of a quantity, and the middle and half width of its range."""
+        robot, none = self.robot, np.zeros(7)
+        if limit == "position":
+            return self.q, 0.5 * (robot.q_max + robot.q_min), 0.5 * (robot.q_max - robot.q_min)
+        if limit == "velocity":
+            return self.dq, none, robot.dq_max
+        if limit == "acceleration":
+            return self.ddq, none, robot.ddq_max
+        return self.tau, none, robot.tau_max
+
+    def __str__(self) -> str:
+        """Aligned lines: duration, motions, limits, collisions."""
+        count = len(self.motions)
+        rows = {
+            "duration": f"{self.duration:.2f} s at full override",
+            "motions": "\n".join(self._listed()),
+            "path": f"{self.length:.3f} m of the tool frame, to {self.end}",
+        }
+        rows |= {name: str(self.closest(name)) for name in ("position", "velocity", "torque")}
+        found = "\n".join(map(str, self.collisions)) or "none on the path, by the collision model"
+        rows["collisions"] = found if self.is_checked else "not checked"
+        return lines(f"Preview of {count} motion{'s' * (count != 1)}; nothing was moved", rows)
+
+    def _listed(self) -> list[str]:
+        rows = [
+            f"{one.begin:7.2f} s  {one.name:<11} {one.duration:7.2f} s{'  blended' if one.is_blended else ''}"
+            for one in self.motions[:_LISTED]
+        ]
+        more = len(self.motions) - _LISTED
+        return [*rows, f"... {more} more"] if more > 0 else rows
+
+    # ----------------------------------------------------------------------------------- figures
+
+    def plot(self) -> Figure:
+        """A figure: joint positions, speeds and torques beside their limits, and the path of the tool frame.
+
+        Raises:
+            MissingExtra: matplotlib is not installed.
+        """
+        figures: Any = require("matplotlib.figure", extra="record")
+        figure = figures.Figure(figsize=(11, 9.5), layout="constrained")
+        grid = figure.add_gridspec(4, 1, height_ratios=[1.9, 1.9, 1.9, 3.6])
+        shared = None
+        for row, limit in enumerate(("position", "velocity", "torque")):
+            values, middle, room = self._limited(limit)
+            axes = shared = figure.add_subplot(grid[row], sharex=shared)
+            for joint in range(7):
+                line = (values[:, joint] - middle[joint]) / room[joint]
+                axes.plot(self.t, line, color=f"C{joint}", linewidth=1.0, label=f"A{joint + 1}")
+            for edge in (-1.0, 1.0):
+                axes.axhline(edge, color="firebrick", linewidth=0.8, linestyle=":")
+            for index, one in enumerate(self.motions):
+                end = one.begin + one.duration
+                axes.axvspan(one.begin, end, color="0.5", alpha=0.12 if index % 2 else 0.06, linewidth=0)
+            for found in self.collisions:
+                axes.axvline(found.t, color="firebrick", linewidth=0.9, linestyle="--")
+            axes.set_ylabel(f"{LIMITS[limit][0]}\n[fraction of limit]", fontsize=8)
+            axes.grid(alpha=0.25)
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=7)
+        axes.set_xlabel("time [s]", fontsize=8)
+        self._draw_path(figure.add_subplot(grid[3], projection="3d"))
+        title = f"preview: {self.robot.title}, {len(self.motions)} motions, {self.duration:.2f} s"
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
+        return figure
+
+    def _draw_path(self, axes: Any) -> None:
+        points = self.tcp[:, :3] * 1e3
+        axes.plot(*points.T, color="tab:blue", linewidth=1.2)
+        axes.scatter(*points[0], color="tab:blue", marker="o", s=18)
+        axes.scatter(*points[-1], color="tab:blue", marker="s", s=18)
+        for found in self.collisions:
+            nearest = int(np.abs(self.t - found.t).argmin())
+            axes.scatter(*points[nearest], color="firebrick", marker="x", s=40)
+        for name, place in zip("xyz", ("set_xlabel", "set_ylabel", "set_zlabel"), strict=True):
+            getattr(axes, place)(f"{name} [mm]", fontsize=8)
+        axes.set_title("path of the tool frame (circle: begin, square: end)", fontsize=8, loc="left")
+        spans = np.ptp(points, axis=0)
+        axes.set_box_aspect(np.maximum(spans, max(float(spans.max()), 1.0) * 0.2))
+
+    def show(self) -> Path:
+        """Open the figure of `plot` in the web browser; returns the page's file, which stays.
+
+        Raises:
+            MissingExtra: matplotlib is not installed.
+        """
+        folder = Path(tempfile.mkdtemp(prefix="heptarm-preview-"))
+        page = plots.save(self.plot(), folder / "preview.html")
+        webbrowser.open(page.as_uri())
+        return page

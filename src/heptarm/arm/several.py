@@ -1,0 +1,412 @@
+"""Several arms: connect and close them together, start them at the same moment, stop all of them.
+
+::
+
+    with ha.connect_all(left="lab1", right="lab2") as arms:
+        left, right = arms
+        ha.start_together({left: ha.lin_rel(z=0.1), right: ha.lin_rel(z=-0.1)}).wait()
+
+Each arm has a cabinet of its own and a clock of its own, which this computer compares with its own one by pings. So the
+states of all arms have times on the same clock: that of this computer (`State.sampled`).
+"""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, TypeVar
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.connect import connect
+from heptarm.arm.motion.handle import MotionHandle, check_timeout
+from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
+from heptarm.record.recorder import Recorder
+from heptarm.values.arrays import flag, instance, shown, within
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.motion import Motion
+from heptarm.values.result import MotionEvent, Result
+from heptarm.values.state import State
+
+_log = logging.getLogger("heptarm.arm")
+
+_Answer = TypeVar("_Answer")
+#: Time that cabinets have to plan their programs before they are released [s].
+_LEAD = 0.2
+#: Longest wait until a cabinet has taken up a program [s].
+_PATIENCE = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class StatesOfArms:
+    """The states of several arms at about the same moment.
+
+    Attributes:
+        time: the moment, on this computer's clock [s].
+        states: one for each arm, in their order.
+        spread: between the earliest and the latest of them [s].
+    """
+
+    time: float
+    states: tuple[State, ...]
+    spread: float
+
+
+class Arms:
+    """Several connected arms; made by `connect_all`.
+
+    A `with` block leaves all of them at rest: however it ends, all are stopped at once, then closed one after the
+    other, the last one first. Iterating returns the arms in their order, `arms["left"]` the one of that name.
+    """
+
+    def __init__(self, arms: Mapping[str, Arm]) -> None:
+        self._arms = dict(arms)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the arms."""
+        return tuple(self._arms)
+
+    def __len__(self) -> int:
+        """Number of arms."""
+        return len(self._arms)
+
+    def __iter__(self) -> Iterator[Arm]:
+        """The arms in their order."""
+        return iter(self._arms.values())
+
+    def __getitem__(self, name: str) -> Arm:
+        """The arm of a name.
+
+        Raises:
+            CommandRejected: there is none; the text lists them.
+        """
+        if name not in self._arms:
+            known = ", ".join(self._arms)
+            raise CommandRejected(
+                f"name must be one of {known}, got {shown(name)}",
+                parameter="name",
+                value=name,
+                allowed=known,
+            )
+        return self._arms[name]
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<Arms {', '.join(f'{name}: {arm!r}' for name, arm in self._arms.items())}>"
+
+    def record(self, path: str | Path, *, rate: float | None = None) -> Recorder:
+        """A recording of all arms in one file, with one time line; see `Arm.record`.
+
+        `heptarm.load(path, arm="left")` reads the part of one of them.
+
+        Args:
+            path: the file, MCAP; it is replaced.
+            rate: have at least so many states of each pushed per second meanwhile [Hz]; None: as many as are.
+
+        Raises:
+            LimitError: a rate outside its range.
+            CommandRejected: the file cannot be written (when the block begins).
+            MissingExtra: the package mcap is not installed (when the block begins).
+        """
+        sources = {name: arm.connection for name, arm in self._arms.items()}
+        return Recorder(sources, Path(instance(path, (str, Path), "path")), rate=rate)
+
+    def close(self) -> None:
+        """Stop all arms, then leave each at rest and disconnect it; calling it again has no effect."""
+        moving = [arm for arm in self if arm.in_control]
+        for error in _of_each(moving, Arm.stop)[1]:
+            _log.warning("closing: %s", error)
+        for arm in reversed(list(self)):
+            arm.close()
+
+    def __enter__(self) -> Arms:
+        """The arms themselves."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close them."""
+        self.close()
+
+
+def connect_all(*targets: str, settings: Mapping[str, Any] | None = None, **named: str) -> Arms:
+    """Connect to several arms; if one does not answer, the others are closed again.
+
+    Args:
+        *targets: names of saved targets, or what `connect` takes; each is also the arm's name.
+        settings: keywords of `connect` for all of them, such as {"state_rate": 250}.
+        **named: more targets by the arm's name: left="sim://iiwa14", right="172.31.1.147".
+
+    Returns:
+        The arms; use them in a `with` block, which leaves all of them at rest.
+
+    Raises:
+        ConnectFailed: one does not answer; others as `connect`. The text names the arm.
+        CommandRejected: no target, or two arms of one name.
+    """
+    pairs = [*((instance(one, str, "targets"), one) for one in targets), *named.items()]
+    if not pairs or len({name for name, _ in pairs}) < len(pairs):
+        raise CommandRejected(
+            "targets must be one or more arms of different names, got "
+            + (", ".join(name for name, _ in pairs) or "none"),
+            parameter="targets",
+            hint='give them names: connect_all(left="sim://iiwa14", right="sim://iiwa14")',
+        )
+    arms: dict[str, Arm] = {}
+    try:
+        for name, target in pairs:
+            try:
+                arms[name] = connect(instance(target, str, name), **dict(settings or {}))
+            except HeptarmError as error:
+                error.text = f"{name}: {error.text}"
+                error.args = (error.text,)
+                raise
+    except BaseException:
+        Arms(arms).close()
+        raise
+    return Arms(arms)
+
+
+def stop_all(*arms: Arm, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
+    """Stop several arms at once; see `Arm.stop`. Each is stopped, also if another one cannot be reached.
+
+    Args:
+        *arms: which ones.
+        kind: see `Arm.stop`.
+
+    Raises:
+        ConnectionLost: an arm could not be reached; the others were stopped.
+    """
+    chosen = [instance(arm, Arm, "arms") for arm in arms]
+    _, errors = _of_each(chosen, lambda arm: arm.stop(kind))
+    if errors:
+        raise errors[0]
+
+
+def states_together(*arms: Arm) -> StatesOfArms:
+    """The newest states of several arms that were sampled at about the same moment.
+
+    The moment is that of the arm whose newest state is the oldest; of the others the nearest state is taken. Each is
+    at most half a period of the pushed states from it, unless states were lost on the way.
+
+    Args:
+        *arms: which ones.
+
+    Raises:
+        StaleState: the newest state of an arm is too old to act on.
+        ConnectionLost: the connection of one has ended.
+    """
+    newest = [instance(arm, Arm, "arms").state for arm in arms]
+    if not newest:
+        raise ShapeError("arms must be one or more arms, got none", parameter="arms")
+    moment = min(state.sampled for state in newest)
+    histories = [(state, *arm.history()) for arm, state in zip(arms, newest, strict=True)]
+    chosen = tuple(min(one, key=lambda state: abs(state.sampled - moment)) for one in histories)
+    times = [state.sampled for state in chosen]
+    return StatesOfArms(moment * 1e-9, chosen, (max(times) - min(times)) * 1e-9)
+
+
+class MotionOfArms:
+    """Programs of several arms that began together; made by `start_together`.
+
+    Attributes:
+        handles: the program of each arm.
+    """
+
+    def __init__(self, handles: Mapping[Arm, MotionHandle], *, stops_others: bool) -> None:
+        self.handles = dict(handles)
+        self._stops_others = stops_others
+        self._begun: dict[Arm, float] = {}
+        self._first: HeptarmError | None = None
+        self._ended: queue.SimpleQueue[Arm] = queue.SimpleQueue()
+        for arm, handle in self.handles.items():
+            handle.add_event_callback(self._noting(arm))
+            handle.add_done_callback(lambda _, arm=arm: self._ended.put(arm))  # type: ignore[misc]
+        self._watcher = threading.Thread(target=self._watch, name="heptarm-together", daemon=True)
+        self._watcher.start()
+
+    def _noting(self, arm: Arm) -> Callable[[MotionEvent], None]:
+        def note(event: MotionEvent) -> None:
+            if event.kind == "begun":
+                self._begun.setdefault(arm, time.monotonic())
+
+        return note
+
+    @property
+    def skew(self) -> float:
+        """Time between the first and the last arm that began to move [s]; NaN until all have.
+
+        It is taken where the cabinets' events arrive, so it holds within the round trip of the network.
+        """
+        if len(self._begun) < len(self.handles):
+            return nan
+        return max(self._begun.values()) - min(self._begun.values())
+
+    @property
+    def done(self) -> bool:
+        """Whether the programs of all arms have ended."""
+        return all(handle.done for handle in self.handles.values())
+
+    def cancel(self) -> None:
+        """End all programs: those that run brake on their paths."""
+        for error in _of_each(list(self.handles.values()), MotionHandle.cancel)[1]:
+            raise error
+
+    def wait(self, *, timeout: float | None = None) -> dict[Arm, Result]:
+        """Wait until the programs of all arms have ended.
+
+        Args:
+            timeout: longest wait for each [s]; None: that of `MotionHandle.wait`.
+
+        Returns:
+            How each ended.
+
+        Raises:
+            HeptarmError: the error of the arm that failed first, as of `MotionHandle.wait`.
+            Timeout: one has not ended in time; all go on.
+        """
+        results: dict[Arm, Result] = {}
+        for arm, handle in self.handles.items():
+            try:
+                results[arm] = handle.wait(timeout=timeout)
+            except Timeout:
+                raise
+            except HeptarmError as error:
+                _log.debug("one of several arms: %s", error)  # the watcher knows which one was the first
+        self._watcher.join(_PATIENCE)
+        if self._first is not None:
+            raise self._first
+        return results
+
+    def _watch(self) -> None:
+        """Stop the other arms when one has failed; in a thread of its own, since a callback must not wait."""
+        waiting = set(self.handles)
+        while waiting:
+            arm = self._ended.get()
+            waiting.discard(arm)
+            error = self.handles[arm].error
+            if error is None or self._first is not None:
+                continue
+            self._first = error
+            if self._stops_others and waiting:
+                _log.warning("one of %d arms failed, the others are stopped: %s", len(self.handles), error)
+                for failure in _of_each(sorted(waiting, key=list(self.handles).index), Arm.stop)[1]:
+                    _log.error("an arm could not be stopped: %s", failure)
+
+
+def start_together(
+    motions: Mapping[Arm, Motion | Sequence[Motion]],
+    *,
+    speed: float | None = None,
+    mode: Mode | None = None,
+    lead: float = _LEAD,
+    stop_others: bool = True,
+) -> MotionOfArms:
+    """Begin motions of several arms at the same moment, and return then.
+
+    Each cabinet gets its program while it is paused, so that it has planned it when all are released at once. What is
+    left is the time by which the releases arrive at different times: `MotionOfArms.skew`.
+
+    Args:
+        motions: for each arm a motion, or several as one batch.
+        speed: ceiling for all of them, (0, 1]; see `Arm.start`.
+        mode: control mode of all of them; see `Arm.start`.
+        lead: time that the cabinets have to plan [s], 0 to 10.
+        stop_others: if one arm fails, or its connection is lost, stop the others.
+
+    Returns:
+        The programs, all of them released.
+
+    Raises:
+        CommandRejected: a program was refused, or could not be planned; nothing has moved.
+        ModeConflict: an arm has not come to rest.
+        NotInControl: this client does not control an arm.
+    """
+    if not isinstance(motions, Mapping) or not motions or not all(isinstance(arm, Arm) for arm in motions):
+        raise ShapeError(
+            f"motions must be a motion for each arm, got {shown(motions)}",
+            parameter="motions",
+            hint="for example {left: ha.lin_rel(z=0.1), right: ha.lin_rel(z=-0.1)}",
+        )
+    flag(stop_others, "stop_others")
+    seconds = within(lead, "lead", 0.0, 10.0, unit="s")
+    arms = list(motions)
+    for arm in arms:
+        status = arm.state.motion
+        if status is not None and (status.active or status.queued):
+            raise ModeConflict(
+                "an arm still moves, so that it could not begin with the others",
+                parameter="motions",
+                hint="wait until all arms rest: arm.wait_for_rest()",
+            )
+    handles: dict[Arm, MotionHandle] = {}
+    try:
+        _raise_first(_of_each(arms, Arm.pause))
+        for arm in arms:
+            handles[arm] = arm.start(motions[arm], speed=speed, mode=mode, when="reject")
+        for arm in arms:
+            _wait_until_taken(arm, handles[arm])
+        time.sleep(seconds)
+        for handle in handles.values():
+            if handle.error is not None:
+                raise handle.error
+    except BaseException:
+        _of_each(list(handles.values()), MotionHandle.cancel)
+        _of_each(arms, Arm.resume)
+        raise
+    together = MotionOfArms(handles, stops_others=stop_others)
+    _, errors = _of_each(arms, Arm.resume)
+    if errors:
+        _of_each(arms, Arm.stop)
+        raise errors[0]
+    return together
+
+
+def _wait_until_taken(arm: Arm, handle: MotionHandle) -> None:
+    """Wait until a cabinet has taken up a program, or refused it."""
+    deadline = time.monotonic() + check_timeout(_PATIENCE)
+    while not handle.done and time.monotonic() < deadline:
+        status = arm.state.motion
+        if status is None or status.id == handle.id:
+            return
+        time.sleep(0.005)
+
+
+def _of_each(
+    these: Sequence[Any], action: Callable[[Any], _Answer]
+) -> tuple[list[_Answer], list[HeptarmError]]:
+    """Carry out an action for each at the same moment; returns the answers and the errors."""
+    if not these:
+        return [], []
+    barrier = threading.Barrier(len(these))
+
+    def act(one: Any) -> _Answer:
+        barrier.wait()
+        return action(one)
+
+    answers: list[_Answer] = []
+    errors: list[HeptarmError] = []
+    with ThreadPoolExecutor(len(these), thread_name_prefix="heptarm-together") as pool:
+        for future in [pool.submit(act, one) for one in these]:
+            try:
+                answers.append(future.result())
+            except HeptarmError as error:
+                errors.append(error)
+    return answers, errors
+
+
+def _raise_first(outcome: tuple[list[Any], list[HeptarmError]]) -> None:
+    for error in outcome[1]:
+        raise error

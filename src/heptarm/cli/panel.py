@@ -1,0 +1,87 @@
+"""`heptarm panel`: a page in the browser for looking at arms and jogging them."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from heptarm.cli.options import NO_TARGETS, CommandTargets, Json
+from heptarm.cli.output import emit
+from heptarm.errors import CommandRejected, require
+from heptarm.panel.guard import is_local
+from heptarm.panel.process import STATE_RATE, Panel, PanelOptions, model_of
+
+
+def panel(
+    *,
+    host: Annotated[str, Parameter(help="Address to listen on; 0.0.0.0 lets in the network.")] = "127.0.0.1",
+    port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 8080,
+    read_only: Annotated[bool, Parameter(negative="", help="Look and stop only; no control.")] = False,
+    allow_control: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Let pages control the arms although the panel listens beyond this machine. Who has the URL then "
+            "moves the robot.",
+        ),
+    ] = False,
+    scene: Annotated[str, Parameter(help="NAME or FILE (MJCF) of what is drawn around the first arm.")] = "",
+    meshes: Annotated[
+        str, Parameter(help="DIR with link_0.stl to link_7.stl, or .obj, in place of heptarm's own.")
+    ] = "",
+    recordings: Annotated[Path, Parameter(help="Folder for recordings.")] = Path(),
+    light: Annotated[bool, Parameter(negative="", help="A light page instead of a dark one.")] = False,
+    target: CommandTargets = NO_TARGETS,
+    as_json: Json = False,
+) -> int:
+    """Open a page in the browser for looking at arms and jogging them; runs until Ctrl-C.
+
+    For example:
+
+        heptarm panel --target sim://iiwa14
+    """
+    require("viser", extra="viz")
+    options = PanelOptions(
+        host=host,
+        port=port,
+        allow_control=allow_control,
+        read_only=read_only,
+        scene=scene,
+        meshes=meshes,
+        recordings=recordings,
+        light=light,
+    )
+    if allow_control and read_only:
+        raise CommandRejected(
+            "--allow-control and --read-only contradict each other",
+            parameter="read-only",
+            hint="give one of them",
+        )
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with ExitStack() as stack:
+        models = []
+        for text, one in target.each():
+            arm = stack.enter_context(one.connect(control=False, state_rate=STATE_RATE))
+            models.append(model_of(arm, text, options))
+        page = Panel(models, options)
+        stack.callback(page.close)
+        if as_json:
+            emit({"panel": page.url, "may_control": options.may_control})
+        else:
+            print(f"The panel is at {page.url}")
+            if not options.may_control and not read_only:
+                print(
+                    "It only shows, since it listens beyond this machine; --allow-control lets its pages move the arm."
+                )
+            elif options.may_control and not is_local(host):
+                print("Who has this URL moves the robot. The connection is not encrypted.")
+            print("Ctrl-C ends it.", flush=True)
+        try:
+            page.run()
+        except KeyboardInterrupt:
+            pass
+    return 0

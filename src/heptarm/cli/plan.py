@@ -1,0 +1,148 @@
+"""`heptarm plan`: how a motion would go, without moving anything; also what `heptarm move --dry-run` prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, Json, Speed
+from heptarm.cli.output import emit
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import Pose
+
+if TYPE_CHECKING:
+    from heptarm.arm.motion.preview import ProgramPreview
+
+Metres = Annotated[float, Parameter(help="Along this axis [m].")]
+Turn = Annotated[
+    float, Parameter(help="Rotation [rad], with --deg [deg]: a about z, then b about y, then c about x.")
+]
+Axis = Annotated[float, Parameter(help="Position of this joint [rad], with --deg [deg].")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanOptions:
+    """Options of every `heptarm plan`."""
+
+    degrees: Degrees = False
+    speed: Speed = 0.1
+    scene: Annotated[
+        str, Parameter(help="Check the path for collisions in this scene: a ready one, or a file (MJCF).")
+    ] = ""
+    box: Annotated[
+        tuple[str, ...],
+        Parameter(help="Check it against this fixed box: X,Y,Z,LENGTH,WIDTH,HEIGHT [m]; may be repeated."),
+    ] = ()
+    out: Annotated[
+        Path | None, Parameter(name=["--out", "-o"], help="Write a figure: .png, .svg, .pdf or .html.")
+    ] = None
+    target: CommandTarget = NO_TARGET
+    as_json: Json = False
+
+
+_OPTIONS = PlanOptions()
+
+
+def plan_ptp(
+    a1: Axis,
+    a2: Axis,
+    a3: Axis,
+    a4: Axis,
+    a5: Axis,
+    a6: Axis,
+    a7: Axis,
+    /,
+    *,
+    options: PlanOptions = _OPTIONS,
+) -> int:
+    """Point to point, to seven joint positions [rad].
+
+    For example:
+
+        heptarm plan ptp 0 30 0 -90 0 60 0 --deg --speed 0.5 --target lab1
+    """
+    return _plan(ptp(_angles((a1, a2, a3, a4, a5, a6, a7), options)), options)
+
+
+def plan_lin(
+    x: Metres, y: Metres, z: Metres, a: Turn, b: Turn, c: Turn, /, *, options: PlanOptions = _OPTIONS
+) -> int:
+    """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad].
+
+    For example:
+
+        heptarm plan lin 0.5 0 0.4 180 0 180 --deg --scene table --target lab1
+    """
+    return _plan(lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), options))), options)
+
+
+def plan_lin_rel(
+    *,
+    x: Metres = 0.0,
+    y: Metres = 0.0,
+    z: Metres = 0.0,
+    a: Turn = 0.0,
+    b: Turn = 0.0,
+    c: Turn = 0.0,
+    frame: Annotated[str, Parameter(help='Whose axes: "tool" or "base".')] = "tool",
+    options: PlanOptions = _OPTIONS,
+) -> int:
+    """Straight line by an offset [m], [rad].
+
+    For example:
+
+        heptarm plan lin-rel --z -0.05 --frame base --out plan.png --target lab1
+    """
+    return _plan(lin_rel(x, y, z, *_angles((a, b, c), options), frame=frame), options)
+
+
+def _angles(values: tuple[float, ...], options: PlanOptions) -> list[float]:
+    return [float(value) for value in (np.radians(values) if options.degrees else values)]
+
+
+def _plan(motion: Motion, options: PlanOptions) -> int:
+    """Look ahead and print it; the exit code is 1 if bodies would touch."""
+    with options.target.connect(control=False) as arm:
+        check = None
+        if options.scene or options.box:
+            from heptarm.sim.collision import CollisionModel
+
+            check = CollisionModel(arm.robot.name, scene=options.scene, boxes=options.box)
+        preview = arm.plan(motion, speed=options.speed, collision_check=check)
+    written: dict[str, Any] = {}
+    if options.out is not None:
+        from heptarm.record import plot
+
+        written = {"file": str(plot.save(preview.plot(), options.out))}
+    if options.as_json:
+        emit(preview_data(preview) | written)
+    else:
+        print(preview, *written.values(), sep="\n")
+    return 1 if preview.collisions else 0
+
+
+def preview_data(preview: ProgramPreview) -> dict[str, Any]:
+    """A preview as plain data, SI."""
+    closest = {name: preview.closest(name) for name in ("position", "velocity", "acceleration", "torque")}
+    return {
+        "duration_s": preview.duration,
+        "length_m": preview.length,
+        "end_q": preview.q[-1].tolist(),
+        "end_xyz": preview.end.xyz.tolist(),
+        "end_quat": preview.end.quat.tolist(),
+        "closest": {
+            name: {"axis": one.axis, "fraction": one.fraction, "t_s": one.t} for name, one in closest.items()
+        },
+        "checked": preview.is_checked,
+        "collisions": [
+            {"first": one.clearance.first, "second": one.clearance.second, "t_s": one.t, "motion": one.motion}
+            for one in preview.collisions
+        ],
+    }

@@ -1,0 +1,29 @@
+"""Input devices for jogging: keyboard, gamepad, SpaceMouse, and recorded or synthetic streams behind one protocol.
+
+A device is read without waiting: deflections of six axes in [-1, 1], and the buttons that are held. What the arm does
+with that is not decided here; `heptarm.skills.teleoperate` does it. A device's library is imported when it is opened.
+"""
+
+from heptarm.devices.device import DeviceInput, InputDevice, Roles
+from heptarm.devices.gamepad import Gamepad, gamepad
+from heptarm.devices.keyboard import Keyboard, keyboard
+from heptarm.devices.spacemouse import SpaceMouse, spacemouse
+from heptarm.devices.stream import Recorded, Recording, Synthetic, recorded, recording, synthetic
+
+__all__ = [
+    "DeviceInput",
+    "Gamepad",
+    "InputDevice",
+    "Keyboard",
+    "Recorded",
+    "Recording",
+    "Roles",
+    "SpaceMouse",
+    "Synthetic",
+    "gamepad",
+    "keyboard",
+    "recorded",
+    "recording",
+    "spacemouse",
+    "synthetic",
+]

@@ -1,0 +1,211 @@
+"""What is drawn in three dimensions: arm and scene, the path driven, the force of a contact, frames, taught points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from heptarm.errors import require
+from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
+from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.shared_state import PositionsFile
+from heptarm.sim.plant.world import compiled
+from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
+
+_COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
+_ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
+#: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
+_ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.005, 0.5, 2.0
+#: A flange and a motion frame closer than this have no line between them [m].
+_NO_TOOL = 0.005
+#: The segments that an empty trail is drawn with.
+_NOTHING = np.zeros((1, 2, 3), np.float32)
+
+
+def wxyz(pose: Pose) -> tuple[float, float, float, float]:
+    """The rotation of a pose as viser has it, w x y z."""
+    x, y, z, w = pose.quat.tolist()
+    return w, x, y, z
+
+
+class DrawnWorld:
+    """The shapes of arm and scene in viser, moved by joint positions.
+
+    Args:
+        server: a viser server.
+        model: "iiwa7", "iiwa14", "med7" or "med14".
+        scene: what is around the arm and on its flange; None: nothing.
+        positions: file in which the simulator writes all positions; None: only the arm moves.
+        meshes: of the arm; None: heptarm's own.
+        root: node of viser's scene that is the base of the arm; empty: the world.
+    """
+
+    def __init__(
+        self,
+        server: Any,
+        model: str,
+        scene: Scene | None = None,
+        positions: Path | None = None,
+        meshes: ArmMeshes | None = None,
+        *,
+        root: str = "",
+    ) -> None:
+        self._root = root
+        self._model = compiled(model, (), scene, meshes or ArmMeshes())
+        self._data = mujoco.MjData(self._model)
+        self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
+        self._handles = [
+            (index, self._shape(server, index)) for index in range(self._model.ngeom) if self._is_drawn(index)
+        ]
+        server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
+        self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
+
+    def _is_drawn(self, index: int) -> bool:
+        kind = int(self._model.geom_type[index])
+        endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+        return not endless and int(self._model.geom_group[index]) < HIDDEN_GROUP
+
+    def _shape(self, server: Any, index: int) -> Any:
+        vertices, faces = self._mesh(index)
+        model, red_green_blue = self._model, self._model.geom_rgba[index, :3]
+        material = model.geom_matid[index]
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MATERIAL, material) if material >= 0 else ""
+        colour = _COLOURS.get(name) or tuple(round(255 * float(part)) for part in red_green_blue)
+        return server.scene.add_mesh_simple(f"{self._root}/world/{index}", vertices, faces, color=colour)
+
+    def _mesh(self, index: int) -> tuple[Array, Array]:
+        """Vertices and faces of a shape in its own frame."""
+        creation = require("trimesh.creation", extra="viz")
+        model, kind = self._model, self._model.geom_type[index]
+        radius, half, depth = model.geom_size[index].tolist()
+        if kind == mujoco.mjtGeom.mjGEOM_MESH:
+            one = int(model.geom_dataid[index])
+            first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
+            vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
+            return np.array(vertices), np.array(model.mesh_face[face : face + int(model.mesh_facenum[one])])
+        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
+            mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
+        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            mesh = creation.cylinder(radius=radius, height=2 * half, sections=32)
+        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
+            mesh = creation.box(extents=(2 * radius, 2 * half, 2 * depth))
+        else:  # a sphere has one radius, an ellipsoid three
+            mesh = creation.icosphere(subdivisions=3, radius=1.0)
+            mesh.apply_scale((radius, half or radius, depth or radius))
+        return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+    def show(self, q: Array) -> None:
+        """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""
+        everything = None if self._positions is None else self._positions.read()
+        if everything is not None:
+            self._data.qpos[:] = everything
+        self._data.qpos[:7] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        quat = np.zeros(4)
+        for index, handle in self._handles:
+            mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
+            handle.position, handle.wxyz = self._data.geom_xpos[index].copy(), quat.copy()
+        flange = self.flange
+        mujoco.mju_mat2Quat(quat, flange.xmat)
+        self._flange.position, self._flange.wxyz = flange.xpos.copy(), quat.copy()
+
+    @property
+    def flange(self) -> Any:
+        """MuJoCo's view of the flange, as it was shown last: `xpos` is its position in the base, shape (3,) [m]."""
+        return self._data.site("flange")
+
+
+class DrawnMarks:
+    """What is drawn besides the bodies of one arm, in viser, in the base frame.
+
+    Args:
+        server: a viser server.
+        root: node of viser's scene that is the base of the arm; empty: the world.
+    """
+
+    def __init__(self, server: Any, root: str = "") -> None:
+        self._scene, self._root = server.scene, root
+        self._tcp = self._scene.add_frame(f"{root}/tcp", axes_length=0.10, axes_radius=0.003)
+        self._target = self._scene.add_frame(
+            f"{root}/target", axes_length=0.08, axes_radius=0.002, visible=False
+        )
+        self._trail = self._scene.add_line_segments(
+            f"{root}/trail", _NOTHING, _TRAIL, thickness=2.5, thickness_units="screen"
+        )
+        self._tool = self._scene.add_line_segments(
+            f"{root}/tool", _NOTHING, _TOOL, thickness=0.012, visible=False
+        )
+        self._force = self._scene.add_arrows(
+            f"{root}/force",
+            _NOTHING,
+            _ACCENT,
+            shaft_radius=0.006,
+            head_radius=0.016,
+            head_length=0.04,
+            visible=False,
+        )
+        self._named: dict[str, tuple[Any, ...]] = {}
+        self._places: dict[str, Pose] = {}
+        self._drawn = 0
+
+    def show(self, tcp: Pose, flange: Array, force: Array | None) -> None:
+        """Move the motion frame, the line to it from the flange, and the arrow of the contact.
+
+        Args:
+            tcp: pose of the motion frame in the base.
+            flange: position of the flange in the base, shape (3,) [m].
+            force: external force on the robot in the base axes, shape (3,) [N]; None: it is not known.
+        """
+        self._tcp.position, self._tcp.wxyz = tcp.xyz, wxyz(tcp)
+        has_tool = float(np.linalg.norm(tcp.xyz - flange)) > _NO_TOOL
+        if has_tool:
+            self._tool.points = np.array([[flange, tcp.xyz]], np.float32)
+        self._tool.visible = has_tool
+        size = 0.0 if force is None else float(np.linalg.norm(force))
+        is_felt = size > _LEAST_FORCE
+        if force is not None and is_felt:
+            along = force / size * min(_ARROW_SCALE * size, _LONGEST_ARROW)
+            self._force.points = np.array([[tcp.xyz, tcp.xyz + along]], np.float32)
+        self._force.visible = is_felt
+
+    def show_target(self, pose: Pose | None) -> None:
+        """Show where the arm is going; None: nowhere."""
+        if pose is not None:
+            self._target.position, self._target.wxyz = pose.xyz, wxyz(pose)
+        self._target.visible = pose is not None
+
+    def show_trail(self, path: Array) -> None:
+        """Draw the path driven: positions in the base, shape (n, 3) [m]."""
+        self._trail.points = (
+            _NOTHING if len(path) < 2 else np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
+        )
+
+    def show_places(self, kind: str, places: Mapping[str, Pose]) -> None:
+        """Draw named frames, such as "frames" or "points", in place of those of the same kind."""
+        wanted = {f"{kind}/{name}": pose for name, pose in places.items()}
+        for name in [one for one in self._places if one.startswith(f"{kind}/") and one not in wanted]:
+            for handle in self._named.pop(name):
+                handle.remove()
+            del self._places[name]
+        for name, pose in wanted.items():
+            if self._places.get(name) == pose:
+                continue
+            for handle in self._named.pop(name, ()):
+                handle.remove()
+            self._drawn += 1
+            node = (
+                f"{self._root}/{kind}/{self._drawn}"  # a name may have characters that viser's paths have not
+            )
+            self._places[name] = pose
+            self._named[name] = (
+                self._scene.add_frame(
+                    node, axes_length=0.05, axes_radius=0.0018, position=pose.xyz, wxyz=wxyz(pose)
+                ),
+                self._scene.add_label(f"{node}/label", name.partition("/")[2], anchor="bottom-left"),
+            )

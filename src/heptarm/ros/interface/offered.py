@@ -1,0 +1,55 @@
+"""Which topics and services a node offers: heptarm's own, and those of the driver that the parameter `names` selects.
+
+A node subscribes to every topic and serves every service::
+
+    table = offered(values)
+    topics, services = TopicDispatcher(context), ServiceDispatcher(context)
+    for row in table.topics:
+        ...                       # under row.name with row.type: topics.handle(row, message); log a refusal
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from heptarm.ros.interface.libiiwa import LibiiwaServer
+from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.service import Service
+from heptarm.ros.interface.services import SERVICES
+from heptarm.ros.interface.topics import Topic, topics_of
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedInterface:
+    """Rows of the tables that a node offers.
+
+    Attributes:
+        topics: that it subscribes to.
+        services: that it serves.
+        missing: packages with types of the other driver that are not installed; what needs them is left out.
+    """
+
+    topics: tuple[Topic, ...]
+    services: tuple[Service, ...]
+    missing: tuple[str, ...]
+
+
+def offered(values: Mapping[str, Any]) -> OfferedInterface:
+    """List what a node offers.
+
+    Args:
+        values: of its parameters: `names` adds the names of another driver, `forward_controllers` leaves topics out.
+    """
+    preset = PRESETS[values["names"]]
+    topics, services = list(topics_of(values)), list(SERVICES)
+    server = LibiiwaServer()
+    for entry in preset.entries:
+        if entry.role is NameRole.JOINT:
+            topics.append(Topic(entry.name, entry.type, server.joint))
+        elif entry.role is NameRole.CARTESIAN:
+            topics.append(Topic(entry.name, entry.type, server.pose))
+        elif entry.role is NameRole.SERVICE and entry.is_available:
+            services.append(server.service(entry.name.rpartition("/")[2], entry.type))
+    return OfferedInterface(tuple(topics), tuple(services), preset.missing())

@@ -1,0 +1,198 @@
+"""The arithmetic of a tick in C: position control, sensors, supervision of the drives, and the published state.
+
+The Python modules are the reference, and compute wherever there is no compiler: `heptarm.sim.control.laws`, and `Plant`
+with its parts. tests/sim/test_native_tick.py compares the two.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from heptarm.io.compiled import Unavailable, compiled_library
+from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
+from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel
+
+AXES = 7
+#: What the functions return.
+LOADED, WAKE, ASK = 1, 1, 2
+
+_SOURCE = Path(__file__).with_name("native.c")
+_WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+#: `struct tick` of native.c: kind, size (0: a scalar), names.
+STRUCT: tuple[tuple[str, int, str], ...] = (
+    ("words", 0, "memory"),
+    # MuJoCo's vectors of the arm; those of the controller's model; what the sensors show
+    (
+        "reals",
+        0,
+        "q dq acceleration bias passive applied constraint pulled actuators mass armature ranges shown",
+    ),
+    # what a tick computes
+    ("reals", 0, "torque tau_cmd tau load wrench"),
+    ("word", 0, "stride pulls is_misjudged has_e1"),
+    ("real", 0, "d_bs d_se d_ew d_wf straight on_axis mass_damping stiffness_damping e1"),
+    ("real", AXES, "stiffness most"),
+    ("real", 3 * AXES, "points"),
+)
+_TYPES: dict[str, Any] = {"words": _POINTER, "reals": _POINTER, "word": _WORD, "real": _REAL}
+_WORDS = "SEQ TIME FLAGS MODE ORDER PROGRESS REMAINING E1 STATUS TURN"
+_SLICES = "Q Q_CMD DQ TAU TAU_EXT TAU_CMD POSE WRENCH"
+
+
+class _Memory(ctypes.Structure):
+    """`struct tick` of native.c."""
+
+    _fields_ = tuple(
+        (name, _TYPES[kind] * size if size else _TYPES[kind])
+        for kind, size, names in STRUCT
+        for name in names.split()
+    )
+
+
+def _header() -> str:
+    """Constants and `struct tick` for native.c."""
+    constants = {
+        "AXES": AXES,
+        "LOADED": LOADED,
+        "WAKE": WAKE,
+        "ASK": ASK,
+        "SLOTS": SLOTS,
+        "TICK_NS": TICK_NS,
+        "HEADER": HeaderWords.SECTION.start,
+        "NEWEST": HeaderWords.NEWEST,
+        "WAKE_AT": HeaderWords.WAKE,
+        "STATES": StateWords.SECTION.start,
+        "SIZE": StateWords.SIZE,
+        **{name: getattr(StateWords, name) for name in _WORDS.split()},
+        **{name: getattr(StateWords, name).start for name in _SLICES.split()},
+    }
+    types = {"words": "word *", "reals": "double *", "word": "word ", "real": "double "}
+    members = [
+        f"    {types[kind]}{name}{f'[{size}]' if size else ''};"
+        for kind, size, names in STRUCT
+        for name in names.split()
+    ]
+    lines = ["#include <stdint.h>", "typedef int64_t word;"]
+    lines += [f"enum {{ {name} = {value} }};" for name, value in constants.items()]
+    return "\n".join([*lines, "struct tick {", *members, "};", ""])
+
+
+@functools.cache
+def tick_library() -> ctypes.CDLL:
+    """Load the functions.
+
+    Raises:
+        Unavailable: this system is not supported, or has no compiler.
+    """
+    made = compiled_library("tick", _header().encode() + _SOURCE.read_bytes(), holds_gil=True)
+    made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = made.ht_publish.restype = _WORD
+    made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
+    made.ht_command.restype = None
+    made.ht_strained.argtypes = (_POINTER, _WORD)
+    made.ht_publish.argtypes = (_POINTER, _WORD, _WORD, _WORD, _WORD, _REAL, _REAL)
+    if made.ht_size() != ctypes.sizeof(_Memory):
+        raise Unavailable(f"`struct tick` must have {ctypes.sizeof(_Memory)} bytes, got {made.ht_size()}")
+    return made
+
+
+class NativeTick:
+    """The arithmetic of the ticks of one plant.
+
+    Args:
+        robot: the robot.
+        shared: where the states are published.
+        on_axis: below this an elbow lies on its axis [m].
+        straight: closer to the straight arm than this the arm angle is asked for [rad].
+        ranges: of the drives' supervision, see `DriveMonitor`; None: it is off.
+        arrays: vectors of the members of `struct tick` that are pointers; they stay where they are.
+
+    Raises:
+        Unavailable: this system is not supported, or has no compiler.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        shared: SharedState,
+        *,
+        on_axis: float,
+        straight: float,
+        ranges: Array | None,
+        **arrays: Array,
+    ) -> None:
+        library = tick_library()
+        self._command, self._sense = library.ht_command, library.ht_sense
+        self._strained, self._publish = library.ht_strained, library.ht_publish
+        self._memory = memory = _Memory()
+        self._at = ctypes.addressof(memory)
+        self._kept = (shared, ranges, arrays)
+        memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
+        for name, values in arrays.items():
+            setattr(memory, name, values.ctypes.data)
+        memory.pulls = arrays["pulled"].size
+        if ranges is not None:
+            memory.ranges = ranges.ctypes.data
+        for name in ("d_bs", "d_se", "d_ew", "d_wf"):
+            setattr(memory, name, getattr(robot, name))
+        memory.straight, memory.on_axis = straight, on_axis
+        memory.mass_damping, memory.stiffness_damping = MASS_DAMPING, STIFFNESS_DAMPING
+        memory.stiffness[:], memory.most[:] = STIFFNESS.tolist(), robot.tau_max.tolist()
+        self._points = np.frombuffer(memory.points).reshape(3, AXES)
+
+    def believe(self, mass: Array, bias: Array, *, is_misjudged: bool) -> None:
+        """Set where the controller's model is: inertia matrix of shape (7, 7), and its torques of shape (7,)."""
+        memory, self._model = self._memory, (mass, bias)
+        memory.mass, memory.stride, memory.bias = mass.ctypes.data, mass.strides[0] // 8, bias.ctypes.data
+        memory.is_misjudged = is_misjudged
+
+    def command(self, before: Array, now: Array, after: Array) -> None:
+        """Drive the motors towards set-points of shape (7,) [rad] of the last, this and the next tick."""
+        points = self._points
+        points[0], points[1], points[2] = before, now, after
+        self._command(self._at)
+
+    def sense(self) -> bool:
+        """Torques at the sensors and external load, after the dynamics; returns whether there is a load."""
+        return bool(self._sense(self._at))
+
+    def strained(self, after: Array, *, is_stiff: bool) -> bool:
+        """Whether a drive has to be looked at; `after`: set-point of the next tick, shape (7,) [rad]."""
+        self._points[2] = after
+        return bool(self._strained(self._at, is_stiff))
+
+    def publish(
+        self,
+        tick: int,
+        after: Array,
+        e1: Callable[[], float],
+        *,
+        words: tuple[int, int, int],
+        times: tuple[float, float],
+    ) -> bool:
+        """Publish the state of a tick.
+
+        Args:
+            tick: its number.
+            after: the set-point of the next tick, shape (7,) [rad].
+            e1: computes the arm angle [rad] where that is not simple.
+            words: flags, mode and order.
+            times: progress and remaining time.
+
+        Returns:
+            Whether a reader waits for it.
+        """
+        self._points[2] = after
+        done = self._publish(self._at, tick, *words, *times)
+        if done == ASK:
+            self._memory.e1, self._memory.has_e1 = e1(), 1
+            done = self._publish(self._at, tick, *words, *times)
+        return bool(done == WAKE)

@@ -1,0 +1,144 @@
+"""Steps: how the arm yields to a weight, and what it does where it touches something."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm import model
+from heptarm.arm.arm import Arm
+from heptarm.sim.control.laws import STIFFNESS
+from heptarm.skills.touch import touch
+from heptarm.testing.commissioning.person import Person, PersonTask, expect
+from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, near, step
+from heptarm.testing.measure import watch
+from heptarm.testing.stage import DEEPEST
+from heptarm.values.arrays import Array
+from heptarm.values.motion.line import lin_rel
+from heptarm.when import force
+
+#: Weight that the person hangs on the flange, and its mass [N, kg].
+WEIGHT, MASS = 9.81, 1.0
+#: Force at which a motion onto the block ends [N], its speed [m/s], and the distance that it has before [m].
+_FORCE, _SLOWLY, _ABOVE = 15.0, 0.01, 0.01
+#: Times for which the arm is watched under a weight, and after its end [s].
+_HANGING, _SWINGING = 3.0, 1.0
+_UP = 0.05
+
+
+def hang(arm: Arm, person: Person, before: Array) -> None:
+    """Let a person hang the weight on the flange.
+
+    Args:
+        arm: at rest.
+        person: hangs it.
+        before: external force without it, base axes, shape (3,) [N].
+
+    Raises:
+        Unfit: no force shows.
+    """
+    expect(
+        arm,
+        person,
+        PersonTask.HANG,
+        lambda s: before[2] - s.wrench.force[2] > 0.5 * WEIGHT,
+        "the weight's force",
+    )
+
+
+@step(
+    movement=Movement(
+        "Nothing but the approach",
+        "0 deg",
+        f"then the arm holds its position; hang {MASS:g} kg on the flange and drop it when you are asked to",
+    )
+)
+def stiffness(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Does the flange sink under a weight as far as the assumed stiffness of the axes says, and stay there?"""
+    rest = watch(arm, 0.5)
+    q = np.array([state.q for state in rest]).mean(axis=0)
+    height = float(np.mean([state.pose.z for state in rest]))
+    hang(arm, person, np.mean([state.wrench.force for state in rest], axis=0))
+    hanging = watch(arm, _HANGING)
+    sinks = [height - state.pose.z for state in hanging]
+    early, late = (
+        float(np.mean(sinks[len(sinks) // 3 : len(sinks) // 2])),
+        float(np.mean(sinks[-len(sinks) // 5 :])),
+    )
+    down = model.jacobian(arm.robot, q)[2]
+    expected = WEIGHT * float(np.sum(down**2 / STIFFNESS))
+    person.does(PersonTask.DROP)
+    arm.wait_until(lambda s: s.wrench.force[2] > -0.5 * WEIGHT, timeout=60.0)
+    swinging = watch(arm, _SWINGING)
+    above = max(state.pose.z for state in swinging) - height
+    return (
+        near("the measured flange sinks by", 1000 * late, 1000 * expected, 500 * expected, "mm"),
+        at_least("part of it that is left after two seconds", late / early if early else 0.0, 0.8),
+        at_most("without the weight it swings above its height by", above / expected, 0.5),
+        at_most(
+            "and comes back to it within", 1000 * abs(swinging[-1].pose.z - height), 100 * expected, "mm"
+        ),
+    )
+
+
+def _above_block(arm: Arm, person: Person) -> None:
+    """Bring the flange closely above the block."""
+    person.does(PersonTask.PLACE_BLOCK)
+    touch(arm, "-z", distance=DEEPEST, force=_FORCE, frame="base", speed_mps=0.02, retreat=_ABOVE)
+    arm.wait_for_rest()
+
+
+@step(
+    movement=Movement(
+        "The flange", f"down onto the block, by {DEEPEST:g} m at most, and up again", "20 mm/s"
+    ),
+    needs=("lin_rel",),
+)
+def stopping(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Does a force condition end a motion as soon as assumed, and does the arm brake within the motion's limits?"""
+    _above_block(arm, person)
+    down = lin_rel(z=-3 * _ABOVE, frame="base", speed_mps=_SLOWLY)
+    handle = arm.start(down, until=force > _FORCE)
+    states = tuple(handle.states())
+    result = handle.wait()
+    rest = arm.wait_for_rest()
+    down_to = rest.pose_cmd.z
+    beyond = [
+        state.pose_cmd.z - down_to for state in states if float(np.linalg.norm(state.wrench.force)) > _FORCE
+    ] or [rest.pose_cmd.z]
+    arm.move(lin_rel(z=_UP, frame="base", speed_mps=0.05))
+    return (
+        at_most(
+            f"largest force of a motion at {1000 * _SLOWLY:g} mm/s that ends at {_FORCE:g} N",
+            result.peak_force,
+            1.6 * _FORCE,
+            "N",
+        ),
+        at_most(
+            "the set-point goes on behind the contact by",
+            1000 * max(beyond, default=0.0),
+            1.0,
+            "mm",
+        ),
+        at_least("force that is left at rest", result.rest_force, 0.4 * _FORCE, "N"),
+    )
+
+
+@step(
+    movement=Movement(
+        "The flange", f"down onto the block, by {DEEPEST:g} m at most, and up again", "20 mm/s"
+    ),
+    needs=("lin_rel", "joint_impedance"),
+)
+def relaxing(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Does the arm, after a contact, go on without force at the position where it is?"""
+    _above_block(arm, person)
+    result = arm.move(
+        lin_rel(z=-3 * _ABOVE, frame="base", speed_mps=_SLOWLY), until=force > _FORCE, then="relax"
+    )
+    rest = arm.wait_for_rest()
+    apart = float(np.abs(rest.q_cmd - rest.q).max())
+    arm.move(lin_rel(z=_UP, frame="base", speed_mps=0.05))
+    return (
+        at_most("force that is left at rest", result.rest_force, 5.0, "N"),
+        at_most("set-point and measured position are apart by", 1000 * apart, 1.0, "mrad"),
+    )

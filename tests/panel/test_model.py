@@ -1,0 +1,423 @@
+"""What the panel does to an arm, without a browser: every action is seen by a second client."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.errors import CommandRejected, HeptarmError, LimitError, ModeConflict
+from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
+from heptarm.panel.model import PanelArm
+from heptarm.panel.process import PanelOptions, model_of
+from heptarm.values.state import State
+
+HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
+PATIENCE = 30.0
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PanelArm]:
+    options = PanelOptions(recordings=tmp_path_factory.mktemp("recordings"))
+    with ha.connect("sim://iiwa14?speed=2", control=False, watchdog=5.0, timeout=PATIENCE) as arm:
+        model = model_of(arm, "sim://iiwa14?speed=2", options)
+        yield model
+        model.close()
+
+
+@pytest.fixture(scope="module")
+def observer(started: PanelArm) -> Iterator[ha.Arm]:
+    with ha.connect(address(started), control=False, watchdog=5.0, timeout=PATIENCE) as arm:
+        yield arm
+
+
+@pytest.fixture
+def model(started: PanelArm) -> Iterator[PanelArm]:
+    """The panel's arm in control and at home, with an empty list of points."""
+    started.operate("clear")
+    if not started.arm.in_control:
+        started.take_control()
+    started.recover()
+    until(lambda: not started.poll().is_jogging)
+    if abs(started.arm.state.q - HOME).max() > 1e-3:
+        started.arm.move(ha.ptp(HOME))
+    for point in tuple(started.points):
+        started.points.delete(point.name)
+    yield started
+
+
+def address(model: PanelArm) -> str:
+    cabinet = model.arm.connection.cabinet
+    assert cabinet is not None
+    return f"sim://{cabinet.host}:{cabinet.port}"
+
+
+def until(condition: Callable[[], object], *, meanwhile: Callable[[], object] = lambda: None) -> None:
+    """Wait until a condition holds, doing something ten times a second as a held button does."""
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "it never happened"
+        meanwhile()
+        time.sleep(0.05)
+
+
+def held(model: PanelArm, jog: Jog, condition: Callable[[], object], owner: object = None) -> None:
+    until(condition, meanwhile=lambda: model.jog(jog, owner))
+
+
+def at_rest(model: PanelArm, observer: ha.Arm) -> State:
+    until(lambda: not model.poll().is_jogging)
+    return observer.wait_for_rest(timeout=PATIENCE)
+
+
+# ------------------------------------------------------------------------------------------- looking
+
+
+def test_it_shows_what_a_second_client_sees(model: PanelArm, observer: ha.Arm) -> None:
+    until(lambda: model.poll().is_connected)
+    readout = model.poll()
+    assert readout.state is not None and readout.tcp is not None
+    assert readout.state.q == pytest.approx(observer.state.q, abs=1e-4)
+    assert readout.tcp.distance_to(observer.state.pose) < 1e-3
+    assert readout.is_virtual and readout.in_control and readout.stands == ()
+    assert set(readout.state.io) == set(observer.io)
+
+
+def test_the_history_of_the_force_has_a_push(model: PanelArm) -> None:
+    model.operate("push 0 0 -25 2")
+    until(lambda: model.forces[1].size and model.forces[1].max() > 15.0, meanwhile=model.poll)
+    times, forces = model.forces
+    assert (
+        times.shape == forces.shape and (np.diff(times) >= 0).all() and times[0] >= -10.5 and times[-1] <= 0.0
+    )
+    model.operate("push 0 0 0 0.01")
+
+
+def test_it_takes_and_gives_control(model: PanelArm, observer: ha.Arm) -> None:
+    name = model.arm.connection.options.name
+    until(lambda: observer.controller == name)
+    model.release_control()
+    until(lambda: observer.controller == "")
+    assert not model.poll().in_control
+    model.take_control()
+    until(lambda: observer.controller == name)
+
+
+# ------------------------------------------------------------------------------------------- jogging
+
+
+def test_a_joint_turns_while_its_button_is_held_and_no_longer(model: PanelArm, observer: ha.Arm) -> None:
+    velocity = np.zeros(7)
+    velocity[3] = 0.2
+    before = observer.state.q
+    held(model, JointJog(velocity), lambda: observer.state.q[3] > before[3] + 0.05)
+    assert model.poll().is_jogging
+    rest = at_rest(model, observer)  # nobody released it: silence is enough
+    assert rest.q[3] > before[3] + 0.05
+    assert np.delete(rest.q - before, 3) == pytest.approx(np.zeros(6), abs=2e-3)
+    assert len(model.path) > 1
+
+
+@pytest.mark.parametrize(("frame", "axis"), [("base", (0, 0, 1)), ("tool", (0, 0, 1))])
+def test_the_tcp_moves_along_the_axes_of_a_frame(
+    model: PanelArm, observer: ha.Arm, frame: str, axis: tuple[int, ...]
+) -> None:
+    before = observer.state.pose
+    along = (before.rotation if frame == "tool" else np.eye(3)) @ np.array(axis)
+    jog = TwistJog(np.array((*(-0.1 * np.array(axis)), 0, 0, 0)), frame)
+    held(model, jog, lambda: (observer.state.pose.xyz - before.xyz) @ along < -0.02)
+    model.end_jog()
+    after = at_rest(model, observer).pose
+    moved = after.xyz - before.xyz
+    assert np.linalg.norm(moved - along * (moved @ along)) < 2e-3 and after.angle_to(before) < 0.01
+
+
+def test_the_tcp_turns_about_its_own_origin(model: PanelArm, observer: ha.Arm) -> None:
+    before = observer.state.pose
+    held(
+        model,
+        TwistJog(np.array((0, 0, 0, 0, 0, 0.3)), "tool"),
+        lambda: observer.state.pose.angle_to(before) > 0.1,
+    )
+    model.end_jog()
+    after = at_rest(model, observer).pose
+    assert after.distance_to(before) < 3e-3
+    turned = before.rotation.T @ after.rotation  # about z of the tool
+    assert turned[2, 2] == pytest.approx(1.0, abs=1e-3) and turned[1, 0] > 0.05
+
+
+def test_it_goes_to_a_pose_and_stays_there(model: PanelArm, observer: ha.Arm) -> None:
+    goal = observer.state.pose.shifted(0.02, 0.03, -0.02).rotated(a=0.1)
+    held(
+        model,
+        PoseJog(goal, 0.5),
+        lambda: observer.state.pose.distance_to(goal) < 1e-3 and observer.state.pose.angle_to(goal) < 5e-3,
+    )
+    assert at_rest(model, observer).pose.distance_to(goal) < 2e-3
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A button counts as held for so long after each message that a busy machine does not release it."""
+    monkeypatch.setattr("heptarm.panel.jog.HOLD", 5.0)
+
+
+@pytest.mark.usefixtures("patient")
+def test_only_one_page_jogs(model: PanelArm, observer: ha.Arm) -> None:
+    jog = JointJog(np.array((0.1, 0, 0, 0, 0, 0, 0)))
+    held(model, jog, lambda: model.poll().is_jogging, owner=1)
+    with pytest.raises(CommandRejected, match="another page is moving the arm"):
+        model.jog(jog, 2)
+    model.end_jog(2)  # closing the other page ends nothing
+    model.jog(jog, 1)
+    model.end_jog(1)
+    at_rest(model, observer)
+
+
+@pytest.mark.usefixtures("patient")
+def test_jogging_without_control_is_one_message_for_a_press(model: PanelArm) -> None:
+    model.release_control()
+    jog = JointJog(np.array((0.1, 0, 0, 0, 0, 0, 0)))
+    held(
+        model,
+        jog,
+        lambda: (m := model.poll().message) is not None and "control" in m.what and m.level == "error",
+    )
+    first = model.poll().message
+    for _ in range(5):
+        model.jog(jog)
+        time.sleep(0.05)
+    assert model.poll().message is first
+    assert not model.poll().is_jogging
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: JointJog(np.array((0.6, 0, 0, 0, 0, 0, 0))),
+        lambda: TwistJog(np.array((0.3, 0, 0, 0, 0, 0))),
+        lambda: TwistJog(np.array((0, 0, 0, 0.7, 0, 0))),
+    ],
+)
+def test_what_is_too_fast_is_refused(make: Callable[[], Jog]) -> None:
+    with pytest.raises(LimitError, match=r"must be in \[-0\.\d+, 0\.\d+\]"):
+        make()
+
+
+# ------------------------------------------------------------------------------------------ stopping
+
+
+def test_stop_works_without_control(model: PanelArm, observer: ha.Arm) -> None:
+    model.release_control()
+    with ha.connect(address(model), name="program", watchdog=5.0, timeout=PATIENCE) as program:
+        handle = program.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.05))
+        observer.wait_until(lambda state: state.q[0] > 0.02, timeout=PATIENCE)
+        model.stop()
+        with pytest.raises(HeptarmError):
+            handle.wait(timeout=PATIENCE)
+        assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 1.0
+    last = model.poll().last_stop
+    assert last is not None and "panel" in last.what
+
+
+@pytest.mark.usefixtures("patient")
+def test_stop_ends_jogging_although_the_button_is_held(model: PanelArm, observer: ha.Arm) -> None:
+    jog = JointJog(np.array((0.2, 0, 0, 0, 0, 0, 0)))
+    held(model, jog, lambda: observer.state.q[0] > 0.02, "somebody")
+    model.stop()
+    for _ in range(8):
+        model.jog(jog, "somebody")
+        time.sleep(0.05)
+    until(lambda: not model.poll().is_jogging, meanwhile=lambda: model.jog(jog, "somebody"))
+    assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 1.0
+
+
+def test_an_emergency_stop_is_explained_and_recovered(model: PanelArm, observer: ha.Arm) -> None:
+    model.operate("emergency_stop")
+    until(lambda: model.poll().stands)
+    (why, *_) = model.poll().stands
+    assert why.what == "Emergency stop" and "Clear" in why.remedy
+    last = model.poll().last_stop
+    assert last is not None and last.what.startswith("Emergency stop")
+    model.operate("clear")
+    until(lambda: all(one.what != "Emergency stop" for one in model.poll().stands))
+    model.resume()
+    model.recover()
+    until(lambda: model.poll().stands == ())
+    assert observer.wait_until(lambda state: state.safety.ready_to_move, timeout=PATIENCE)
+    assert model.poll().last_stop is not None
+
+
+def test_the_operation_mode_and_the_enabling_switch(model: PanelArm, observer: ha.Arm) -> None:
+    model.operate("t1")
+    observer.wait_until(lambda state: state.safety.mode.value == "t1", timeout=PATIENCE)
+    model.operate("release")
+    until(lambda: any("Enabling" in one.what and "Enable" in one.remedy for one in model.poll().stands))
+    model.operate("enable")
+    observer.wait_until(lambda state: state.safety.enabling_switch, timeout=PATIENCE)
+    model.operate("aut")
+    observer.wait_until(lambda state: state.safety.mode.value == "aut", timeout=PATIENCE)
+
+
+# -------------------------------------------------------------------------------------------- points
+
+
+def test_points_are_taught_and_visited(model: PanelArm, observer: ha.Arm) -> None:
+    first = model.teach()
+    model.arm.move(ha.ptp(HOME + 0.1))
+    second = model.teach("above", straight=True)
+    assert model.points.names == ("P1", "above") and first.q == pytest.approx(HOME, abs=1e-3)
+    model.run("P1", speed=0.5)
+    assert model.poll().running == "P1" and model.poll().target == first.pose
+    with pytest.raises(ModeConflict):
+        model.run("above")
+    observer.wait_until(lambda state: abs(state.q - first.q).max() < 1e-3, timeout=PATIENCE)
+    until(lambda: model.poll().running == "")
+    model.run(speed=0.5)
+    observer.wait_until(lambda state: abs(state.q - second.q).max() < 1e-3, timeout=PATIENCE)
+    until(lambda: (m := model.poll().message) is not None and m.what == "Arrived at above")
+
+
+def test_a_run_can_be_cancelled(model: PanelArm, observer: ha.Arm) -> None:
+    model.arm.move(ha.ptp(HOME + 0.4))
+    model.teach()
+    model.arm.move(ha.ptp(HOME))
+    model.run(speed=0.05)
+    observer.wait_until(lambda state: state.q[0] > 0.01, timeout=PATIENCE)
+    model.end_run()
+    assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 0.35
+
+
+def test_the_list_is_edited_and_survives_a_file(model: PanelArm) -> None:
+    for name in ("a", "b", "c"):
+        model.teach(name)
+    points = model.points
+    points.shift("c", -2)
+    points.rename("a", "first")
+    points.delete("b")
+    points.approach("first", straight=True)
+    assert points.names == ("c", "first")
+    text = points.to_json()
+    points.delete("c")
+    points.load(text)
+    assert points.names == ("c", "first") and [point.straight for point in points] == [False, True]
+    assert next(iter(points)).q == pytest.approx(HOME, abs=1e-3)
+    for wrong in (
+        "",
+        "[]",
+        '{"kind": "heptarm points"}',
+        text.replace("iiwa14", "iiwa7"),
+        text.replace('"ptp"', "7"),
+    ):
+        with pytest.raises(CommandRejected, match="no taught points"):
+            points.load(wrong)
+    content = json.loads(text)
+    content["points"][0]["q"][0] = 9.0
+    with pytest.raises(LimitError, match="A1 must be in"):
+        points.load(json.dumps(content))
+    assert points.names == ("c", "first")
+    for name, why in (("c", "named 'c' already"), ("", "printable"), ("x" * 65, "printable")):
+        with pytest.raises(CommandRejected, match=why):
+            points.rename("first", name)
+    with pytest.raises(CommandRejected, match="no point is named"):
+        model.run("nowhere")
+
+
+def test_points_of_another_tool_are_refused(model: PanelArm) -> None:
+    model.teach("bare")
+    with model.arm.tool(ha.Tool("stick", mass=0.1, tcp=ha.Pose.at(z=0.1))):
+        until(lambda: model.arm.state.tool == "stick")
+        with pytest.raises(CommandRejected, match="taught with no tool, attached is stick"):
+            model.run("bare")
+
+
+# --------------------------------------------------------------------------------- the other actions
+
+
+def test_override_outputs_and_tools(model: PanelArm, observer: ha.Arm) -> None:
+    model.set_override(0.4)
+    observer.wait_until(
+        lambda state: state.motion is not None and state.motion.override == 0.4, timeout=PATIENCE
+    )
+    model.set_override(1.0)
+    (name, *_) = [
+        one for one, signal in observer.io.signals.items() if signal.is_output and signal.kind == "boolean"
+    ]
+    wanted = not observer.io[name]
+    model.set_output(name, wanted)
+    observer.io.wait(name, wanted, timeout=PATIENCE)
+    model.arm.attach_tool(ha.Tool("probe", mass=0.2, tcp=ha.Pose.at(z=0.15)))
+    model.attach_tool("")
+    observer.wait_until(lambda state: state.tool == "", timeout=PATIENCE)
+    model.attach_tool("probe")
+    observer.wait_until(lambda state: state.tool == "probe", timeout=PATIENCE)
+    model.attach_tool("")
+
+
+def test_a_recording_has_states(model: PanelArm) -> None:
+    pytest.importorskip("mcap")
+    path = model.start_recording()
+    assert model.poll().recording == path.name
+    with pytest.raises(CommandRejected, match="a recording runs"):
+        model.start_recording()
+    seen = model.arm.state.stamp
+    model.arm.wait_until(lambda state: state.stamp > seen + 100_000_000, timeout=PATIENCE)
+    model.stop_recording()
+    assert model.poll().recording == "" and len(ha.load(path)) > 1
+
+
+def test_a_panel_that_only_shows_refuses_all_but_stop(model: PanelArm) -> None:
+    model.teach("a")
+    halted: list[bool] = []
+    shows = PanelArm(model.arm, halt=lambda: halted.append(True), operate=lambda _: "", may_control=False)
+    actions: tuple[Callable[[], object], ...] = (
+        shows.take_control,
+        shows.recover,
+        shows.pause,
+        shows.resume,
+        shows.teach,
+        shows.run,
+        shows.start_recording,
+        lambda: shows.set_override(0.5),
+        lambda: shows.set_output("LEDBlue", True),
+        lambda: shows.attach_tool(""),
+        lambda: shows.operate("emergency_stop"),
+        lambda: shows.jog(JointJog(np.zeros(7))),
+    )
+    for action in actions:
+        with pytest.raises(CommandRejected, match="only shows"):
+            action()
+    shows.stop()
+    assert halted == [True] and not shows.has_operator
+    shows.close()
+
+
+@pytest.mark.parametrize(
+    ("host", "words", "may"),
+    [
+        ("127.0.0.1", {}, True),
+        ("localhost", {}, True),
+        ("::1", {}, True),
+        ("127.0.0.1", {"read_only": True}, False),
+        ("0.0.0.0", {}, False),
+        ("192.168.1.5", {}, False),
+        ("robot-pc", {}, False),
+        ("0.0.0.0", {"allow_control": True}, True),
+    ],
+)
+def test_who_may_control(host: str, words: dict[str, bool], may: bool) -> None:
+    assert PanelOptions(host=host, **words).may_control is may
+
+
+def test_a_recording_that_cannot_be_written_is_refused(model: PanelArm, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    lost = PanelArm(model.arm, halt=lambda: None, folder=tmp_path / "taken")
+    with pytest.raises(CommandRejected):
+        lost.start_recording()
+    assert lost.poll().recording == ""
+    lost.close()

@@ -1,0 +1,27 @@
+"""What a user of reinforcement learning makes refuses what it cannot mean, as all other values do."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("gymnasium")
+
+from heptarm.rl.deploy import DeploySettings, circle
+from heptarm.rl.env import ReachEnv
+from heptarm.rl.pilot import PolicyGuard
+from heptarm.rl.policy import shipped
+from heptarm.rl.sim.randomisation import Randomisation
+from heptarm.rl.task import ReachTask
+from tests.bad_values import Call, call_of, wrong
+
+MADE = (ReachTask, PolicyGuard, DeploySettings, Randomisation, ReachEnv, circle, shipped)
+
+
+CALLS = [call_of(made.__name__, made) for made in MADE]
+
+
+@pytest.mark.parametrize("call", CALLS, ids=[call.name for call in CALLS])
+def test_what_a_parameter_cannot_mean_is_refused(call: Call) -> None:
+    call({})
+    found = list(wrong(call))
+    assert not found, "\n".join(found)

@@ -1,0 +1,73 @@
+"""The arithmetic of a tick in C does what the one in Python does: two plants have the same courses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from heptarm.io.compiled import SWITCH, Unavailable
+from heptarm.sim.planning.native_inverse import inverse_library
+from heptarm.sim.plant.native import tick_library
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import StateWords
+from tests.sim.courses import COURSES
+from tests.sim.driving import READY
+
+try:
+    tick_library()
+except Unavailable as reason:
+    pytest.skip(f"no compiled part: {reason}", allow_module_level=True)
+
+#: Words of a state that are integers.
+WHOLE = [
+    StateWords.SEQ,
+    StateWords.TIME,
+    StateWords.FLAGS,
+    StateWords.MODE,
+    StateWords.ORDER,
+    StateWords.STATUS,
+    StateWords.TURN,
+]
+#: Sums of products are rounded otherwise than numpy's; the arm's feedback keeps that from growing. A last digit of a
+#: set-point is a millionth of an acceleration [rad, rad/s; Nm, N].
+SAME, SAME_LOAD = 2e-12, 1e-9
+
+
+@contextmanager
+def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Without the compiled parts."""
+    try:
+        with monkeypatch.context() as patched:
+            patched.setenv(SWITCH, "1")
+            tick_library.cache_clear()
+            inverse_library.cache_clear()
+            yield
+    finally:
+        tick_library.cache_clear()
+        inverse_library.cache_clear()
+
+
+@pytest.mark.parametrize("name", COURSES)
+def test_every_state_of_a_course_is_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = COURSES[name].record()
+    with in_python(monkeypatch):
+        expected = COURSES[name].record()
+    assert (found[:, WHOLE].view(np.int64) == expected[:, WHOLE].view(np.int64)).all()
+    off = np.abs(np.nan_to_num((found - expected) / np.maximum(1.0, np.abs(expected))))
+    torques = [StateWords.TAU, StateWords.TAU_EXT, StateWords.TAU_CMD, StateWords.WRENCH]
+    assert max(off[:, words].max() for words in torques) < SAME_LOAD
+    for words in torques:
+        off[:, words] = 0.0
+    assert off.max() < SAME
+    assert (np.isnan(found) == np.isnan(expected)).all()
+    assert np.ptp(found[:, StateWords.Q], axis=0).max() > 1e-3  # something has moved
+
+
+def test_a_robot_that_cannot_compile_computes_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    with in_python(monkeypatch):
+        plant = Plant("iiwa7", q=READY)
+        plant.step(5)
+    assert plant.shared.read(5) is not None
