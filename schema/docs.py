@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import key_vectors
 from spec import SIZES, Field, Spec
 
@@ -18,6 +20,19 @@ def _table(fields: list[Field]) -> list[str]:
             f"| `{one.name}` | `{one.type.text}` | {one.unit} | {one.range_text} | {note.lstrip('; ')} |"
         )
     return [*lines, ""]
+
+
+def _linked(text: str, page: str, spec: Spec) -> str:
+    """The text of one of the protocol's pages with each link to a heading (`#ping`) to the page where that is."""
+    pages = {name.lower(): "protocol-messages.md" for name in spec.messages}
+    for kinds in (spec.structs, spec.unions, spec.enums):
+        pages |= {name.lower(): "protocol-types.md" for name in kinds}
+
+    def target(found: re.Match[str]) -> str:
+        place = pages.get(found[1], "protocol.md")
+        return f"](#{found[1]})" if place == page else f"]({place}#{found[1]})"
+
+    return re.sub(r"\]\(#([\w-]+)\)", target, text)
 
 
 def protocol(spec: Spec) -> str:
@@ -56,9 +71,9 @@ def protocol(spec: Spec) -> str:
     ]
     for message in spec.messages.values():
         lines.append(
-            f"| {message.id} | [{message.name}](protocol-messages.md#{message.name.lower()}) | {message.source} | {message.kind} | {message.role} | {message.doc} |"
+            f"| {message.id} | [{message.name}](#{message.name.lower()}) | {message.source} | {message.kind} | {message.role} | {message.doc} |"
         )
-    return "\n".join([*lines, ""])
+    return _linked("\n".join([*lines, ""]), "protocol.md", spec)
 
 
 def messages(spec: Spec) -> str:
@@ -79,12 +94,11 @@ def messages(spec: Spec) -> str:
                 "|---|---|",
             ]
             lines += [
-                f"| {number} | `{bit}`: [{kind}](protocol-types.md#{kind.lower()}) |"
-                for bit, number, kind in message.groups
+                f"| {number} | `{bit}`: [{kind}](#{kind.lower()}) |" for bit, number, kind in message.groups
             ] + [""]
         else:
             lines += _table(message.fields)
-    return "\n".join(lines)
+    return _linked("\n".join(lines), "protocol-messages.md", spec)
 
 
 def types(spec: Spec) -> str:
@@ -116,7 +130,7 @@ def types(spec: Spec) -> str:
             f"| {value['bit' if enum.flags else 'value']} | {value['name']} | {value.get('doc', '')} |"
             for value in enum.values
         ] + [""]
-    return "\n".join(lines)
+    return _linked("\n".join(lines), "protocol-types.md", spec)
 
 
 def errors(spec: Spec) -> str:

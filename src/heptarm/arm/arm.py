@@ -747,23 +747,24 @@ class Arm:
         Args:
             kind: the quantity commanded on top of a hold: joint "position", "torque" (in joint impedance), "wrench"
                 (in Cartesian impedance), "pose" (Sunrise 2.x); or "monitor", which runs beside other motions.
-            **settings: period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
-                multiplier: answer every n-th message; 1.
-                mode: control mode of the hold; None: that of `using`, otherwise position.
-                law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in
-                    every cycle; a law of `heptarm.law`, `heptarm.law_from` or `heptarm.laws` runs there without Python.
-                    None: `Fri.command`.
-                params: numbers and arrays by name for the law, which can change while it runs.
-                memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
-                policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
-                limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
-                pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
-                io: up to ten names of signals, as in `arm.io`, that the session transmits: `state.io`, `Fri.output`.
-                version: FRI release of the cabinet such as "1.15"; None: detected from the first message.
-                host: address at which the cabinet reaches this machine; empty: that of this connection.
-                port: own UDP port; 0: any free one; None: the first free one of FRI's.
-                realtime: request real-time priority and locked memory. cpu: processor of the loop; None: any.
-                history: messages that are kept. timeout: longest time until the session is open [s].
+            **settings: as follows.
+            period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
+            multiplier: answer every n-th message; 1.
+            mode: control mode of the hold; None: that of `using`, otherwise position.
+            law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in
+                every cycle; a law of `heptarm.law`, `heptarm.law_from` or `heptarm.laws` runs there without Python.
+                None: `Fri.command`.
+            params: numbers and arrays by name for the law, which can change while it runs.
+            memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
+            policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
+            limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
+            pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
+            io: up to ten names of signals, as in `arm.io`, that the session transmits: `state.io`, `Fri.output`.
+            version: FRI release of the cabinet such as "1.15"; None: detected from the first message.
+            host: address at which the cabinet reaches this machine; empty: that of this connection.
+            port: own UDP port; 0: any free one; None: the first free one of FRI's.
+            realtime: request real-time priority and locked memory. cpu: processor of the loop; None: any.
+            history: messages that are kept. timeout: longest time until the session is open [s].
 
         Raises:
             CommandRejected: this cabinet does not support the session; ModeConflict: not in this control mode.
