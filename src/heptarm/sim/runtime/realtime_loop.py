@@ -114,7 +114,7 @@ def shorten_timer_slack() -> str:
 
 
 def share_memory_pools() -> None:
-    """Let the threads of this process share two pools of memory, where its C library is glibc.
+    """Let the threads of this process use two common pools of memory, where its C library is glibc.
 
     It would give each new thread one of up to eight pools a processor, and every pool keeps what it once grew to: with
     clients that come and go, the process would grow for an hour.

@@ -1,4 +1,4 @@
-"""Steps: how the arm yields to a weight, and what it does where it touches something."""
+"""Steps: how far the arm gives way to a weight, and what it does where it touches something."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.motion.line import lin_rel
 from heptarm.when import force
 
-#: Weight that the person hangs on the flange, and its mass [N, kg].
+#: Weight that the person attaches to the flange, and its mass [N, kg].
 WEIGHT, MASS = 9.81, 1.0
 #: Force at which a motion onto the block ends [N], its speed [m/s], and the distance that it has before [m].
 _FORCE, _SLOWLY, _ABOVE = 15.0, 0.01, 0.01
@@ -53,7 +53,7 @@ def hang(arm: Arm, person: Person, before: Array) -> None:
     )
 )
 def stiffness(arm: Arm, person: Person) -> tuple[Comparison, ...]:
-    """Does the flange sink under a weight as far as the assumed stiffness of the axes says, and stay there?"""
+    """Does the flange sink under a weight as far as the assumed stiffness of the axes gives, and stay there?"""
     rest = watch(arm, 0.5)
     q = np.array([state.q for state in rest]).mean(axis=0)
     height = float(np.mean([state.pose.z for state in rest]))
