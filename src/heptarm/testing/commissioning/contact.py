@@ -1,4 +1,4 @@
-"""Steps: how far the arm gives way to a weight, and what it does where it touches something."""
+"""Steps: how far the arm deforms under a weight, and what it does where it touches something."""
 
 from __future__ import annotations
 
