@@ -99,6 +99,16 @@ def test_no_more_than_twenty_files_are_kept(
     assert len(names) == black_box.MOST_FILES and names[0].startswith("20200101-000011")
 
 
+def test_two_connections_that_see_the_same_stop_have_files_of_their_own(peer: Peer, folder: Path) -> None:
+    other = Peer()
+    with peer.arm() as left, other.arm() as right:
+        boxes = [arm.connection.capture("stop") for arm in (left, right)]
+        assert None not in [box and box() for box in boxes]
+    other.close()
+    numbers = {one.name.split("-")[4] for one in folder.iterdir()}  # date, time, millisecond, process, number
+    assert len(numbers) == 2
+
+
 @pytest.mark.parametrize("by", ["option", "environment"])
 def test_it_can_be_switched_off(peer: Peer, folder: Path, monkeypatch: pytest.MonkeyPatch, by: str) -> None:
     if by == "environment":

@@ -12,6 +12,7 @@ import os
 import re
 import threading
 import time
+from itertools import count
 from pathlib import Path
 
 from heptarm.errors import HeptarmError, MissingExtra
@@ -33,6 +34,7 @@ _SAME = 1.0
 _PATIENCE = 30.0
 #: States that are encoded at once.
 _BATCH = 64
+_numbers = count(1)
 
 
 def folder() -> Path | None:
@@ -120,7 +122,8 @@ class BlackBox:
                 return self._last
             stamp = time.strftime("%Y%m%d-%H%M%S")
             name = re.sub(r"[^a-z0-9]+", "-", reason.lower()).strip("-")[:40]
-            path = where / f"{stamp}-{now // 1_000_000 % 1000:03d}-{os.getpid()}-{name}.mcap"
+            number = f"{os.getpid()}-{next(_numbers)}"  # connections of a process may see the same stop
+            path = where / f"{stamp}-{now // 1_000_000 % 1000:03d}-{number}-{name}.mcap"
             self._last = file = BlackBoxFile(path, now)
         work = (path, file, reason, self._source.journal.sessions)
         try:
