@@ -131,7 +131,8 @@ def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
     control = fresh(bare).groups.mode
     assert control is not None
     assert control.frame == "tcp"
-    assert bare.tools["gripper"] == KnownTool("gripper", 2.0, GRIPPER.frames)
+    known = KnownTool("gripper", 2.0, GRIPPER.frames, com=GRIPPER.com, inertia=GRIPPER.inertia)
+    assert bare.tools["gripper"] == known
 
 
 def test_the_wrench_is_reported_where_and_as_one_likes() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
 import numpy as np
 import pytest
 
@@ -25,9 +23,9 @@ def test_forward_is_that_of_denavit_hartenberg(robot: RobotModel) -> None:
 
 def test_forward_is_that_of_mujoco(robot: RobotModel) -> None:
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(
-        files("heptarm.sim").joinpath("models", f"{robot.name}.xml").read_text()
-    )
+    from heptarm.sim.plant.world import specification
+
+    model = specification(robot.name).compile()
     data = mujoco.MjData(model)
     site = data.site("flange")
     j = np.zeros((6, model.nv))
@@ -91,9 +89,9 @@ def test_jacobian_of_a_tool_point(robot: RobotModel) -> None:
 
 def test_links_are_those_of_mujoco(robot: RobotModel) -> None:
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(
-        files("heptarm.sim").joinpath("models", f"{robot.name}.xml").read_text()
-    )
+    from heptarm.sim.plant.world import specification
+
+    model = specification(robot.name).compile()
     data = mujoco.MjData(model)
     j = np.zeros((6, model.nv))
     rng = np.random.default_rng(6)

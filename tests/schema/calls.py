@@ -112,7 +112,7 @@ CALLS: dict[str, Call] = {
     "Hello.name": Call(_connected(name=...), "name"),
     "Subscribe.rate": Call(lambda arm, v: arm.subscribe(rate=v), "rate"),
     "Run.items": Call(lambda arm, v: arm.start([ha.hold(1.0)] * len(v)), "motion"),
-    "Ptp.q": Call(_moving(ha.ptp), "q", 7),
+    "Ptp.q": Call(_moving(ha.ptp), "q", 7, but=("NaN",)),  # keeps a joint
     "JointDynamics.velocity": Call(_moving(lambda v: ha.ptp(HOME, speed=v)), "speed", 7),
     "JointDynamics.acceleration": Call(_moving(lambda v: ha.ptp(HOME, acceleration=v)), "acceleration", 7),
     "JointDynamics.jerk": Call(_moving(lambda v: ha.ptp(HOME, jerk=v)), "jerk", 7),

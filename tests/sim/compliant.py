@@ -11,7 +11,7 @@ import numpy as np
 from heptarm.model.kinematics import forward
 from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
 from heptarm.sim.control.laws import MeasuredState
-from heptarm.sim.plant.world import MODELS
+from heptarm.sim.plant.world import specification
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
@@ -41,7 +41,7 @@ class Arm:
         model: str = "iiwa14",
     ) -> None:
         self.robot = robot(model)
-        text = (MODELS / f"{model}.xml").read_text(encoding="utf-8")
+        text = specification(model).to_xml()
         text = text.replace("</worldbody>", extra + "</worldbody>").replace("</mujoco>", tail + "</mujoco>")
         self.model = mujoco.MjModel.from_xml_string(text)
         self.data = mujoco.MjData(self.model)

@@ -83,7 +83,7 @@ class ServoKeywords(TypedDict, total=False):
     goal_timeout: float
     speed_timeout: float | None
     moving: str
-    frame: str | Pose
+    frame: str | Pose | None
     timeout: float | None
     keep_clear_of: ClearanceModel | None
     until: Condition | None
@@ -118,7 +118,7 @@ class ServoRequest:
             passing it, before it brakes [s], 0.001 to 10; None: 0.1.
         moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame. A twist
             is the velocity of its origin.
-        frame: of "twist": its axes: "tool", "flange", "base", the name of a frame, or its pose in the base; "tool".
+        frame: of "twist": its axes: "tool", "flange", "base", a name, or a pose in the base; None: "tool".
         timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
         keep_clear_of: of velocities: bodies to brake before, such as a `heptarm.CollisionModel`; None: none. It is
             no safety function: it knows only its own model of the scene.

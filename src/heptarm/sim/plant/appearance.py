@@ -55,16 +55,7 @@ class ArmMeshes:
             return
         _remove_meshes(spec)
         for (link, colour), path in self._files().items():
-            _add_mesh(spec, path, f"{link}.{colour}")
-            spec.body(link).add_geom(
-                type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=f"{link}.{colour}",
-                material=colour,
-                group=DRAWN_GROUP,
-                contype=0,
-                conaffinity=0,
-                mass=0.0,
-            )
+            _add_mesh(spec, spec.body(link), path, f"{link}.{colour}").material = colour
 
     def _files(self) -> dict[tuple[str, str], Path]:
         """File of each link and colour.
@@ -114,10 +105,13 @@ def _remove_meshes(spec: mujoco.MjSpec) -> None:
         spec.delete(mesh)
 
 
-def _add_mesh(spec: mujoco.MjSpec, path: Path, name: str) -> None:
-    # as a surface: it need not enclose a volume
+def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, path: Path, name: str) -> mujoco.MjsGeom:
+    # as a surface that meets nothing: it need not enclose a volume, and may be flat
     shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
     spec.add_mesh(name=name, file=str(path.resolve()), inertia=shell)
+    return body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, group=DRAWN_GROUP, contype=0, conaffinity=0, mass=0.0
+    )
 
 
 def _check(path: Path) -> None:
@@ -127,8 +121,7 @@ def _check(path: Path) -> None:
         ValueError: it cannot be read, or is not of a link's size in metres.
     """
     alone = mujoco.MjSpec()
-    _add_mesh(alone, path, "mesh")
-    alone.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="mesh")
+    _add_mesh(alone, alone.worldbody, path, "mesh")
     try:
         vertices = alone.compile().mesh_vert
     except (ValueError, mujoco.FatalError) as error:
