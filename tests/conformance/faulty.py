@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from heptarm.io.compiled import SWITCH
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState
 from heptarm.sim.controller.safety import StopRequest
@@ -85,6 +86,7 @@ def _listen() -> None:
 
 
 if __name__ == "__main__":
+    os.environ[SWITCH] = "1"  # the laws are Python functions, which may be replaced
     unruly = _Unruly(ActiveLaw.torque)
 
     def torque(control: ActiveLaw, sensed: MeasuredState) -> Any:
