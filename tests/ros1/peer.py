@@ -111,11 +111,18 @@ class Core:
         self._home.cleanup()
 
 
+def forget_parameters(name: str) -> None:
+    """Delete the parameters of a node."""
+    if rospy.has_param(name):
+        rospy.delete_param(name)
+
+
 class NodeProcess:
     """The node as a process of its own."""
 
     def __init__(self, target: str, name: str = "heptarm", *, ns: str = "/", **values: object) -> None:
         self.log = Path(tempfile.mkstemp(prefix="heptarm-node-", suffix=".log")[1])
+        forget_parameters(f"{ns.rstrip('/')}/{name}")  # of a node before it: the master would keep them
         command = [sys.executable, str(NODE), f"__name:={name}", f"__ns:={ns}"]
         for key, value in ({"target": target} | PATIENT | values).items():
             command.append(f"_{key.replace('__', '/')}:={value}")
