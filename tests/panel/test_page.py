@@ -15,7 +15,8 @@ from tests.cli.running import sim
 pytest.importorskip("viser")
 webdriver = pytest.importorskip("selenium.webdriver")
 
-pytestmark = pytest.mark.browser
+#: A browser that draws by software burdens the whole machine, and a held button has to ask in time.
+pytestmark = [pytest.mark.browser, pytest.mark.alone]
 PATIENCE = 60.0
 
 
