@@ -106,7 +106,13 @@ public final class SafetyMonitor implements Watchdog.Check {
 
     /** Whether a safety function has stopped the robot, by its present state: a motion may fail before a periodic check. */
     public boolean isStopped() {
-        return update().isStop();
+        try {
+            return update().isStop();
+        } catch (RuntimeException e) { // a motion that fails must end, also if the state cannot be read
+            synchronized (this) {
+                return seen != null && seen.isStop();
+            }
+        }
     }
 
     /** Refuses a motion that could not begin. */
