@@ -17,7 +17,7 @@ from typing import NamedTuple
 DRIFT = 1e-4
 #: Largest deviation from the estimate that does not count as a step [ns].
 TOLERANCE = 300_000
-#: A clock that is slower than this rate over a time shorter than this [ns] stalls; that is not the rate at which it runs.
+#: A clock slower than this rate over a time shorter than this [ns] stands for a moment; that is not its rate.
 STALLED, SHORT = 0.05, 500_000_000
 
 
