@@ -291,9 +291,7 @@ class _GuidingGoal:
         """Record states until the motion has ended; returns why this goal ended it, empty: something else did."""
         published = 0
         why = ""
-        for state in self._arm.states():
-            if self._handle.done:
-                break
+        for state in self._handle.states():  # to its end, also those that are read late
             self.recorded.append(state)
             if state.stamp - published >= FEEDBACK_PERIOD * 1e9:
                 published = state.stamp
