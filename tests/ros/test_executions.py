@@ -213,7 +213,7 @@ def test_a_twist_moves_and_silence_ends_it(driver: Driver) -> None:
     assert np.abs(moved[[0, 2]]).max() < 5e-3
 
 
-def test_targets_and_states_go_by_datagram_if_the_parameter_says_so(cabinet: RunningCabinet) -> None:
+def test_targets_and_states_go_by_datagram_if_the_parameter_is_set(cabinet: RunningCabinet) -> None:
     values = {"target": cabinet.target, "datagrams": True, "servo.watchdog": 2.0, "speed": 0.5, **PATIENT}
     recorder = Recorder()
     driver = Driver(NodeConfiguration.of(values), recorder)
