@@ -39,7 +39,7 @@ def header() -> str:
     lines += _enum("command modes", _members(messages.CommandMode))
     lines += _enum("fallbacks for missing commands", {one.name: i for i, one in enumerate(native.MISSING)})
     lines += _enum("what the guard limits", _members(joint_guard.Limited, "LIMITED_"))
-    flags = ("ANSWERED", "FILLED", "LIMITED", "BRAKING")
+    flags = ("ANSWERED", "FILLED", "LIMITED", "BRAKING", "ESTIMATED")
     lines += _enum("flags of a turn", _named(memory, *flags))
     words = (
         "STATES",

@@ -23,6 +23,7 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
+from heptarm.fri.loop.wrench import WrenchEstimator
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.version import Version
@@ -370,12 +371,13 @@ class Cycle:
         memory: its memory, on `memory_values`; None: the law takes none.
         memory_values: words of its memory, initially those of its first call.
         positions: position limits of the robot [rad], see `Session`.
+        estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
 
     Attributes:
         memory_values: words of the law's memory.
         is_compiled: whether the native part calls the law.
         q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, pose_commander, fallback, exchange, record, law: its parts.
+        layout, session, guard, pose_commander, fallback, exchange, record, law, estimator: its parts.
         failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
         mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
@@ -397,6 +399,7 @@ class Cycle:
         memory: Memory | None = None,
         memory_values: Floats | None = None,
         positions: Positions | None = None,
+        estimator: WrenchEstimator | None = None,
     ) -> None:
         self.layout = layout
         self.failure = ""
@@ -421,6 +424,7 @@ class Cycle:
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)
         self.record = Record(layout, self.session)
+        self.estimator = estimator
         self._out = Output(self.exchange.outputs)
         self.commands_seen = layout.commands.count
         self._restarts = 0
@@ -453,6 +457,14 @@ class Cycle:
         except Exception:  # the controller stops the arm itself when no answer arrives
             return None
 
+    def forget_controller(self) -> None:
+        """Reset for another controller: its counter, version and interpolator are not those of the last one."""
+        self.session.restart()
+        self.guard.stop()
+        self.pose_commander.guard.stop()
+        self.pose_commander.forget()
+        self.mirrored = self.q_before = None
+
     def _fail(self, error: Exception, now: int) -> None:
         """Report an error of the loop, and end the loop once the arm is at rest."""
         if not self.failure:
@@ -482,6 +494,7 @@ class Cycle:
         if sample is None:
             return None
         self._differentiate(sample, sample.sequence - previous)
+        self._find_wrench(sample)
         exchange.update(sample)
         record.signals, record.state.signals = exchange.numbers, exchange.signals
         self._follow(sample, received, before, sample.sequence - previous)
@@ -523,6 +536,18 @@ class Cycle:
             self.record.dq[:] = 0.0
         else:
             self.record.dq[:] = [(new - old) / gap for new, old in zip(sample.q, before, strict=True)]
+
+    def _find_wrench(self, sample: Sample) -> None:
+        """Take the external wrench of a message, or estimate it from the torques."""
+        monitor = sample.message.monitor if sample.is_full else None
+        sent = monitor.wrench if monitor is not None else None
+        if sent is not None and not math.isnan(sent[0]):
+            self.record.wrench = sent
+        elif self.estimator is None or sample.q is None or sample.tau_ext is None:
+            self.record.wrench = NAN6
+        else:
+            self.record.wrench = self.estimator.wrench(sample.q, sample.tau_ext)
+            self.record.flags |= at.ESTIMATED
 
     def _count(self, *, limited: bool) -> None:
         """Count limited and filled setpoints."""

@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "include/heptarm_law.h"
+#include "kinematics.h"
 #include "native_layout.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
@@ -73,11 +74,12 @@ static int stamp(struct part p, word *nanos) {
 }
 
 /* Read strategy and value of a redundancy; 0 if there is anything else. */
-static int redundancy(struct part p, double *value) {
-    uint64_t key, strategy;
+static int redundancy(struct part p, word *strategy, double *value) {
+    uint64_t key, number;
     struct part bytes;
-    if (!field(&p, &key, &strategy, &bytes) || key != 8 || (strategy != 0 && strategy != 4)) return 0;
-    if (!field(&p, &key, &strategy, &bytes) || key != 17 || p.at < p.end) return 0;
+    if (!field(&p, &key, &number, &bytes) || key != 8 || (number != 0 && number != 4)) return 0;
+    *strategy = (word)number;
+    if (!field(&p, &key, &number, &bytes) || key != 17 || p.at < p.end) return 0;
     memcpy(value, bytes.at, 8);
     return 1;
 }
@@ -160,7 +162,7 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
     if (p.at >= p.end || *p.at != 0x0a) return 0;
     l->t_known = 0;
     l->t_tracking = l->t_e1 = l->t_wrench[0] = l->t_pose[0] = NAN;
-    l->t_stamp = -1;
+    l->t_stamp = l->t_strategy = -1;
     while (p.at < p.end) {
         if (!field(&p, &key, &number, &one) || (key & 7) != 2 || key > (5 << 3 | 2)) return 0;
         int tag = key >> 3;
@@ -190,7 +192,7 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
                 } else if (at == 9) {
                     if (!doubles(leaf, 2, AXES, 1, l->t_pose)) return 0;
                 } else if (at == 10) {
-                    if (!redundancy(leaf, &l->t_e1)) return 0;
+                    if (!redundancy(leaf, &l->t_strategy, &l->t_e1)) return 0;
                 } else if (at == 15) {
                     if (!stamp(leaf, &l->t_stamp)) return 0;
                 } else {
@@ -211,7 +213,8 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
                     if (!doubles(leaf, 2, AXES, 1, unused)) return 0;
                 } else if (key == 26) {
                     double unused;
-                    if (!redundancy(leaf, &unused)) return 0;
+                    word none;
+                    if (!redundancy(leaf, &none, &unused)) return 0;
                 } else {
                     return 0;
                 }
@@ -513,6 +516,7 @@ static void fill_state(struct loop *l, word *slot) {
     slot[S_REFLECTED] = l->reflected;
     slot[S_SENT] = l->sent;
     slot[S_TICKS] = active && l->ticks > 0 ? l->ticks : 0;
+    slot[S_STRATEGY] = l->t_strategy;
     numbers[S_TRACKING] = l->t_tracking;
     for (int array = 0; array < STATE_ARRAYS; array++)
         for (int i = 0; i < AXES; i++) numbers[S_ARRAYS + AXES * array + i] = l->t_known >> array & 1 ? l->t_arrays[AXES * array + i] : NAN;
@@ -699,6 +703,13 @@ static void differentiate(struct loop *l) {
     l->q_known = known;
 }
 
+/* Estimate the external wrench from the torques where the controller sends none. */
+static void find_wrench(struct loop *l) {
+    word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
+    if (!isnan(l->t_wrench[0]) || !l->has_chain || (l->t_known & needed) != needed) return;
+    if (explain_torques((const struct chain *)l->chain, ARRAY(S_Q), ARRAY(S_TAU_EXT), l->t_wrench)) l->t_flags |= ESTIMATED;
+}
+
 /* Process a datagram: HANDBACK, LAW (call hf_answer next), or the size of the answer in t_reply, 0 for none. */
 int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     struct seen seen;
@@ -727,6 +738,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     l->t_flags = l->t_answer = 0;
     l->waiting++;
     differentiate(l);
+    find_wrench(l);
     if (commanding) {
         l->ticks++;
     } else if (waiting) {

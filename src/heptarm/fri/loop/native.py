@@ -40,7 +40,11 @@ LAW_CUT = 20_000_000
 MAX_PLAIN = 64
 
 _SOURCE = Path(__file__).with_name("native.c")
-_HEADERS = (_SOURCE.with_name("native_layout.h"), _SOURCE.parent / "include" / "heptarm_law.h")
+#: Headers that native.c includes, each behind those that include it.
+_HEADERS = (
+    *(_SOURCE.with_name(name) for name in ("kinematics.h", "native_layout.h")),
+    _SOURCE.parent / "include" / "heptarm_law.h",
+)
 _WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p
 #: Fallbacks for missing commands, in the numbering of the native part.
 MISSING = tuple(Missing)
@@ -78,6 +82,9 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
     ("real", 6, "wrench_max wrench_step"),
     ("real", 1, "reach step"),
+    # kinematics for the estimate of the wrench: `struct chain`
+    ("word", 1, "has_chain"),
+    ("real", 24, "chain"),
     # plausible positions
     ("real", AXES, "plausible_low plausible_high"),
     # fallback for missing commands
@@ -100,7 +107,7 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("word", 1, "q_known"),
     ("real", AXES, "q_before dq"),
     # this cycle; t_known has one bit for each array of t_arrays, which are those of a state from S_ARRAYS on
-    ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known"),
+    ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known t_strategy"),
     ("real", 1, "t_tracking"),
     ("real", at.S_WRENCH - at.S_ARRAYS, "t_arrays"),
     ("real", 6, "t_wrench"),
@@ -182,6 +189,8 @@ class Native:
         memory.reach = limits.reach
         memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
         memory.law_fraction = LAW_FRACTION
+        if cycle.estimator is not None:
+            memory.chain[:], memory.has_chain = cycle.estimator.chain, 1
         memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
 
