@@ -369,8 +369,8 @@ class State:
     def wrench(self) -> Floats:
         """External wrench on the flange, shape (6,) [N, Nm].
 
-        FRI 2.7 sends it. Else it is estimated from `tau_ext` and `q`, in base axes, see `is_wrench_estimated`; NaN if the
-        controller sends no external torques.
+        FRI 2.7 sends it. Else it is estimated from `tau_ext` and `q`, in base axes, see `is_wrench_estimated`; NaN if
+        the controller sends no external torques.
         """
         return self._floats[at.S_WRENCH : at.S_WRENCH + 6]
 

@@ -16,16 +16,16 @@ _Vector = Sequence[float]
 
 
 def chain_of(arm: RobotModel) -> list[float]:
-    """Kinematics of a robot as `struct chain` of kinematics.h: origin of each joint, then the flange; 24 numbers [m]."""
+    """Kinematics of a robot, as `struct chain` of kinematics.h: origin of each joint, flange; 24 numbers [m]."""
     return [*arm.links.origin.reshape(-1).tolist(), *arm.links.flange.tolist()]
 
 
 class WrenchEstimator:
     """Wrench on the flange that explains the external torques best: min |J' F - tau_ext|, damped.
 
-    It needs the load data to be right, as the torques do, and contact at the tool: a push on an elbow is explained, too.
-    Base axes, at the flange. Damped least squares after Siciliano et al., "Robotics", 2009, section 3.5; kinematics.h has the
-    same operations in the same order.
+    It is as good as the load data, and assumes a contact at the tool: a push on the elbow is explained, too. Damped
+    least squares after Siciliano et al., "Robotics", 2009, section 3.5; kinematics.h has the same operations in the
+    same order.
 
     Args:
         chain: see `chain_of`.
