@@ -65,13 +65,13 @@ def header() -> str:
     command = _prefixed(layout, "C_") | _named(memory, "COMMAND_WORDS", "COMMAND_SLOTS")
     lines += _enum("words of a command", command)
     lines += _enum("parts that a command has", _prefixed(layout, "GIVEN_"))
-    sizes = {"AXES": joint_guard.AXES, "MAX_NAME": messages.MAX_NAME}
+    sizes = {"AXES": joint_guard.AXES} | _named(messages, "MAX_NAME", "MAX_IO", "MAX_TRANSFORMATIONS")
     slots = _named(memory, "PARAM_SLOTS", "MEMORY_SLOTS")
-    lines += _enum("sizes", sizes | _named(native, "BUFFER") | slots)
+    lines += _enum("sizes", sizes | _named(native, "BUFFER", "HEAD") | slots)
     for module, names in (
         (version, ("MONITORING_ID", "COMMAND_ID")),
         (joint_guard, ("PLANNED", "ON_TRACK")),
-        (cycle, ("GAP_PERIODS", "MIN_GAP", "GRACE")),
+        (cycle, ("GAP_PERIODS", "MIN_GAP", "GRACE", "REPEATS")),
         (statistics, ("LONGEST",)),
         (native, ("LAW_PATIENCE", "LAW_CUT")),
     ):

@@ -114,6 +114,13 @@ static int same(struct part p, const char *known, word size) {
     return p.end - p.at == size && !memcmp(p.at, known, size);
 }
 
+/* Whether a part begins with some bytes; moves behind them. */
+static int starts_with(struct part *p, const uint8_t *known, word size) {
+    if (p->end - p->at < size || memcmp(p->at, known, size)) return 0;
+    p->at += size;
+    return 1;
+}
+
 static uint32_t crc_table[256];
 
 __attribute__((constructor)) static void make_table(void) {
@@ -135,7 +142,43 @@ static const int monitored[16] = MONITORED;
 
 struct seen {
     uint64_t sequence, reflected;
+    word signals, requests;
 };
+
+/* Read the value of the signal that comes next; 0 if anything else than its value differs from the previous message. */
+static int read_signal(struct loop *l, struct part p, word place) {
+    if (place >= l->io_count || !starts_with(&p, l->io_head + HEAD * place, l->io_size[place]) || p.at >= p.end) return 0;
+    uint64_t number;
+    if (l->io_is_analog[place]) {
+        if (p.end - p.at != 9 || *p.at != (5 << 3 | 1)) return 0;
+        memcpy(l->t_io + place, p.at + 1, 8);
+        return 1;
+    }
+    if (*p.at++ != 4 << 3 || !varint(&p, &number) || p.at < p.end) return 0;
+    l->t_io[place] = (word)number;
+    return 1;
+}
+
+/* Check a requested frame: its name; its stamp and its numbers may change. */
+static int check_request(struct loop *l, struct part p, word place) {
+    if (place >= l->request_count) return 0;
+    int names = 0, found = 0, most = l->echoes ? 12 : 7;
+    word none;
+    while (p.at < p.end) {
+        uint64_t key, number;
+        struct part one;
+        if (!field(&p, &key, &number, &one) || (key & 7) == 0) return 0;
+        if (key == (1 << 3 | 2)) {
+            if (names++ || !same(one, (char *)l->request_name + HEAD * place, l->request_size[place])) return 0;
+        } else if (key >> 3 == 2) {
+            if ((one.end - one.at) % 8) return 0;
+            found += (int)(one.end - one.at) / 8;
+        } else if (key != (3 << 3 | 2) || !stamp(one, &none)) {
+            return 0;
+        }
+    }
+    return names && found <= most;
+}
 
 /* Whether an array that may be sent back has positions that the robot can have, if the message has the array. */
 static int is_plausible(struct loop *l, int array) {
@@ -163,9 +206,14 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
     l->t_known = 0;
     l->t_tracking = l->t_e1 = l->t_wrench[0] = l->t_pose[0] = NAN;
     l->t_stamp = l->t_strategy = -1;
+    seen->signals = seen->requests = 0;
     while (p.at < p.end) {
-        if (!field(&p, &key, &number, &one) || (key & 7) != 2 || key > (5 << 3 | 2)) return 0;
+        if (!field(&p, &key, &number, &one) || (key & 7) != 2 || key > (6 << 3 | 2)) return 0;
         int tag = key >> 3;
+        if (tag == 6) {
+            if (!check_request(l, one, seen->requests++)) return 0;
+            continue;
+        }
         if (tags & 1 << tag) return 0;
         tags |= 1 << tag;
         if (tag == 2 && !same(one, l->robot, l->robot_size)) return 0;
@@ -174,7 +222,12 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
         int inner = 0;
         while (one.at < one.end) {
             struct part leaf;
-            if (!field(&one, &key, &number, &leaf) || key >> 3 > 15 || inner & 1 << (key >> 3)) return 0;
+            if (!field(&one, &key, &number, &leaf) || key >> 3 > 15) return 0;
+            if (tag == 3 && key == (8 << 3 | 2)) {
+                if (!read_signal(l, leaf, seen->signals++)) return 0;
+                continue;
+            }
+            if (inner & 1 << (key >> 3)) return 0;
             inner |= 1 << (key >> 3);
             if (tag == 1) {
                 if (key == 8) id = number;
@@ -223,6 +276,7 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
         if (tag == 1 && inner != 14) return 0;
         if (tag == 5 && ((l->mode && !(inner & 1 << 10)) || (l->overlay >= 0 && !(inner & 1 << 11)))) return 0;
     }
+    if (seen->signals != l->io_count || seen->requests != l->request_count) return 0;
     if (id != MONITORING_ID || seen->sequence >> 32 || seen->reflected >> 32) return 0;
     if (!(tags & 1 << 4) || (!(tags & 1 << 2)) != (l->robot_size < 0)) return 0;
     if (!(tags & 1 << 5) && (l->mode || l->overlay >= 0)) return 0;
@@ -442,6 +496,52 @@ static uint8_t *put_joints(uint8_t *at, uint8_t key, const double *values) {
     return at;
 }
 
+/* Whether the cabinet shows an output as it was written; its first answer is sent in any case. */
+static int is_shown(struct loop *l, int index) {
+    word place = l->pending_signal[index], shown = l->t_io[place], value = l->pending_value[index];
+    double analog, wanted;
+    if (l->pending_left[index] >= REPEATS) return 0;
+    if (!l->io_is_analog[place]) return shown == value;
+    memcpy(&analog, &shown, 8);
+    memcpy(&wanted, &value, 8);
+    return analog == wanted;
+}
+
+/* Whether Python has to report an output that the cabinet does not accept. */
+static int is_refused(struct loop *l) {
+    for (int i = 0; i < l->pending_count; i++)
+        if (!l->pending_left[i] && !is_shown(l, i) && !l->io_is_analog[l->pending_signal[i]]) return 1;
+    return 0;
+}
+
+/* Write the frames, and the outputs that the cabinet does not show yet. */
+static uint8_t *put_exchange(struct loop *l, uint8_t *at) {
+    int kept = 0;
+    memcpy(at, l->frames, (size_t)l->frames_size);
+    at += l->frames_size;
+    for (int i = 0; i < l->pending_count; i++) {
+        if (is_shown(l, i) || !l->pending_left[i]) continue;
+        word place = l->pending_signal[i], value = l->pending_value[i], size = l->put_size[place];
+        uint8_t number[10], *end = number + 8;
+        if (l->io_is_analog[place])
+            memcpy(number, &value, 8);
+        else
+            end = put_varint(number, (uint64_t)value);
+        *at++ = 5 << 3 | 2;
+        *at++ = (uint8_t)(size + 1 + (end - number));
+        memcpy(at, l->put_head + HEAD * place, (size_t)size);
+        at += size;
+        *at++ = l->io_is_analog[place] ? 5 << 3 | 1 : 4 << 3;
+        memcpy(at, number, (size_t)(end - number));
+        at += end - number;
+        l->pending_signal[kept] = place;
+        l->pending_value[kept] = value;
+        l->pending_left[kept++] = l->pending_left[i] - 1;
+    }
+    l->pending_count = kept;
+    return at;
+}
+
 static int write_command(struct loop *l, const double *q, const double *tau, const double *wrench) {
     uint8_t *begin = l->t_reply + (l->framed ? 4 : 0), *at = begin + 2;
     at = put_varint((*at = 8, at + 1), COMMAND_ID);
@@ -449,9 +549,13 @@ static int write_command(struct loop *l, const double *q, const double *tau, con
     at = put_varint((*at = 24, at + 1), (uint64_t)l->sequence);
     begin[0] = 10;
     begin[1] = (uint8_t)(at - begin - 2);
-    if (q) {
+    uint8_t exchange[BUFFER];
+    word size = put_exchange(l, exchange) - exchange;
+    if (q || size) {
         *at++ = 18;
-        at = put_varint(at, 65 + (wrench ? 52 : 0) + (tau ? 65 : 0));
+        at = put_varint(at, (uint64_t)((q ? 65 : 0) + (q && wrench ? 52 : 0) + (q && tau ? 65 : 0) + size));
+    }
+    if (q) {
         at = put_joints(at, 10, q);
         if (wrench) {
             memcpy(at, "\x12\x32\x0a\x30", 4);
@@ -460,6 +564,8 @@ static int write_command(struct loop *l, const double *q, const double *tau, con
         }
         if (tau) at = put_joints(at, 26, tau);
     }
+    memcpy(at, exchange, (size_t)size);
+    at += size;
     if (l->framed) {
         uint32_t length = (uint32_t)(at - begin), sum = crc(begin, (int)length);
         memcpy(l->t_reply, &length, 4);
@@ -528,7 +634,11 @@ static void fill_state(struct loop *l, word *slot) {
         numbers[S_TAU_SENT + i] = active && l->t_answer && l->mode == TORQUE ? l->tau[i] : NAN;
         if (i < 6) numbers[S_WRENCH_SENT + i] = active && l->t_answer && l->mode == WRENCH ? l->wrench[i] : NAN;
     }
-    for (int i = S_POSE_IPO; i < STATE_WORDS; i++) numbers[i] = NAN; /* Python handles sessions that command poses */
+    for (int i = S_POSE_IPO; i < S_IO; i++) numbers[i] = NAN; /* Python handles sessions that command poses */
+    for (int i = 0; i < MAX_IO; i++) {
+        numbers[S_IO + i] = i < l->io_count ? (double)(uint64_t)l->t_io[i] : NAN;
+        if (i < l->io_count && l->io_is_analog[i]) memcpy(numbers + S_IO + i, l->t_io + i, 8);
+    }
 }
 
 static word clock_now(clockid_t clock) {
@@ -717,9 +827,10 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     if (!l->hot || !read_message(l, data, size, &seen)) return HANDBACK;
     if (seen.sequence != (((uint64_t)l->sequence + 1) & 0xffffffff)) return HANDBACK;
     if ((commanding || waiting) && !(l->t_known & KNOWN(S_Q_IPO))) return HANDBACK;
+    if (*l->outputs != l->outputs_seen || is_refused(l)) return HANDBACK;
     if (commanding) {
         word gap = received - l->received;
-        if (!l->is_started || *l->outputs != l->outputs_seen) return HANDBACK;
+        if (!l->is_started) return HANDBACK;
         if ((double)gap > most(GAP_PERIODS * (double)l->period * (double)l->multiplier, MIN_GAP)) return HANDBACK;
     }
     /* from here on the message is not handed back */

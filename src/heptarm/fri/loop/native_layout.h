@@ -184,7 +184,10 @@ enum {
 enum {
     AXES = 7,
     MAX_NAME = 63,
+    MAX_IO = 10,
+    MAX_TRANSFORMATIONS = 5,
     BUFFER = 2048,
+    HEAD = 80,
     PARAM_SLOTS = 8,
     MEMORY_SLOTS = 8,
 };
@@ -196,6 +199,7 @@ enum {
 #define GAP_PERIODS 5LL
 #define MIN_GAP 25000000LL
 #define GRACE 50000000LL
+#define REPEATS 50LL
 #define LONGEST 1000000000000000LL
 #define LAW_PATIENCE 10LL
 #define LAW_CUT 20000000LL
@@ -208,6 +212,13 @@ struct loop {
     word overlay, safety, operation, control, drive, receive_multiplier;
     word robot_size, connection_size;
     char robot[64], connection[64];
+    word io_count, pending_count;
+    word io_size[10], io_is_analog[10], put_size[10], pending_signal[10], pending_left[10], pending_value[10];
+    uint8_t io_head[800], put_head[800];
+    word request_count, frames_size;
+    word request_size[5];
+    uint8_t request_name[400];
+    uint8_t frames[2048];
     word is_started, is_ending, has_law, ticks, commands_seen, outputs_seen, started;
     word ipo_known, ipo_sequence;
     double ipo[7], slope[7];
@@ -240,6 +251,7 @@ struct loop {
     double t_wrench[6];
     double t_pose[7];
     double t_e1;
+    word t_io[10];
     uint8_t t_datagram[2048], t_reply[2048];
 };
 

@@ -309,7 +309,7 @@ class Loop:
         header, cycle, states = self.layout.header, self.cycle, self.layout.states
         run, send, now_ns = native.library.hf_run, native.library.hf_send, time.monotonic_ns
         memory, reference = native.memory, native.reference
-        out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench)
+        out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench, cycle.exchange.outputs)
         dq = np.frombuffer(memory.dq, dtype=np.float64)
         sys.unraisablehook = native.note_error
         native.listen(self.socket.sock, None)
@@ -317,8 +317,9 @@ class Loop:
         while True:
             code = run(reference, _CHECK_EVERY, native.sender)
             if code == CALL_LAW:
-                state = State(states.floats[header[at.STATES] % history], dq=dq)
+                state = State(states.floats[header[at.STATES] % history], cycle.exchange.signals, dq)
                 cycle.call_law(state, out, memory.received)
+                native.write_outputs()
                 memory.is_ending = cycle.is_ending
                 send(reference)
                 code = CHECK if header[at.STOP] else CALL_LAW

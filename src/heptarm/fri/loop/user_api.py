@@ -243,9 +243,9 @@ class Output:
         self._e1 = value if isinstance(value, float) else scalar(value, "out.e1")
 
     @classmethod
-    def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
+    def on(cls, q: Any, tau: Any, wrench: Any, outputs: Outputs | None = None) -> Output:
         """Make an output on existing memory."""
-        made = cls()
+        made = cls(outputs)
         made._q, made._tau, made._wrench = (
             np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench)
         )

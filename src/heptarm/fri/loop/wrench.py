@@ -80,7 +80,7 @@ class WrenchEstimator:
                 row[first], row[second] = c * u + s * v, c * v - s * u
             joints.append(([sign * row[direction] for row in turn], place))
         tip = [value + _dot(row, self._flange) for value, row in zip(place, turn, strict=True)]
-        columns = []
+        columns: list[tuple[float, ...]] = []
         for (ax, ay, az), point in joints:
             x, y, z = (end - start for end, start in zip(tip, point, strict=True))
             columns.append((ay * z - az * y, az * x - ax * z, ax * y - ay * x, ax, ay, az))
