@@ -921,28 +921,51 @@ void hf_send(struct loop *l) {
     hf_finish(l, clock_now(CLOCK_MONOTONIC));
 }
 
+/* Receive a datagram of at most BUFFER bytes, its sender and the time of receipt by the kernel; its size, or -1. */
+static ssize_t receive(int sock, uint8_t *into, struct sockaddr_in *from, word *received) {
+    char control[128];
+    struct iovec part = {into, BUFFER};
+    struct msghdr message = {.msg_name = from, .msg_namelen = sizeof *from, .msg_iov = &part, .msg_iovlen = 1,
+                             .msg_control = control, .msg_controllen = sizeof control};
+    ssize_t size = recvmsg(sock, &message, 0);
+    if (size < 0) return size;
+    *received = clock_now(CLOCK_MONOTONIC);
+    for (struct cmsghdr *head = CMSG_FIRSTHDR(&message); head; head = CMSG_NXTHDR(&message, head)) {
+        struct timespec stamp;
+        if (head->cmsg_level != SOL_SOCKET || head->cmsg_type != SCM_TIMESTAMPNS) continue;
+        memcpy(&stamp, CMSG_DATA(head), sizeof stamp);
+        word age = clock_now(CLOCK_REALTIME) - stamp.tv_sec * 1000000000LL - stamp.tv_nsec;
+        if (age >= 0 && age < 10000000000LL) *received -= age;
+    }
+    return size;
+}
+
+/* The floor of a reply on this machine: send `turns` datagrams back, with the time from receipt to reply of each [ns]; how
+   many came. */
+word hf_echo(int sock, word turns, word *took) {
+    uint8_t datagram[BUFFER];
+    for (word turn = 0; turn < turns; turn++) {
+        struct sockaddr_in from;
+        word received;
+        ssize_t size = receive(sock, datagram, &from, &received);
+        if (size < 0) return turn;
+        sendto(sock, datagram, (size_t)size, 0, (struct sockaddr *)&from, sizeof from);
+        took[turn] = clock_now(CLOCK_MONOTONIC) - received;
+    }
+    return turns;
+}
+
 /* Receive and answer at most `turns` datagrams. A datagram that is handed back is in t_datagram, with its size, time and
    sender. */
 int hf_run(struct loop *l, word turns, word *sender) {
     while (turns-- > 0) {
         struct sockaddr_in from;
-        char control[128];
-        struct iovec part = {l->t_datagram, BUFFER};
-        struct msghdr message = {.msg_name = &from, .msg_namelen = sizeof from, .msg_iov = &part, .msg_iovlen = 1,
-                                 .msg_control = control, .msg_controllen = sizeof control};
-        ssize_t size = recvmsg((int)l->sock, &message, 0);
+        word received;
+        ssize_t size = receive((int)l->sock, l->t_datagram, &from, &received);
         if (size < 0) {
             if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNREFUSED) return TIMEOUT;
             l->t_size = errno;
             return SOCKET_ERROR;
-        }
-        word received = clock_now(CLOCK_MONOTONIC);
-        for (struct cmsghdr *head = CMSG_FIRSTHDR(&message); head; head = CMSG_NXTHDR(&message, head)) {
-            struct timespec stamp;
-            if (head->cmsg_level != SOL_SOCKET || head->cmsg_type != SCM_TIMESTAMPNS) continue;
-            memcpy(&stamp, CMSG_DATA(head), sizeof stamp);
-            word age = clock_now(CLOCK_REALTIME) - stamp.tv_sec * 1000000000LL - stamp.tv_nsec;
-            if (age >= 0 && age < 10000000000LL) received -= age;
         }
         int known = from.sin_addr.s_addr == (uint32_t)l->address && ntohs(from.sin_port) == l->port;
         int answer = known ? hf_turn(l, l->t_datagram, (int)size, received) : HANDBACK;

@@ -165,6 +165,7 @@ def library() -> ctypes.CDLL:
     made.hf_send.argtypes = (_POINTER,)
     made.hf_run.argtypes = (_POINTER, _WORD, _POINTER)
     made.hf_law.argtypes = (_POINTER, _POINTER)
+    made.hf_echo.argtypes, made.hf_echo.restype = (ctypes.c_int, _WORD, _POINTER), _WORD
     if made.hf_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")
     return made
