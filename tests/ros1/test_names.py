@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from heptarm.ros.interface.names import PRESETS
-from tests.conformance import names
+from tests.conformance import iiwa_stack, names
 from tests.conformance.stage import Stage
 from tests.ros1.peer import NodeProcess, active, collect, publisher, until
 from tests.ros1.test_surface import Client
@@ -55,6 +55,13 @@ def test_a_program_for_libiiwa(other: Client) -> None:
 @pytest.mark.parametrize("other", ["lbr_stack"], indirect=True)
 def test_a_program_for_lbr_stack(other: Client) -> None:
     names.a_program_for_lbr_stack(other)
+
+
+@pytest.mark.parametrize("other", ["iiwa_stack"], indirect=True)
+def test_a_program_for_iiwa_stacks_own_interface(other: Client) -> None:
+    iiwa_stack.a_program_for_iiwa_stack(other)
+    iiwa_stack.actions_of_iiwa_stack(other)
+    iiwa_stack.control_modes_of_iiwa_stack(other)
 
 
 def test_a_program_for_iiwa_stack(ros: None, spare: Stage) -> None:
