@@ -49,7 +49,7 @@ _JOINT_STIFFNESS = 1000.0
 #: Millimetres in a metre: limits of the position are in mm and mm/s.
 _MM = 1000.0
 #: Keywords of `heptarm.lin` by the fields of iiwa_msgs/SetPTPCartesianSpeedLimits; these are in m and rad.
-_PATH = {
+PATH_LIMITS = {
     "maxCartesianVelocity": "speed_mps",
     "maxOrientationVelocity": "speed_radps",
     "maxCartesianAcceleration": "acceleration_mps2",
@@ -279,7 +279,7 @@ def set_joint_limits(context: NodeContext, request: Any) -> str:
 
 def set_path_limits(context: NodeContext, request: Any) -> str:
     """Limit motions of the actions along a path [m/s, rad/s, and their derivatives]."""
-    given = {keyword: getattr(request, name) for name, keyword in _PATH.items()}
+    given = {keyword: getattr(request, name) for name, keyword in PATH_LIMITS.items()}
     path = context.iiwa_stack.path | {name: value for name, value in given.items() if value > 0.0}
     lin(Pose.at(0.0, 0.0, 0.0), **path)  # refuses values outside their ranges
     context.iiwa_stack.path = path

@@ -225,7 +225,7 @@ def _iiwa_stack(
     )
 
 
-#: By its last release, 1.4; the types of releases before 1.3 are others.
+#: With its newest types; older releases, in which state/CartesianPose is a PoseStamped, have others.
 _IIWA_STACK = (
     *_iiwa_stack(NameRole.OWN_STATE, "~/pose", "CartesianPose", "state/CartesianPose"),
     *_iiwa_stack(NameRole.OWN_STATE, "~/wrench", "CartesianWrench", "state/CartesianWrench"),
