@@ -66,7 +66,7 @@ class _Arm:
         return self.probe.make("iiwa_msgs/CartesianQuantity", **dict(zip("xyzabc", values, strict=True)))
 
     def arrives(self, send: Callable[[], None], there: Callable[[], bool], why: str) -> None:
-        """One message, then the topic that tells that the destination is reached."""
+        """One message, then the topic that reports the destination as reached."""
         before = len(self.reached)
         send()
         until(lambda: len(self.reached) > before, f"{why}: destination not reached")
@@ -239,14 +239,14 @@ def control_modes_of_iiwa_stack(probe: IiwaProbe) -> None:
     there[6] += 0.1
     send = probe.tell("iiwa/command/JointPosition", "iiwa_msgs/JointPosition", position=arm.quantity(there))
     arm.arrives(send, lambda: abs(arm.q[6] - there[6]) < 0.02, "in joint impedance")
-    soft = probe.make(
+    gentle = probe.make(
         "iiwa_msgs/CartesianImpedanceControlMode",
         cartesian_stiffness=arm.six(1500.0, 1500.0, 350.0, 300.0, 300.0, 300.0),
         cartesian_damping=arm.six(*[0.7] * 6),
         nullspace_stiffness=-1.0,
         nullspace_damping=0.7,
     )
-    configure(2, cartesian_impedance=soft)
+    configure(2, cartesian_impedance=gentle)
     force = probe.make(
         "iiwa_msgs/DesiredForceControlMode", cartesian_dof=3, desired_force=2.0, desired_stiffness=1000.0
     )

@@ -15,7 +15,7 @@ from heptarm.ros.node.destination import Destination, DestinationKeeper
 
 
 class FakeStream:
-    """Counts repetitions; open until it is told otherwise."""
+    """Counts repetitions; open until a test changes that."""
 
     def __init__(self) -> None:
         self.count, self.open, self.broken = 0, True, False
@@ -65,7 +65,7 @@ def scene() -> Iterator[Scene]:
     assert "heptarm-destination" not in {thread.name for thread in threading.enumerate()}
 
 
-def test_the_target_is_repeated_until_the_arm_is_there_and_that_is_told_once(scene: Scene) -> None:
+def test_the_target_is_repeated_until_the_arm_is_there_and_that_is_reported_once(scene: Scene) -> None:
     scene.go(1.0)
     scene.until(lambda: scene.stream.count > 3)
     assert scene.arrivals == 0
@@ -76,7 +76,7 @@ def test_the_target_is_repeated_until_the_arm_is_there_and_that_is_told_once(sce
     scene.until(lambda: scene.arrivals == 2)
 
 
-def test_a_compliant_arm_stays_and_is_told_once(scene: Scene) -> None:
+def test_a_compliant_arm_stays_and_is_reported_once(scene: Scene) -> None:
     scene.go(0.0, stays=True)
     scene.until(lambda: scene.stream.count > 20)
     assert scene.arrivals == 1

@@ -66,8 +66,8 @@ def test_angles_are_those_of_kuka_and_millimetres_become_metres() -> None:
 
 def test_the_other_modes() -> None:
     assert iiwa_stack.mode_of(request(0)) == Position()
-    soft = SimpleNamespace(joint_stiffness=joints(300.0), joint_damping=joints(-1.0))
-    mode = iiwa_stack.mode_of(request(1, joint_impedance=soft))
+    gentle = SimpleNamespace(joint_stiffness=joints(300.0), joint_damping=joints(-1.0))
+    mode = iiwa_stack.mode_of(request(1, joint_impedance=gentle))
     assert isinstance(mode, JointImpedance) and mode.stiffness[6] == 300.0
     force = SimpleNamespace(cartesian_dof=4, desired_force=2.0, desired_stiffness=100.0)
     mode = iiwa_stack.mode_of(request(3, desired_force=force))

@@ -69,7 +69,7 @@ def test_a_program_for_iiwa_stacks_own_interface(other: Client) -> None:
 
 
 def a_snippet_runs(space: str) -> None:
-    """The guide's program for iiwa_stack, as it is; the node's namespace is told to it as to every ROS program."""
+    """The guide's program for iiwa_stack, as it is; it receives the node's namespace as every ROS program does."""
     text = (ROOT / "docs" / "guide" / "migration.md").read_text(encoding="utf-8")
     source = text.partition("```python no-run\n")[2].partition("```")[0]
     moved = [f"{name}:={space}{name}" for name in re.findall(r"/iiwa/\w+/\w+", source)]

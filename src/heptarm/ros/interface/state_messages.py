@@ -234,7 +234,7 @@ def preset_message(
 
 
 def preset_event(ros: RosAdapter, kind: Any, value: str) -> Any:
-    """Make a message for a topic of another driver that tells that something has happened.
+    """Make a message for a topic of another driver about something that has happened.
 
     Args:
         ros: types and time of the ROS.
