@@ -1,8 +1,8 @@
 """Topics, services and actions of iiwa_stack, for programs written for it: the parameter `names` is "iiwa_stack".
 
 A message on a command topic is a destination there: the arm goes on to it when no other message comes, and
-state/DestinationReached reports that it is there. Services set the control mode, the limits and the motion frame of what
-follows; they are kept in `NodeContext.iiwa_stack`.
+state/DestinationReached reports that it is there. Services set the control mode, the limits and the motion frame of
+what follows; they are kept in `NodeContext.iiwa_stack`.
 """
 
 from __future__ import annotations
