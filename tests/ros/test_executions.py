@@ -58,6 +58,9 @@ class Recorder:
     def on_event(self, number: int, event: MotionEvent) -> None:
         pass
 
+    def on_arrival(self) -> None:
+        pass
+
     def on_collision(self, found: Collision) -> None:
         pass
 
