@@ -207,6 +207,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "law_from": (WORDS + "a law is Python code",),
         "lin": ("~/move_pose", "~/command/lin", "~/run_program"),
         "lin_rel": ("~/move_pose", "~/run_program"),
+        "live": (WORDS + "rviz shows the arm; `heptarm live` runs beside the node",),
         "load": (WORDS + "it reads a file",),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),

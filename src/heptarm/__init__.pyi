@@ -289,5 +289,11 @@ from .values.tool import (
 from .values.workspace import (
     Workspace as Workspace,
 )
+from .viewers.live import (
+    LiveView as LiveView,
+)
+from .viewers.live import (
+    live as live,
+)
 
 __version__: str
