@@ -1,6 +1,7 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
 from . import devices as devices
+from . import shapes as shapes
 from .arm.arm import (
     Arm as Arm,
 )
