@@ -105,6 +105,12 @@ def test_both_sides_prove_the_key() -> None:
     assert client.is_proven and client.state is cabinet.state is SessionState.OPEN
 
 
+def test_no_two_sessions_have_the_same_nonce() -> None:
+    sessions = [Session(side, key=KEY) for side in Side for _ in range(3)]
+    nonces = {one.hello(name="t").nonce for one in sessions} | {one.challenge().nonce for one in sessions}
+    assert len(nonces) == len(sessions)
+
+
 def test_a_wrong_key_proves_nothing() -> None:
     client, cabinet = challenged(other=b"other")
     pour(client.send(client.proof()), cabinet)
@@ -126,10 +132,14 @@ def refuses(client: Session, *frames: bytes) -> int:
     return error.value.code
 
 
-def test_a_client_with_a_key_opens_no_session_without_a_challenge() -> None:
-    client = Session(Side.CLIENT, key=KEY)
-    client.send(client.hello(name="t"))
-    assert refuses(client, pack(Welcome.TYPE, welcome(mac=bytes(32)).encode(), seq=0)) == Code.WRONG_KEY
+@pytest.mark.parametrize("knows", [False, True], ids=["rogue", "with the key"])
+def test_a_client_with_a_key_opens_no_session_without_a_challenge(knows: bool) -> None:
+    client, exchange = Session(Side.CLIENT, key=KEY), KeyExchange(KEY)
+    hello = client.hello(name="t")
+    client.send(hello)
+    exchange.add(Hello.TYPE, hello.encode())
+    mac = exchange.cabinet_mac(Welcome.TYPE, welcome(mac=b"").encode()) if knows else bytes(32)
+    assert refuses(client, pack(Welcome.TYPE, welcome(mac=mac).encode(), seq=0)) == Code.WRONG_KEY
 
 
 @pytest.mark.parametrize("nonce", [NONCES[0], b"", bytes(31), bytes(33)])
