@@ -342,7 +342,7 @@ def test_points_of_another_tool_are_refused(model: PanelArm) -> None:
 # ------------------------------------------------------------------------------- plans and the gripper
 
 
-def test_the_way_to_the_points_is_planned_and_shown(model: PanelArm, observer: ha.Arm) -> None:
+def test_the_motion_to_the_points_is_planned_and_shown(model: PanelArm, observer: ha.Arm) -> None:
     with pytest.raises(CommandRejected, match="list of points is empty"):
         model.preview()
     model.teach("here")

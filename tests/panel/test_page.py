@@ -250,7 +250,7 @@ def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelAr
     browser.find_element("css selector", "input[type=file]").send_keys(str(file))
     until(lambda: model.points.names == ("P1",), "nothing was loaded")
 
-    # a program's plan, by way of the user's folder of open panels
+    # a program's plan, through the user's folder of open panels
     plan = arm.plan(ha.lin_rel(z=-0.05, frame="base"))
     until(lambda: plan.show() is None, "the panel takes no plans")
     until(lambda: model.plan is not None and len(model.plan.t) == len(plan.t), "the plan never came")

@@ -375,7 +375,7 @@ class PanelArm:
         return min((time.monotonic() - self._plan_since) % (duration + _PAUSE), duration)
 
     def preview(self, *names: str, speed: float = 0.1) -> None:
-        """Plan the way to taught points, and show it; nothing moves.
+        """Plan the motion to taught points, and show it; nothing moves.
 
         Args:
             names: of the points; none: all of them in order.
