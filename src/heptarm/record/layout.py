@@ -173,7 +173,7 @@ def cycle_rows(words: npt.NDArray[np.float64]) -> Rows:
     """Rows of FRI cycles.
 
     Args:
-        words: slots of the ring of states, shape (n, 122).
+        words: slots of the ring of states, shape (n, 123).
     """
     rows, ints = FRI_CYCLE.rows(len(words)), words.view(np.int64)
     for one, place in _CYCLE_WORDS:

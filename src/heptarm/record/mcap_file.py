@@ -178,7 +178,7 @@ class RecordingFile:
             self._out.add_message(self._signals, one.received + self._epoch, data.encode(), sampled)
 
     def cycles(self, words: npt.NDArray[np.float64]) -> None:
-        """Write FRI cycles; `words` has shape (n, 122)."""
+        """Write FRI cycles; `words` has shape (n, 123)."""
         if self._cycles is None:
             self._cycles = self._add_rows("/fri", FRI_CYCLE)
         rows = cycle_rows(words)
