@@ -101,7 +101,7 @@ def test_foxgloves_messages_are_those_that_it_publishes(recorded: list[Any]) -> 
     assert names == {"foxglove.Log", "foxglove.PoseInFrame", "foxglove.FrameTransforms"}
 
 
-def test_the_frames_lead_from_the_base_to_the_flange(tmp_path: Path) -> None:
+def test_the_frames_are_a_chain_from_the_base_to_the_flange(tmp_path: Path) -> None:
     file = RecordingFile(tmp_path / "left.mcap", FACTS, epoch=EPOCH, chunk=50_000, arm="left")
     file.states(samples(1), to_ours=to_ours)
     file.finish({})
