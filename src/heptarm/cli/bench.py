@@ -244,9 +244,9 @@ def draw(measured: Measurement, path: Path) -> None:
     left.hist(np.minimum(micros, top), bins=bins, color="steelblue", log=True, label="FRI answers")
     if measured.echo.size:  # as many in sum as answers, so that heights compare
         each = np.full(measured.echo.size, max(micros.size, 1) / measured.echo.size)
-        echoes, style = np.minimum(1e6 * measured.echo, top), {"histtype": "step", "color": "darkorange"}
+        echoes, outline = np.minimum(1e6 * measured.echo, top), {"histtype": "step", "color": "darkorange"}
         median = 1e6 * float(np.median(measured.echo))
-        left.hist(echoes, bins=bins, weights=each, label=f"bare echo in C, 50 %: {median:.0f} us", **style)
+        left.hist(echoes, bins=bins, weights=each, label=f"bare echo in C, 50 %: {median:.0f} us", **outline)
     for percent, style in ((50, "-"), (99, "--"), (99.9, ":")):
         value = float(np.percentile(micros, percent)) if micros.size else 0.0
         left.axvline(
