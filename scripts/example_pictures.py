@@ -56,6 +56,7 @@ PLOTS = {
     "18": ("front", "height"),
     "19": ("front", "speeds"),
     "22": ("front", "speed"),
+    "23": ("front", "height"),
 }
 DEFAULT = ("joints", "height")
 #: Runs an example with the first connection recorded.

@@ -1,6 +1,7 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
 from . import devices as devices
+from . import shapes as shapes
 from .arm.arm import (
     Arm as Arm,
 )
@@ -288,6 +289,12 @@ from .values.tool import (
 )
 from .values.workspace import (
     Workspace as Workspace,
+)
+from .viewers.live import (
+    LiveView as LiveView,
+)
+from .viewers.live import (
+    live as live,
 )
 
 __version__: str

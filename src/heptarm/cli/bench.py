@@ -244,9 +244,10 @@ def draw(measured: Measurement, path: Path) -> None:
     left.hist(np.minimum(micros, top), bins=bins, color="steelblue", log=True, label="FRI answers")
     if measured.echo.size:  # as many in sum as answers, so that heights compare
         each = np.full(measured.echo.size, max(micros.size, 1) / measured.echo.size)
-        echoes, outline = np.minimum(1e6 * measured.echo, top), {"histtype": "step", "color": "darkorange"}
+        echoes = np.minimum(1e6 * measured.echo, top)
         median = 1e6 * float(np.median(measured.echo))
-        left.hist(echoes, bins=bins, weights=each, label=f"bare echo in C, 50 %: {median:.0f} us", **outline)
+        label = f"bare echo in C, 50 %: {median:.0f} us"
+        left.hist(echoes, bins=bins, weights=each, label=label, histtype="step", color="darkorange")
     for percent, style in ((50, "-"), (99, "--"), (99.9, ":")):
         value = float(np.percentile(micros, percent)) if micros.size else 0.0
         left.axvline(
