@@ -861,7 +861,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     l->t_flags = l->t_answer = 0;
     l->waiting++;
     differentiate(l);
-    find_wrench(l);
+    if (commanding && l->has_law) find_wrench(l); /* else after the answer */
     if (commanding) {
         l->ticks++;
     } else if (waiting) {
@@ -910,6 +910,7 @@ int hf_answer(struct loop *l) {
 /* Publish the turn; its answer was sent at `now`. */
 void hf_finish(struct loop *l, word now) {
     word tick = l->header[H_STATES], *slot = open_slot(l);
+    find_wrench(l);
     if (l->t_answer) {
         l->t_flags |= ANSWERED;
         count_duration(l, l->latency, now - l->received);
