@@ -286,6 +286,7 @@ class Loop:
         if in_python is not None:
             self.cycle.limit = LawLimit(layout.header)
         self._native = None if self._why_python else Native(self.cycle)
+        layout.header[at.NATIVE] = self._native is not None
         if compiled is not None and self._native is not None:
             address, kept = compiled.load(schema, memory)
             self._native.set_law(address, kept, success=compiled.success)
@@ -304,7 +305,6 @@ class Loop:
             self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python: {self._why_python}")
             self._run_in_python()
         else:
-            self.layout.header[at.NATIVE] = 1
             self._run_native(self._native)
         if self.cycle.failure:
             raise ConnectionLost(self.cycle.failure)
