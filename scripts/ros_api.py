@@ -215,6 +215,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),
         "ptp_transport": ("~/move_joints", "~/run_program"),
+        "record_client": (WORDS + "it records a process of your own; `ros2 bag` records topics",),
         "spiral": ("as SPLINE, with points computed by the client", "~/run_program"),
         "spl": ("~/move_spline", "~/run_program"),
         "spline": ("~/move_spline", "~/run_program"),

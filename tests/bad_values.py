@@ -100,6 +100,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Trajectory.of": {"q": np.zeros((3, 7))},
     "Trajectory.load": {"path": "no such file"},
     "load": {"path": "no such file"},
+    "record_client": {"path": "no folder of mine/run.mcap"},
     "Recording.__getitem__": {"name": "q"},
     "Arm.record": {"path": "no folder of mine/run.mcap"},
     "Limits": {"q_max": np.full(7, 1.0)},

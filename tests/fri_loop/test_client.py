@@ -150,6 +150,57 @@ def test_a_law_whose_module_fails_in_the_new_process_is_reported(
         Client(0, law=law, realtime=False)
 
 
+def test_a_law_in_python_that_never_returns_is_interrupted_and_the_arm_brakes() -> None:
+    def endless(state: State, out: Output, params: Params) -> None:
+        out.q += 0.1 * min(state.t, 0.3)
+        while state.t > 0.3:
+            pass
+
+    with Client(0, law=endless, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            text = _event(client, "the law failed")
+            assert "did not return within 1 s: look for an endless loop" in text
+            count = client.stats.answered
+            deadline = time.monotonic() + 20.0
+            while client.stats.answered < count + 200 and time.monotonic() < deadline:
+                client.next()
+            states = client.history(50)
+        assert all(one.is_answered for one in states), "the loop answers again"
+        assert np.ptp([one.q_sent for one in states], axis=0).max() == 0.0, "and the arm stands"
+
+
+def test_a_law_that_cannot_be_interrupted_ends_the_loop_with_its_cause() -> None:
+    def endless(state: State, out: Output, params: Params) -> None:
+        sum(range(10**13))  # in C, where no signal interrupts it
+
+    with Client(0, law=endless, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            with pytest.raises(
+                ConnectionLost, match="did not return within 1 s and could not be interrupted"
+            ):
+                while True:
+                    client.next(timeout=20.0)
+            deadline = time.monotonic() + 10.0
+            while client.is_running and time.monotonic() < deadline:
+                time.sleep(0.02)
+            assert not client.is_running and "the cabinet stops the arm" in client.trouble
+
+
+def _event(client: Client, words: str) -> str:
+    """Wait for an event; its text."""
+    deadline = time.monotonic() + 30.0
+    while time.monotonic() < deadline:
+        for one in client.events():
+            if words in one.text:
+                return one.text
+        time.sleep(0.02)
+    pytest.fail(f"no event {words!r}")
+
+
 def _until(client: Client, goal: np.ndarray) -> None:
     deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from heptarm.errors import ShapeError
+from heptarm.fri.guard.collision_watch import CollisionWatch
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
@@ -40,6 +41,7 @@ class Bench:
         law: Law | None = None,
         policy: Policy | None = None,
         memory: npt.NDArray[np.float64] | None = None,
+        watch: CollisionWatch | None = None,
         **params: object,
     ) -> None:
         values, schema = Params.flat(params)  # type: ignore[arg-type]
@@ -58,6 +60,7 @@ class Bench:
             params=Params(np.zeros(values.size), schema),
             memory_values=None if memory is None else memory.copy(),
             estimator=WrenchEstimator(chain_of(robot("iiwa14"))),
+            watch=watch,
         )
         self.controller = Controller(9, wire=wire, period_ms=1)
         self.controller._sock.close()

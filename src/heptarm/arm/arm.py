@@ -757,6 +757,8 @@ class Arm:
                 None: `Fri.command`.
             params: numbers and arrays by name for the law, which can change while it runs.
             memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
+            collision: bands of the external torques, as `collision_guard` makes them: the loop watches them in every
+                message, and the arm brakes at once. None: those of the `guarded` block, if there is one.
             policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
             limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
             pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
@@ -775,7 +777,11 @@ class Arm:
             settings["mode"] = None if word(kind, "kind", fri_settings.KINDS) == "monitor" else self._mode
         check_mode(settings["mode"])
         self._tooling.check_mode(settings["mode"])
-        return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))
+        on_collision = None
+        if settings.get("collision") is None and (rule := guarding.in_force(self)) is not None:
+            settings["collision"], on_collision = rule
+        request = fri_settings.request(self._connection, kind, **settings)
+        return Fri(self._connection, request, on_collision=on_collision)
 
     # -------------------------------------------------------------------------- stop and recover
 

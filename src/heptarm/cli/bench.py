@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -113,11 +114,11 @@ def bench(
         source = _asked(target.or_else("sim://iiwa14"), fri_command, fri_period, settings, yes=yes)
     with source as client:
         before = client.stats
-        _wait(client, seconds)
+        echo = _wait_beside_echo(client, seconds) if plot is not None else _wait(client, seconds)
         after = client.stats
         measured = _measure(client, after.lost - before.lost, after.missed - before.missed, before.received)
     if plot is not None:
-        measured = _beside_echo(measured, seconds)
+        measured = replace(measured, echo=echo)
         draw(measured, plot)
     emit(_data(measured)) if as_json else print("\n".join(_lines(measured, plot)))
     return 0 if measured.good else 1
@@ -157,11 +158,27 @@ def _heard(settings: dict[str, Any], seconds: float) -> Iterator[Client]:
         yield client
 
 
-def _wait(client: Client, seconds: float) -> None:
+def _wait(client: Client, seconds: float) -> Array:
+    """Wait while messages come; no echo is measured."""
     deadline = time.monotonic() + seconds
     while (rest := deadline - time.monotonic()) > 0.0:
         client.next(timeout=5.0)
         time.sleep(min(rest, 0.1))
+    return np.zeros(0)
+
+
+def _wait_beside_echo(client: Client, seconds: float) -> Array:
+    """Measure the echo meanwhile, with the period of the session: the machine is then the same for both.
+
+    Returns:
+        Receipt to reply of the echo [s]; empty without a C compiler.
+    """
+    with ThreadPoolExecutor(1) as pool:
+        echo = pool.submit(floor, min(seconds, _ECHO_TIME), period=client.state.period)
+        nothing = _wait(client, seconds)
+        with suppress(Unavailable):
+            return echo.result()
+    return nothing
 
 
 def _measure(client: Client, lost: int, missed: int, before: int) -> Measurement:
@@ -173,13 +190,6 @@ def _measure(client: Client, lost: int, missed: int, before: int) -> Measurement
     usual = float(np.percentile([one.latency for one in messages], 99))
     why = cause(stats, period, client.refused, late=usual)
     return Measurement(messages, lost, missed, period, why, good)
-
-
-def _beside_echo(measured: Measurement, seconds: float) -> Measurement:
-    """Measure the echo as well, with the period of the session and after it; without a C compiler there is none."""
-    with suppress(Unavailable):
-        return replace(measured, echo=floor(min(seconds, _ECHO_TIME), period=measured.period))
-    return measured
 
 
 def _times(latency: Array) -> dict[str, float]:

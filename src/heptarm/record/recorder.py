@@ -96,7 +96,7 @@ class RecordSink(Protocol):
         ...
 
     def cycles(self, words: npt.NDArray[np.float64]) -> None:
-        """Write FRI cycles, shape (n, 122)."""
+        """Write FRI cycles, shape (n, 123)."""
         ...
 
     def entry(self, entry: JournalEntry) -> None:

@@ -15,12 +15,14 @@ from dataclasses import replace
 import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.fri.guard.collision_watch import CollisionWatch
 from heptarm.fri.guard.fallback import CommandFallback, Policy
 from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
 from heptarm.fri.guard.joint_guard import JointGuard, Limits
 from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.law_interface import Memory
+from heptarm.fri.loop.law_limit import EndlessLaw, LawLimit
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import WrenchEstimator
@@ -45,6 +47,8 @@ GRACE = 50_000_000
 LAW_FRACTION = 0.5
 #: Beginning of the text of the event after a failure of the law.
 LAW_FAILED = "the law failed, the arm brakes: "
+#: Beginning of the text of the event after a collision.
+COLLIDED = "collision, the arm brakes: "
 #: Beginning of the text of the event after a failure of the loop itself.
 LOOP_FAILED = "the loop failed, the arm brakes: "
 #: Largest number of answers that repeat an output until the cabinet shows it.
@@ -386,12 +390,14 @@ class Cycle:
         memory_values: words of its memory, initially those of its first call.
         positions: position limits of the robot [rad], see `Session`.
         estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
+        watch: detects collisions, at which the arm brakes; None: nothing does.
 
     Attributes:
         memory_values: words of the law's memory.
         is_compiled: whether the native part calls the law.
+        limit: interrupts a law in Python that does not return; None: nothing does.
         q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, pose_commander, fallback, exchange, record, law, estimator: its parts.
+        layout, session, guard, pose_commander, fallback, exchange, record, law, estimator, watch: its parts.
         failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
         mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
@@ -414,6 +420,7 @@ class Cycle:
         memory_values: Floats | None = None,
         positions: Positions | None = None,
         estimator: WrenchEstimator | None = None,
+        watch: CollisionWatch | None = None,
     ) -> None:
         self.layout = layout
         self.failure = ""
@@ -435,10 +442,11 @@ class Cycle:
         self._memory_written = np.zeros(len(self.memory_values))
         self._memory_tick = 0
         self.is_compiled = False
+        self.limit: LawLimit | None = None
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)
         self.record = Record(layout, self.session)
-        self.estimator = estimator
+        self.estimator, self.watch = estimator, watch
         self._out = Output(self.exchange.outputs)
         self.commands_seen = layout.commands.count
         self._restarts = 0
@@ -511,6 +519,7 @@ class Cycle:
         self._find_wrench(sample)
         exchange.update(sample)
         record.signals, record.state.signals = exchange.numbers, exchange.signals
+        self._detect_collision(sample, received)
         self._follow(sample, received, before, sample.sequence - previous)
         record.ipo, record.ipo_e1 = self.pose_commander.ipo_on_wire, self.pose_commander.ipo_e1
         if not session.is_due or session.version is None:
@@ -562,6 +571,17 @@ class Cycle:
         else:
             self.record.wrench = self.estimator.wrench(sample.q, sample.tau_ext)
             self.record.flags |= at.ESTIMATED
+
+    def _detect_collision(self, sample: Sample, now: int) -> None:
+        """Brake from now on if the external torque of a joint is outside its band while commands are effective."""
+        if self.watch is None or self.is_ending or not self.session.is_commanding:
+            return
+        found = self.watch.collision(sample.tau_ext, self.record.dq.tolist())
+        if found is not None:
+            at.write_collision(self.layout, found)
+            text = str(found) if sample.tau_ext is not None else "the controller sends no external torques"
+            self.record.report(now, COLLIDED + text)
+            self.end()
 
     def _count(self, *, limited: bool) -> None:
         """Count limited and filled setpoints."""
@@ -790,14 +810,21 @@ class Cycle:
                 self._params.replace(words[1:])
         began = time.monotonic_ns()
         try:
+            if self.limit is not None:
+                self.limit.begin(began)
             if self._memory is None:
                 self.law(state, out, self._params)
             else:
                 self._take_memory()
                 self.law(state, out, self._params, self._memory)
                 self.layout.memory.write(self.memory_values)
+            if self.limit is not None:
+                self.limit.end()
         except BaseException as error:  # sys.exit() as well: the arm has to brake first
-            self.law_failed(str(error) if isinstance(error, LawFailure) else describe(error), now)
+            if self.limit is not None:
+                self.limit.end()
+            is_clear = isinstance(error, (LawFailure, EndlessLaw))
+            self.law_failed(str(error) if is_clear else describe(error), now)
         if not self.is_compiled:  # the native part counts those of a compiled law
             self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
 

@@ -813,6 +813,18 @@ static void differentiate(struct loop *l) {
     l->q_known = known;
 }
 
+/* Whether an external torque is outside its band: Python then names the joint and lets the arm brake. */
+static int is_collision(struct loop *l) {
+    if (!(l->t_known & KNOWN(S_TAU_EXT))) return 1;
+    double gap = (double)l->period * 1e-9;
+    for (int i = 0; i < AXES; i++) {
+        double speed = l->q_known && l->t_known & KNOWN(S_Q) && gap > 0.0 ? (ARRAY(S_Q)[i] - l->q_before[i]) / gap : 0.0;
+        double allowed = l->watch_threshold[i] + l->watch_margin[i] * fabs(speed);
+        if (!(fabs(ARRAY(S_TAU_EXT)[i] - l->watch_baseline[i]) - allowed <= 0.0)) return 1;
+    }
+    return 0;
+}
+
 /* Estimate the external wrench from the torques where the controller sends none. */
 static void find_wrench(struct loop *l) {
     word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
@@ -830,7 +842,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     if (*l->outputs != l->outputs_seen || is_refused(l)) return HANDBACK;
     if (commanding) {
         word gap = received - l->received;
-        if (!l->is_started) return HANDBACK;
+        if (!l->is_started || (l->has_watch && !l->is_ending && is_collision(l))) return HANDBACK;
         if ((double)gap > most(GAP_PERIODS * (double)l->period * (double)l->multiplier, MIN_GAP)) return HANDBACK;
     }
     /* from here on the message is not handed back */
@@ -849,7 +861,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     l->t_flags = l->t_answer = 0;
     l->waiting++;
     differentiate(l);
-    find_wrench(l);
+    if (commanding && l->has_law) find_wrench(l); /* else after the answer */
     if (commanding) {
         l->ticks++;
     } else if (waiting) {
@@ -898,6 +910,7 @@ int hf_answer(struct loop *l) {
 /* Publish the turn; its answer was sent at `now`. */
 void hf_finish(struct loop *l, word now) {
     word tick = l->header[H_STATES], *slot = open_slot(l);
+    find_wrench(l);
     if (l->t_answer) {
         l->t_flags |= ANSWERED;
         count_duration(l, l->latency, now - l->received);

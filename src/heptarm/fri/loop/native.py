@@ -99,6 +99,9 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     # kinematics for the estimate of the wrench: `struct chain`
     ("word", 1, "has_chain"),
     ("real", 24, "chain"),
+    # bands of the external torques
+    ("word", 1, "has_watch"),
+    ("real", AXES, "watch_threshold watch_baseline watch_margin"),
     # plausible positions
     ("real", AXES, "plausible_low plausible_high"),
     # fallback for missing commands
@@ -207,6 +210,10 @@ class Native:
         memory.law_fraction = LAW_FRACTION
         if cycle.estimator is not None:
             memory.chain[:], memory.has_chain = cycle.estimator.chain, 1
+        if cycle.watch is not None:
+            memory.has_watch = 1
+            for name in ("threshold", "baseline", "margin"):
+                getattr(memory, f"watch_{name}")[:] = getattr(cycle.watch, name)
         memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
 

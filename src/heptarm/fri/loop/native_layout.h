@@ -229,6 +229,8 @@ struct loop {
     double reach, step;
     word has_chain;
     double chain[24];
+    word has_watch;
+    double watch_threshold[7], watch_baseline[7], watch_margin[7];
     double plausible_low[7], plausible_high[7];
     word f_at, f_has_q, f_has_slope, f_has_tau, f_has_wrench, f_missing;
     double f_q[7], f_slope[7], f_tau[7];

@@ -27,6 +27,7 @@ import cloudpickle
 import numpy as np
 
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError
+from heptarm.fri.guard.collision_watch import watch_of
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
@@ -34,6 +35,7 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import LOOP_FAILED, Cycle, Law, describe
 from heptarm.fri.loop.law_interface import Memory
+from heptarm.fri.loop.law_limit import LawLimit
 from heptarm.fri.loop.native import (
     CALL_LAW,
     CHECK,
@@ -279,8 +281,12 @@ class Loop:
             memory_values=values,
             positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
             estimator=WrenchEstimator(config["chain"]),
+            watch=watch_of(config["collision"]),
         )
+        if in_python is not None:
+            self.cycle.limit = LawLimit(layout.header)
         self._native = None if self._why_python else Native(self.cycle)
+        layout.header[at.NATIVE] = self._native is not None
         if compiled is not None and self._native is not None:
             address, kept = compiled.load(schema, memory)
             self._native.set_law(address, kept, success=compiled.success)
@@ -299,7 +305,6 @@ class Loop:
             self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python: {self._why_python}")
             self._run_in_python()
         else:
-            self.layout.header[at.NATIVE] = 1
             self._run_native(self._native)
         if self.cycle.failure:
             raise ConnectionLost(self.cycle.failure)

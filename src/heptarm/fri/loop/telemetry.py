@@ -24,6 +24,7 @@ from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.session import Event, Kind, Session
 from heptarm.io.shared import Floats as Words
 from heptarm.values.arrays import instance, integer, within, word
+from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 
 NAN7, NAN6 = (math.nan,) * 7, (math.nan,) * 6
@@ -201,6 +202,10 @@ class Reader:
         self._seen = self._events_seen = 0
         self._offer: tuple[int, Signals, tuple[str, ...]] = (-1, Signals(), ())
 
+    def follower(self) -> Reader:
+        """Make another reader of the same loop, which counts the events and states that it has read by itself."""
+        return Reader(self._layout)
+
     @property
     def state(self) -> State:
         """State of the newest message.
@@ -376,6 +381,11 @@ class Reader:
     def limited(self) -> list[str]:
         """What the guards have limited, one line of text for each axis (or part of a pose) and quantity."""
         return at.report_lines(self._layout)
+
+    @property
+    def collision(self) -> Collision | None:
+        """The collision at which the loop began to brake; None: there was none."""
+        return at.read_collision(self._layout)
 
     def events(self) -> list[Event]:
         """Get the events since the last call, oldest first."""

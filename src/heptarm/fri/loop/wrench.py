@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import cos, sin, sqrt
 
-from heptarm.fri.protocol.messages import JOINTS, Joints
+from heptarm.fri.protocol.messages import JOINTS
 from heptarm.values.robot import RobotModel
 
 #: Damping of the inverse: near singular postures the estimate becomes too small instead of arbitrarily large.
@@ -39,7 +39,7 @@ class WrenchEstimator:
         self._origins = [tuple(chain[3 * i : 3 * i + 3]) for i in range(JOINTS)]
         self._flange = tuple(chain[3 * JOINTS :])
 
-    def wrench(self, q: Joints, tau_ext: Joints) -> list[float]:
+    def wrench(self, q: Sequence[float], tau_ext: Sequence[float]) -> list[float]:
         """Estimate the wrench.
 
         Args:
@@ -66,7 +66,7 @@ class WrenchEstimator:
             result[i] /= factor[i][i]
         return result
 
-    def _jacobian(self, q: Joints) -> list[tuple[float, ...]]:
+    def _jacobian(self, q: Sequence[float]) -> list[tuple[float, ...]]:
         """Columns of the Jacobian of the flange."""
         turn = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
         place = [0.0, 0.0, 0.0]
