@@ -64,6 +64,17 @@ def fitted(peer: Peer) -> tuple[str, str, str]:
     return state.mode.tool, state.mode.workpiece, state.mode.frame
 
 
+FAR = wire.Pose(xyz=(2.1, 0.0, 0.0), quat=(0.0, 0.0, 0.0, 1.0))
+
+
+def shape(
+    kind: wire.ShapeKind = wire.ShapeKind.BOX,
+    size: tuple[float, float, float] = (0.1, 0.1, 0.1),
+    pose: wire.Pose = HERE,
+) -> wire.Shape:
+    return wire.Shape(kind=kind, size=size, pose=pose)
+
+
 #: Invalid fields of tools: what the client refuses in tests/values/test_tool.py, with the same codes.
 BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"name": ""}, Code.BAD_LENGTH, "name"),
@@ -76,6 +87,13 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"com": (0.0, NAN, 0.0)}, Code.NOT_FINITE, "com[1]"),
     ({"com": (0.0, 0.0, 2.1)}, Code.OUT_OF_RANGE, "com[2]"),
     ({"inertia": (NAN, *BALL[1:])}, Code.NOT_FINITE, "inertia[0]"),
+    ({"shapes": (shape(size=(0.1, 0.0, 0.1)),)}, Code.OUT_OF_RANGE, "shapes[0].size[1]"),
+    ({"shapes": (shape(), shape(size=(0.1, 0.1, 4.1)))}, Code.OUT_OF_RANGE, "shapes[1].size[2]"),
+    ({"shapes": (shape(size=(0.1, NAN, 0.1)),)}, Code.NOT_FINITE, "shapes[0].size[1]"),
+    ({"shapes": (shape(wire.ShapeKind.SPHERE),)}, Code.OUT_OF_RANGE, "shapes[0].size[1]"),
+    ({"shapes": (shape(wire.ShapeKind.CAPSULE),)}, Code.OUT_OF_RANGE, "shapes[0].size[2]"),
+    ({"shapes": (shape(pose=FAR),)}, Code.OUT_OF_RANGE, "shapes[0].pose.xyz[0]"),
+    ({"shapes": (shape(),) * 17}, Code.BAD_LENGTH, "shapes"),
     ({"inertia": (-1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
     ({"inertia": (1e-3, 1e-3, 3e-3, 0.0, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
     ({"inertia": (1e-3, 1e-3, 1e-3, 2e-3, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),

@@ -117,7 +117,9 @@ def test_the_plant_feels_the_tip_of_a_tool_and_feels_it_no_more_when_it_is_gone(
     plant.step(400)
     force, torque = plant.snapshot.wrench[:3], plant.snapshot.wrench[3:]
     assert force[2] > 20.0
-    assert np.abs(np.cross([0, 0, -0.2], force) - torque).max() < 0.02 * force[2]  # as from a force at the tip
+    assert (
+        np.abs(np.cross([0, 0, -0.2], force) - torque).max() < 0.02 * force[2]
+    )  # as from a force at the tip
     plant.carry([])
     plant.step(600)
     assert np.abs(plant.snapshot.wrench).max() < 1.0

@@ -324,7 +324,6 @@ class JavaPlant:
         given = seam.AttachedLoad.decode(bytes(load.encode()))
         self._plant.set_load_data(Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia)))
 
-
     def setCarriedBodies(self, carried: Any) -> None:
         """Set the shapes of everything attached to the flange."""
         given = seam.CarriedBodies.decode(bytes(carried.encode()))
