@@ -74,6 +74,19 @@ def test_the_tool_is_felt_where_it_is_hit(arm: ha.Arm) -> None:
         assert arm.wrench("flange").torque == pytest.approx(moment, abs=0.2 * float(np.linalg.norm(moment)))
 
 
+def test_other_clients_know_the_shapes_as_soon_as_they_are_there(arm: ha.Arm) -> None:
+    assert arm.connection.cabinet is not None
+    with ha.connect(f"127.0.0.1:{arm.connection.cabinet.port}", control=False) as other:
+        assert other.shapes == arm.shapes == ()
+        with arm.tool(PEN):
+            other.wait_until(lambda _: bool(other.shapes))
+            assert other.shapes == arm.shapes == tuple((one, one.pose) for one in PEN.shapes)
+            arm.attach_workpiece(CUBE)
+            other.wait_until(lambda _: len(other.shapes) > 1)
+            assert other.shapes == arm.shapes and other.shapes[1][1] == TIP @ CUBE.shapes[0].pose
+        other.wait_until(lambda _: not other.shapes)
+
+
 def test_a_client_that_comes_later_knows_the_shapes(arm: ha.Arm) -> None:
     assert arm.connection.cabinet is not None
     port = arm.connection.cabinet.port

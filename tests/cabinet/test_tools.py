@@ -143,6 +143,27 @@ def test_tools_come_and_go_and_the_state_reports_it(peer: Peer) -> None:
     assert fitted(peer) == ("", "", "flange")
 
 
+def test_every_client_receives_what_is_attached(cabinet: FakeCabinet, peer: Peer) -> None:
+    pen = replace(GRIPPER, name="pen", shapes=(shape(), shape(wire.ShapeKind.SPHERE, (0.1, 0.0, 0.0))))
+    with Peer(cabinet.port) as other:
+        seen: list[tuple[wire.ToolInfo | None, wire.ToolInfo | None]] = []
+
+        def changed(since: int) -> int:
+            event = other.wait(lambda _, message: isinstance(message, wire.ToolChanged), since=since)
+            seen.append((event.tool, event.workpiece))
+            return len(other.seen)
+
+        at = len(other.seen)
+        peer.ask(wire.DefineTool(tool=pen))
+        peer.ask(wire.AttachTool(name="pen", frame=""))
+        at = changed(at)
+        peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
+        at = changed(at)
+        peer.ask(wire.AttachTool(name="", frame=""))
+        changed(at)
+    assert seen == [(pen, None), (pen, EMPTY), (None, None)]
+
+
 def test_templates_of_the_project_are_tools_too(cabinet: FakeCabinet, peer: Peer) -> None:
     peer.ask(wire.DefineTool(tool=GRIPPER))
     with Peer(cabinet.port) as other:

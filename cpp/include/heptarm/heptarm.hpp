@@ -2576,6 +2576,20 @@ struct ControlChanged {
     }
 };
 
+/// The attached tool or workpiece has changed, or was defined again.
+struct ToolChanged {
+    static constexpr std::uint16_t TYPE = 106;
+    static constexpr const char* NAME = "ToolChanged";
+    std::optional<ToolInfo> tool;  ///< absent: none
+    std::optional<ToolInfo> workpiece;  ///< absent: none
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.tool, "tool");
+        visit(self.workpiece, "workpiece");
+    }
+};
+
 /// Safety or readiness has changed.
 struct SafetyChanged {
     static constexpr std::uint16_t TYPE = 101;
@@ -2716,7 +2730,7 @@ struct State {
 };
 
 /// Any message.
-using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, State>;
+using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, ToolChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, State>;
 
 /// The message with this id in a body. Throws DecodeError.
 inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {
@@ -2771,6 +2785,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case TriggerFired::TYPE: return decode<TriggerFired>(data, size);
         case MotionFinished::TYPE: return decode<MotionFinished>(data, size);
         case ControlChanged::TYPE: return decode<ControlChanged>(data, size);
+        case ToolChanged::TYPE: return decode<ToolChanged>(data, size);
         case SafetyChanged::TYPE: return decode<SafetyChanged>(data, size);
         case KeyPressed::TYPE: return decode<KeyPressed>(data, size);
         case Notice::TYPE: return decode<Notice>(data, size);

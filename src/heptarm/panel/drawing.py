@@ -11,11 +11,13 @@ import numpy as np
 
 from heptarm.errors import require
 from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
-from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.carried import GEOMS, mujoco_size
+from heptarm.sim.plant.scene import Scene, is_mounted
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from heptarm.values.shape import Shape
 
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
@@ -64,6 +66,9 @@ class DrawnWorld:
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
+        self._server, self._has_tool = server, is_mounted(self._model)
+        self._carried: tuple[tuple[Shape, Pose], ...] = ()
+        self._carried_handles: list[Any] = []
 
     def _is_drawn(self, index: int) -> bool:
         kind = int(self._model.geom_type[index])
@@ -80,25 +85,34 @@ class DrawnWorld:
 
     def _mesh(self, index: int) -> tuple[Array, Array]:
         """Vertices and faces of a shape in its own frame."""
-        creation = require("trimesh.creation", extra="viz")
-        model, kind = self._model, self._model.geom_type[index]
-        radius, half, depth = model.geom_size[index].tolist()
+        model, kind = self._model, int(self._model.geom_type[index])
         if kind == mujoco.mjtGeom.mjGEOM_MESH:
             one = int(model.geom_dataid[index])
             first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
             vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
             return np.array(vertices), np.array(model.mesh_face[face : face + int(model.mesh_facenum[one])])
-        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
-            mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
-        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            mesh = creation.cylinder(radius=radius, height=2 * half, sections=32)
-        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-            mesh = creation.box(extents=(2 * radius, 2 * half, 2 * depth))
-        else:  # a sphere has one radius, an ellipsoid three
-            mesh = creation.icosphere(subdivisions=3, radius=1.0)
-            mesh.apply_scale((radius, half or radius, depth or radius))
-        return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+        return _solid(kind, model.geom_size[index])
+
+    def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
+        """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
+
+        Where the scene has a tool on the flange, that one is drawn alone.
+        """
+        if self._has_tool or shapes == self._carried:
+            return
+        for handle in self._carried_handles:
+            handle.remove()
+        self._carried = shapes
+        self._carried_handles = [
+            self._server.scene.add_mesh_simple(
+                f"{self._root}/flange/carried/{number}",
+                *_solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
+                color=_TOOL,
+                position=pose.xyz,
+                wxyz=wxyz(pose),
+            )
+            for number, (one, pose) in enumerate(shapes)
+        ]
 
     def show(self, q: Array) -> None:
         """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""
@@ -119,6 +133,23 @@ class DrawnWorld:
     def flange(self) -> Any:
         """MuJoCo's view of the flange, as it was shown last: `xpos` is its position in the base, shape (3,) [m]."""
         return self._data.site("flange")
+
+
+def _solid(kind: int, size: Array) -> tuple[Array, Array]:
+    """Vertices and faces of a shape in its own frame: MuJoCo's kind, and MuJoCo's size [m]."""
+    creation = require("trimesh.creation", extra="viz")
+    radius, half, depth = size.tolist()
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
+        mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
+    elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        mesh = creation.cylinder(radius=radius, height=2 * half, sections=32)
+    elif kind == mujoco.mjtGeom.mjGEOM_BOX:
+        mesh = creation.box(extents=(2 * radius, 2 * half, 2 * depth))
+    else:  # a sphere has one radius, an ellipsoid three
+        mesh = creation.icosphere(subdivisions=3, radius=1.0)
+        mesh.apply_scale((radius, half or radius, depth or radius))
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
 class DrawnMarks:

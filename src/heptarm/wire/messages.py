@@ -4961,6 +4961,68 @@ class ControlChanged:
         self._check("")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolChanged:
+    """The attached tool or workpiece has changed, or was defined again."""
+
+    TYPE: ClassVar[int] = 106
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    tool: ToolInfo | None = None
+    workpiece: ToolInfo | None = None
+
+    def _write(self, out: list[bytes]) -> None:
+        if self.tool is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.tool._write(out)
+        if self.workpiece is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.workpiece._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ToolChanged, int]:
+        present, pos = codec.read_flag(data, pos)
+        tool: ToolInfo | None = None
+        if present:
+            tool, pos = ToolInfo._read(data, pos)
+        present, pos = codec.read_flag(data, pos)
+        workpiece: ToolInfo | None = None
+        if present:
+            workpiece, pos = ToolInfo._read(data, pos)
+        return cls(tool=tool, workpiece=workpiece), pos
+
+    def _check(self, path: str) -> None:
+        if self.tool is not None:
+            self.tool._check(path + "tool.")
+        if self.workpiece is not None:
+            self.workpiece._check(path + "workpiece.")
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> ToolChanged:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "ToolChanged")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _SafetyChanged_0 = Struct(">HB")
 
 
@@ -5345,7 +5407,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5400,6 +5462,7 @@ MESSAGES: dict[int, type[Message]] = {
     98: TriggerFired,
     99: MotionFinished,
     100: ControlChanged,
+    106: ToolChanged,
     101: SafetyChanged,
     102: KeyPressed,
     103: Notice,

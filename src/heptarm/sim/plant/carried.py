@@ -27,7 +27,8 @@ _MOUNTED = "mounted"
 _SLOTS = tuple(f"mounted/{index}" for index in range(2 * MOST_SHAPES))
 #: Contact types of a shape that is mounted, as those of the links.
 _MEETS_ALL = 1
-_GEOMS = {
+#: MuJoCo's kind of each kind of shape.
+GEOMS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -57,7 +58,7 @@ class CarriedShapes(Value):
         body = _on_flange(arm, f"{prefix}{self.name}", self.pose)
         for one in self.shapes:
             body.add_geom(
-                type=_GEOMS[one.kind],
+                type=GEOMS[one.kind],
                 size=mujoco_size(one.kind, one.size),
                 pos=one.pose.xyz,
                 quat=np.roll(one.pose.quat, 1),
@@ -121,7 +122,7 @@ class FlangeShapes:
         model.opt.disableflags &= ~midphase
         for geom, (one, pose) in zip(self._slots, shapes):
             half = _half_extents(one.kind, one.size)
-            model.geom_type[geom] = _GEOMS[one.kind]
+            model.geom_type[geom] = GEOMS[one.kind]
             model.geom_size[geom] = mujoco_size(one.kind, one.size)
             model.geom_pos[geom], model.geom_quat[geom] = pose.xyz, np.roll(pose.quat, 1)
             model.geom_sameframe[geom] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
