@@ -75,6 +75,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "robot": ("~/info",),
         "servo": (*SERVOS, "~/follow_joint_trajectory"),
         "set_override": ("~/set_override", "~/speed_scaling"),
+        "shapes": (WORDS + "the robot description of a planner such as MoveIt has the tool",),
         "software": ("~/info",),
         "speed": ("parameter `speed`", "~/set_speed"),
         "start": (*MOTIONS, *COMMANDS),

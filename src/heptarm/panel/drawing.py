@@ -11,12 +11,14 @@ import numpy as np
 
 from heptarm.io.plan_box import PlanOutline
 from heptarm.sim.plant.appearance import ArmMeshes
-from heptarm.sim.plant.scene import Scene
-from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes
+from heptarm.sim.plant.carried import GEOMS, mujoco_size
+from heptarm.sim.plant.scene import Scene, is_mounted
+from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from heptarm.values.shape import Shape
 
 _GHOST, _TOUCH = (90, 170, 255), (224, 49, 49)
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
@@ -70,6 +72,30 @@ class DrawnWorld:
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
+        self._scene, self._root, self._has_tool = server.scene, root, is_mounted(self._model)
+        self._carried: tuple[tuple[Shape, Pose], ...] = ()
+        self._carried_handles: list[Any] = []
+
+    def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
+        """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
+
+        Where the scene has a tool on the flange, that one is drawn alone.
+        """
+        if self._has_tool or shapes == self._carried:
+            return
+        for handle in self._carried_handles:
+            handle.remove()
+        self._carried = shapes
+        self._carried_handles = [
+            self._scene.add_mesh_simple(
+                f"{self._root}/flange/carried/{number}",
+                *solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
+                color=_TOOL,
+                position=pose.xyz,
+                wxyz=wxyz(pose),
+            )
+            for number, (one, pose) in enumerate(shapes)
+        ]
 
     def show(self, q: Array) -> None:
         """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""

@@ -129,6 +129,7 @@ class ArmPage:
         if state is None or state.groups.joints is None:
             return
         self._world.show(state.q)
+        self._world.carry(self.model.arm.shapes)
         if tcp is not None:
             force = None if state.groups.wrench is None else state.wrench.force
             self._marks.show(tcp, np.array(self._world.flange.xpos), force)

@@ -161,6 +161,9 @@ public final class Messages {
             case 100:
                 message = ControlChanged.read(in);
                 break;
+            case 106:
+                message = ToolChanged.read(in);
+                break;
             case 101:
                 message = SafetyChanged.read(in);
                 break;

@@ -106,6 +106,7 @@ public final class SessionTransitions {
                     case 98:
                     case 99:
                     case 100:
+                    case 106:
                     case 101:
                     case 102:
                     case 103:
