@@ -142,6 +142,7 @@ class Events:
 
     Attributes:
         key_listeners: called with (slot, pressed) of each user key of the smartPAD.
+        dialog_listeners: called with the number, the pressed button and the problem of each closed dialog.
     """
 
     def __init__(self, on_control: Callable[[wire.ControlChanged], None]) -> None:
@@ -151,6 +152,7 @@ class Events:
         self._servo_status: wire.ServoStatus | None = None
         self._fri_changes: dict[int, wire.FriChanged] = {}
         self.key_listeners: list[Callable[[int, bool], None]] = []
+        self.dialog_listeners: list[Callable[[int, int, str], None]] = []
 
     def dispatch(self, message: Message) -> None:
         """Pass an event on to its receiver."""
@@ -168,6 +170,9 @@ class Events:
                     listener(message.slot, message.down)
                 except Exception:  # the link thread has to go on
                     _log.exception("a key callback raised an error")
+        elif isinstance(message, wire.DialogClosed):
+            for closed in list(self.dialog_listeners):
+                closed(message.dialog, message.button, message.text)
         elif isinstance(message, wire.FriChanged):
             self._note_fri(message)
         elif isinstance(message, wire.ControlChanged):
@@ -210,7 +215,7 @@ class Events:
         for program in self._programs.values():
             program.on_fork(error)
         self._programs = {}
-        self.key_listeners = []
+        self.key_listeners, self.dialog_listeners = [], []
 
     def _deliver(self, program: SentProgram, message: Message) -> None:
         if isinstance(message, wire.MotionFinished):
