@@ -108,6 +108,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "wait": (CLIENT, "~/signals"),
     },
     "arm.pad": {
+        "ask": ("~/ask",),
         "on_key": ("~/keys",),
         "process_data": ("~/process_data",),
         "set_key": ("~/set_key",),
@@ -116,6 +117,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "wait_for_key": (CLIENT, "~/keys"),
     },
     "arm.operator": {
+        "answer": OPERATOR,
         "choose": OPERATOR,
         "clear": OPERATOR,
         "do": OPERATOR,

@@ -251,6 +251,8 @@ CALLS: dict[str, Call] = {
     ),
     "AttachTool.name": Call(lambda arm, v: arm.attach_tool(v), "name"),
     "AttachTool.frame": Call(lambda arm, v: arm.attach_tool("t", frame=v), "frame"),
+    "AskOperator.text": Call(lambda arm, v: arm.pad.ask(v, "Ok"), "text"),
+    "AskOperator.buttons": Call(lambda arm, v: arm.pad.ask("Ready?", *v), "buttons"),
     "ShowMessage.text": Call(lambda arm, v: arm.pad.show(v), "text"),
     "SetKey.slot": Call(lambda arm, v: arm.pad.set_key(v, "x"), "slot"),
     "SetKey.text": Call(lambda arm, v: arm.pad.set_key(0, v), "text"),

@@ -824,6 +824,26 @@ inline const char* name(Severity value) {
 
 inline bool is_known(Severity value) { return *name(value) != 0; }
 
+/// What a dialog of the smartPAD looks like.
+enum class DialogKind : std::uint8_t {
+    question = 0,
+    info = 1,
+    warning = 2,
+    error = 3,
+};
+
+inline const char* name(DialogKind value) {
+    switch (value) {
+        case DialogKind::question: return "question";
+        case DialogKind::info: return "info";
+        case DialogKind::warning: return "warning";
+        case DialogKind::error: return "error";
+    }
+    return "";
+}
+
+inline bool is_known(DialogKind value) { return *name(value) != 0; }
+
 /// Groups of the pushed state. Each is sampled at its own period and carries its own time stamp.
 struct Groups {
     static constexpr std::uint16_t joints = 1;  ///< measured and commanded positions, velocity
@@ -2282,6 +2302,22 @@ struct DatagramStatistics {
     }
 };
 
+/// Shows a dialog on the smartPAD; the accepted id is its number, and DialogClosed has the answer. Refused while a dialog is shown: nobody but the operator can close one.
+struct AskOperator {
+    static constexpr std::uint16_t TYPE = 59;
+    static constexpr const char* NAME = "AskOperator";
+    DialogKind kind = DialogKind::question;
+    std::string text;
+    std::vector<std::string> buttons;  ///< different labels of 1 to 64 bytes
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.kind, "kind");
+        visit(self.text, "text", {-infinite, infinite, false, false, false, 1, 512});
+        visit(self.buttons, "buttons", {-infinite, infinite, false, false, false, 1, 12});
+    }
+};
+
 /// Starts a servo motion at the current position; Accepted carries its id.
 struct ServoOpen {
     static constexpr std::uint16_t TYPE = 64;
@@ -2676,6 +2712,22 @@ struct SegmentReached {
     }
 };
 
+/// The operator has answered a dialog.
+struct DialogClosed {
+    static constexpr std::uint16_t TYPE = 107;
+    static constexpr const char* NAME = "DialogClosed";
+    std::uint32_t dialog = 0;  ///< its number
+    std::int32_t button = 0;  ///< index of the pressed button; -1: the smartPAD could not show the dialog
+    std::string text;  ///< why it could not; empty: it was shown
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.dialog, "dialog");
+        visit(self.button, "button");
+        visit(self.text, "text");
+    }
+};
+
 /// Pushed state: the newest sample of each subscribed group.
 struct State {
     static constexpr std::uint16_t TYPE = 112;
@@ -2730,7 +2782,7 @@ struct State {
 };
 
 /// Any message.
-using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, ToolChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, State>;
+using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, AskOperator, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, ToolChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, DialogClosed, State>;
 
 /// The message with this id in a body. Throws DecodeError.
 inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {
@@ -2770,6 +2822,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case ProcessData::TYPE: return decode<ProcessData>(data, size);
         case GetDatagramStatistics::TYPE: return decode<GetDatagramStatistics>(data, size);
         case DatagramStatistics::TYPE: return decode<DatagramStatistics>(data, size);
+        case AskOperator::TYPE: return decode<AskOperator>(data, size);
         case ServoOpen::TYPE: return decode<ServoOpen>(data, size);
         case ServoJoints::TYPE: return decode<ServoJoints>(data, size);
         case ServoJointsVelocity::TYPE: return decode<ServoJointsVelocity>(data, size);
@@ -2791,6 +2844,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case Notice::TYPE: return decode<Notice>(data, size);
         case ConditionFired::TYPE: return decode<ConditionFired>(data, size);
         case SegmentReached::TYPE: return decode<SegmentReached>(data, size);
+        case DialogClosed::TYPE: return decode<DialogClosed>(data, size);
         case State::TYPE: return decode<State>(data, size);
         default: throw DecodeError("unknown message id " + std::to_string(type));
     }

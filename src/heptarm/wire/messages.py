@@ -201,6 +201,15 @@ class Severity(enum.IntEnum):
     ERROR = 2
 
 
+class DialogKind(enum.IntEnum):
+    """What a dialog of the smartPAD looks like."""
+
+    QUESTION = 0
+    INFO = 1
+    WARNING = 2
+    ERROR = 3
+
+
 class Groups(enum.IntFlag):
     """Groups of the pushed state. Each is sampled at its own period and carries its own time stamp."""
 
@@ -4071,6 +4080,65 @@ class DatagramStatistics:
         self._check("")
 
 
+_AskOperator_0 = Struct(">B")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskOperator:
+    """Shows a dialog on the smartPAD; the accepted id is its number, and DialogClosed has the answer. Refused while a dialog is shown: nobody but the operator can close one."""
+
+    TYPE: ClassVar[int] = 59
+    KIND: ClassVar[str] = "request"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "controller"
+
+    kind: DialogKind
+    text: str
+    buttons: tuple[str, ...]
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_AskOperator_0.pack(self.kind))
+        out.append(codec.put_str(self.text))
+        out.append(codec.put_count(len(self.buttons)))
+        for one_buttons in self.buttons:
+            out.append(codec.put_str(one_buttons))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[AskOperator, int]:
+        v = codec.unpack(_AskOperator_0, data, pos)
+        pos += _AskOperator_0.size
+        kind = codec.read_enum(DialogKind, v[0])
+        text, pos = codec.read_str(data, pos)
+        size, pos = codec.read_count(data, pos)
+        buttons_list: list[str] = []
+        for _ in range(size):
+            one_buttons, pos = codec.read_str(data, pos)
+            buttons_list.append(one_buttons)
+        buttons = tuple(buttons_list)
+        return cls(kind=kind, text=text, buttons=buttons), pos
+
+    def _check(self, path: str) -> None:
+        codec.check_length(len(self.text.encode()), path + "text", 1, 512)
+        codec.check_length(len(self.buttons), path + "buttons", 1, 12)
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> AskOperator:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "AskOperator")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
 _ServoOpen_2 = Struct(">d")
@@ -5283,6 +5351,56 @@ class SegmentReached:
         self._check("")
 
 
+_DialogClosed_0 = Struct(">Ii")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DialogClosed:
+    """The operator has answered a dialog."""
+
+    TYPE: ClassVar[int] = 107
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    dialog: int
+    button: int
+    text: str = ""
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_DialogClosed_0.pack(self.dialog, self.button))
+        out.append(codec.put_str(self.text))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[DialogClosed, int]:
+        v = codec.unpack(_DialogClosed_0, data, pos)
+        pos += _DialogClosed_0.size
+        dialog = v[0]
+        button = v[1]
+        text, pos = codec.read_str(data, pos)
+        return cls(dialog=dialog, button=button, text=text), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> DialogClosed:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "DialogClosed")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -5407,7 +5525,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | DialogClosed | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5447,6 +5565,7 @@ MESSAGES: dict[int, type[Message]] = {
     56: ProcessData,
     57: GetDatagramStatistics,
     58: DatagramStatistics,
+    59: AskOperator,
     64: ServoOpen,
     65: ServoJoints,
     66: ServoJointsVelocity,
@@ -5468,6 +5587,7 @@ MESSAGES: dict[int, type[Message]] = {
     103: Notice,
     104: ConditionFired,
     105: SegmentReached,
+    107: DialogClosed,
     112: State,
 }
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)

@@ -116,6 +116,9 @@ public final class Messages {
             case 58:
                 message = DatagramStatistics.read(in);
                 break;
+            case 59:
+                message = AskOperator.read(in);
+                break;
             case 64:
                 message = ServoOpen.read(in);
                 break;
@@ -179,6 +182,9 @@ public final class Messages {
             case 105:
                 message = SegmentReached.read(in);
                 break;
+            case 107:
+                message = DialogClosed.read(in);
+                break;
             case 112:
                 message = State.read(in);
                 break;
@@ -206,6 +212,7 @@ public final class Messages {
             case 52:
             case 53:
             case 55:
+            case 59:
             case 64:
             case 65:
             case 66:
@@ -243,6 +250,7 @@ public final class Messages {
             case 54:
             case 55:
             case 57:
+            case 59:
             case 64:
             case 68:
             case 69:
@@ -283,6 +291,7 @@ public final class Messages {
             case 54:
             case 55:
             case 57:
+            case 59:
             case 64:
             case 65:
             case 66:
