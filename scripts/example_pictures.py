@@ -59,6 +59,7 @@ PLOTS = {
     "21": ("joints", "speeds"),
     "22": ("front", "speed"),
     "23": ("front", "height"),
+    "24": ("height", "force"),
 }
 DEFAULT = ("joints", "height")
 #: Runs an example with the first connection recorded.
