@@ -638,7 +638,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
-        motions = program.with_kept_joints(self._connection, motions)
+        motions = program.resolved(self._connection, self._tooling, motions)
         self._foresight.examine(motions, when, ceiling)
         return program.send(
             self._connection,

@@ -9,17 +9,16 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from heptarm.errors import require
-from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
+from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.carried import GEOMS, mujoco_size
 from heptarm.sim.plant.scene import Scene, is_mounted
+from heptarm.sim.plant.shapes import drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape
 
-_COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
 #: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
 _ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.01, 0.6, 2.0
@@ -57,41 +56,23 @@ class DrawnWorld:
         *,
         root: str = "",
     ) -> None:
-        self._root = root
         self._model = compiled(model, (), scene, meshes or ArmMeshes())
         self._data = mujoco.MjData(self._model)
         self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
         self._handles = [
-            (index, self._shape(server, index)) for index in range(self._model.ngeom) if self._is_drawn(index)
+            (
+                one.index,
+                server.scene.add_mesh_simple(
+                    f"{root}/world/{one.index}", one.vertices, one.faces, color=one.colour
+                ),
+            )
+            for one in drawn_shapes(self._model)
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
-        self._server, self._has_tool = server, is_mounted(self._model)
+        self._server, self._root, self._has_tool = server, root, is_mounted(self._model)
         self._carried: tuple[tuple[Shape, Pose], ...] = ()
         self._carried_handles: list[Any] = []
-
-    def _is_drawn(self, index: int) -> bool:
-        kind = int(self._model.geom_type[index])
-        endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-        return not endless and int(self._model.geom_group[index]) < HIDDEN_GROUP
-
-    def _shape(self, server: Any, index: int) -> Any:
-        vertices, faces = self._mesh(index)
-        model, red_green_blue = self._model, self._model.geom_rgba[index, :3]
-        material = model.geom_matid[index]
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MATERIAL, material) if material >= 0 else ""
-        colour = _COLOURS.get(name) or tuple(round(255 * float(part)) for part in red_green_blue)
-        return server.scene.add_mesh_simple(f"{self._root}/world/{index}", vertices, faces, color=colour)
-
-    def _mesh(self, index: int) -> tuple[Array, Array]:
-        """Vertices and faces of a shape in its own frame."""
-        model, kind = self._model, int(self._model.geom_type[index])
-        if kind == mujoco.mjtGeom.mjGEOM_MESH:
-            one = int(model.geom_dataid[index])
-            first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
-            vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
-            return np.array(vertices), np.array(model.mesh_face[face : face + int(model.mesh_facenum[one])])
-        return _solid(kind, model.geom_size[index])
 
     def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
         """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
@@ -106,7 +87,7 @@ class DrawnWorld:
         self._carried_handles = [
             self._server.scene.add_mesh_simple(
                 f"{self._root}/flange/carried/{number}",
-                *_solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
+                *solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
                 color=_TOOL,
                 position=pose.xyz,
                 wxyz=wxyz(pose),
@@ -133,23 +114,6 @@ class DrawnWorld:
     def flange(self) -> Any:
         """MuJoCo's view of the flange, as it was shown last: `xpos` is its position in the base, shape (3,) [m]."""
         return self._data.site("flange")
-
-
-def _solid(kind: int, size: Array) -> tuple[Array, Array]:
-    """Vertices and faces of a shape in its own frame: MuJoCo's kind, and MuJoCo's size [m]."""
-    creation = require("trimesh.creation", extra="viz")
-    radius, half, depth = size.tolist()
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
-        mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
-    elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        mesh = creation.cylinder(radius=radius, height=2 * half, sections=32)
-    elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-        mesh = creation.box(extents=(2 * radius, 2 * half, 2 * depth))
-    else:  # a sphere has one radius, an ellipsoid three
-        mesh = creation.icosphere(subdivisions=3, radius=1.0)
-        mesh.apply_scale((radius, half or radius, depth or radius))
-    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
 class DrawnMarks:

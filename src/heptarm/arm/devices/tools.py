@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy.typing as npt
+
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError
@@ -261,13 +263,23 @@ class Tooling:
             raise unknown(name, "frame", (*frames, BASE, *taught))
         return Pose.from_matrix(forward(self._connection.robot, state.q)) @ frames[name]
 
+    def reached(self, q: npt.ArrayLike, moving: str) -> Pose | None:
+        """Pose of a motion frame in the base at joint positions, shape (7,) [rad]; None: the frame is not known."""
+        tip = (self._flange_frames() or {FLANGE: _ORIGIN}).get(moving)
+        return None if tip is None else Pose.from_matrix(forward(self._connection.robot, q)) @ tip
+
+    @property
+    def fixed(self) -> dict[str, Pose]:
+        """The fixed frames by name, in the base frame: the base itself, and the taught ones."""
+        return {BASE: _ORIGIN} | self.taught
+
     def on_flange(self, name: str) -> Pose:
         """Pose of a frame on the flange in the flange frame; of an unknown one the flange itself."""
         return (self._flange_frames() or {}).get(name, _ORIGIN)
 
     def in_base(self, name: str) -> Pose | None:
         """Pose of a fixed frame in the base: the base itself, or a taught frame; None: it is no fixed one."""
-        return _ORIGIN if name == BASE else self.taught.get(name)
+        return self.fixed.get(name)
 
     def axes(self, frame: str | Pose) -> Callable[[Pose], Pose]:
         """A function that returns a frame's pose in the base, by the pose of the flange.
