@@ -91,18 +91,24 @@ def declared(folder: Path) -> dict[tuple[str, str], Declared]:
     return found
 
 
+def _offered(functions: set[str]) -> Iterator[Declared]:
+    """What a module offers by these functions of `heptarm.ros.interface.offered`."""
+    if "offered" in functions:
+        for row in SERVICES:
+            yield Declared(row.name, "service", row.type)
+        for topic in TOPICS:
+            yield Declared(topic.name, "subscribes", topic.type)
+    if "offered_actions" in functions:
+        for action in ACTIONS:
+            yield Declared(action.name, "action", action.type)
+
+
 def _of(tree: ast.Module) -> Iterator[Declared]:
     types = {}  # of ROS: local name to kind and full name
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             if node.module == "heptarm.ros.interface.offered":
-                for row in SERVICES:
-                    yield Declared(row.name, "service", row.type)
-                for topic in TOPICS:
-                    yield Declared(topic.name, "subscribes", topic.type)
-            if node.module == "heptarm.ros.interface.actions":
-                for action in ACTIONS:
-                    yield Declared(action.name, "action", action.type)
+                yield from _offered({name.name for name in node.names})
             package, _, kind = node.module.partition(".")
             if kind in ("msg", "srv", "action"):
                 for name in node.names:
@@ -256,7 +262,8 @@ def page() -> str:
         "## Names of other drivers",
         "",
         "With the parameter `names`, the node also offers these names, relative to its namespace; see",
-        "[Coming from other drivers](../guide/migration.md).",
+        "[Coming from other drivers](../guide/migration.md). Only ROS 1 has what needs `iiwa_msgs`: all of",
+        "`iiwa_stack` but for its first three rows.",
         "",
         "| `names` | name | type | heptarm's own |",
         "|---|---|---|---|",

@@ -1,6 +1,7 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
 from . import devices as devices
+from . import shapes as shapes
 from .arm.arm import (
     Arm as Arm,
 )
@@ -157,6 +158,9 @@ from .fri.loop.compiled import (
 from .fri.loop.compiled import (
     law_from as law_from,
 )
+from .record.fri_client import (
+    record_client as record_client,
+)
 from .record.recorder import (
     Recorder as Recorder,
 )
@@ -294,6 +298,12 @@ from .values.tool import (
 )
 from .values.workspace import (
     Workspace as Workspace,
+)
+from .viewers.live import (
+    LiveView as LiveView,
+)
+from .viewers.live import (
+    live as live,
 )
 
 __version__: str

@@ -10,6 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model
+from heptarm.io.plan_box import PlanBox
 from heptarm.values.arrays import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
@@ -192,6 +193,25 @@ def test_collisions_are_found_where_they_happen(arm: ha.Arm) -> None:
         arm.plan(program, collision_check=3)  # type: ignore[arg-type]
 
 
+def test_the_attached_tool_and_workpiece_collide(arm: ha.Arm) -> None:
+    table = ha.CollisionModel("iiwa14", boxes=["0.6,0,0.1,0.6,0.8,0.2"])
+    down = ha.lin_rel(z=0.21 - START.z, frame="base", speed_mps=0.1)  # the tip ends 10 mm above the table
+    pen = ha.Tool("pen", tcp=TOOL.tcp, shapes=[ha.shapes.sphere(0.02, at=TOOL.tcp)])
+    part = ha.Workpiece("part", shapes=[ha.shapes.sphere(0.005, at=Pose.at(0, 0, 0.025))])
+    arm.collision_check = table
+    assert arm.plan(down).collisions == ()  # the tool of the module has no shapes
+    with arm.tool(pen):
+        (found,) = arm.plan(down).collisions
+        assert (found.clearance.first, found.clearance.second) == ("pen", "box 0")
+        with pytest.raises(ha.CollisionForeseen, match=r"pen is \d mm from box 0"):
+            arm.move(down)
+        with arm.attached(part):
+            (sooner,) = arm.plan(down).collisions
+            assert sooner.clearance.first == "part" and sooner.t < found.t
+        assert arm.plan(down).collisions == (found,)
+    assert arm.plan(down).collisions == ()
+
+
 def test_as_text_and_as_a_figure(arm: ha.Arm, tmp_path: Path) -> None:
     preview = arm.plan(PROGRAMS["blended"])
     lines = str(preview).splitlines()
@@ -208,3 +228,21 @@ def test_as_text_and_as_a_figure(arm: ha.Arm, tmp_path: Path) -> None:
     figure = preview.plot()
     assert len(figure.axes) == 4
     figure.savefig(tmp_path / "plan.png", dpi=40)
+
+
+def test_it_is_shown_in_an_open_panel_or_in_the_browser(
+    arm: ha.Arm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    preview = arm.plan(PROGRAMS["blended"])
+    page = preview.show()
+    assert page is not None and "svg" in page.read_text() and opened == [page.as_uri()]
+    box = PlanBox(["iiwa14"])
+    box.take()
+    assert preview.show() is None and len(opened) == 1
+    found = box.take()
+    assert found is not None and found == preview.outline()
+    np.testing.assert_array_equal(found.path, preview.tcp[:, :3])
+    box.close()

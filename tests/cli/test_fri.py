@@ -8,11 +8,13 @@ import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import heptarm as ha
 from heptarm.fri.loop.client import Client
 from heptarm.values.pose import Pose
 from tests.cli.running import HEPTARM, run
@@ -179,3 +181,15 @@ def test_the_network_of_a_bare_controller_has_faults() -> None:
 def test_what_no_cabinet_would_do_is_refused_in_words(arguments: tuple[str, ...], why: str) -> None:
     done = run("sim", *arguments, "--fri-port", "0")
     assert done.returncode == 1 and why in done.stderr and "Traceback" not in done.stderr
+
+
+def test_messages_of_any_application_are_recorded(tmp_path: Path) -> None:
+    port, path = free_port(), tmp_path / "fri.mcap"
+    with controller(port, "--fri-period", "10", "--fri-force", "0,0,-20"):
+        done = run("record", str(path), "--listen", "--fri-port", str(port), "--for", "1.5", "--json")
+    assert done.returncode == 0, done.stderr
+    reported, recorded = json.loads(done.stdout), ha.load(path)
+    assert reported["lost"] == 0 and reported["cycles"] >= len(recorded["fri.t"]) > 10
+    assert recorded["fri.wrench"][-1, 2] == pytest.approx(-20.0, abs=1.0), (
+        "estimated: this version sends none"
+    )

@@ -150,6 +150,57 @@ def test_a_law_whose_module_fails_in_the_new_process_is_reported(
         Client(0, law=law, realtime=False)
 
 
+def test_a_law_in_python_that_never_returns_is_interrupted_and_the_arm_brakes() -> None:
+    def endless(state: State, out: Output, params: Params) -> None:
+        out.q += 0.1 * min(state.t, 0.3)
+        while state.t > 0.3:
+            pass
+
+    with Client(0, law=endless, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            text = _event(client, "the law failed")
+            assert "did not return within 1 s: look for an endless loop" in text
+            count = client.stats.answered
+            deadline = time.monotonic() + 20.0
+            while client.stats.answered < count + 200 and time.monotonic() < deadline:
+                client.next()
+            states = client.history(50)
+        assert all(one.is_answered for one in states), "the loop answers again"
+        assert np.ptp([one.q_sent for one in states], axis=0).max() == 0.0, "and the arm stands"
+
+
+def test_a_law_that_cannot_be_interrupted_ends_the_loop_with_its_cause() -> None:
+    def endless(state: State, out: Output, params: Params) -> None:
+        sum(range(10**13))  # in C, where no signal interrupts it
+
+    with Client(0, law=endless, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            with pytest.raises(
+                ConnectionLost, match="did not return within 1 s and could not be interrupted"
+            ):
+                while True:
+                    client.next(timeout=20.0)
+            deadline = time.monotonic() + 10.0
+            while client.is_running and time.monotonic() < deadline:
+                time.sleep(0.02)
+            assert not client.is_running and "the cabinet stops the arm" in client.trouble
+
+
+def _event(client: Client, words: str) -> str:
+    """Wait for an event; its text."""
+    deadline = time.monotonic() + 30.0
+    while time.monotonic() < deadline:
+        for one in client.events():
+            if words in one.text:
+                return one.text
+        time.sleep(0.02)
+    pytest.fail(f"no event {words!r}")
+
+
 def _until(client: Client, goal: np.ndarray) -> None:
     deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:
@@ -304,6 +355,30 @@ def test_another_sender_is_ignored_while_a_session_stands(client: Client) -> Non
         stranger.setblocking(False)
         with pytest.raises(BlockingIOError):
             stranger.recv(100)
+
+
+def test_a_restarted_controller_with_a_new_port_is_answered_at_once(client: Client) -> None:
+    controller = Controller(client.port)
+    with controller.running():
+        controller.active()
+        client.wait(ACTIVE)
+        deadline = time.monotonic() + 20.0
+        while time.monotonic() < deadline and client.next().q_sent[0] < IPO[0] + 0.01:
+            client.command(q=np.add(IPO, 0.05))
+    # no farewell: it was killed, and starts again in another posture
+    elsewhere = tuple(value + 0.2 for value in IPO)
+    again = Controller(client.port, wire=Version.V2_5, ipo=elsewhere)
+    with again.running():
+        client.wait("MONITORING_WAIT")
+        again.settle()
+        first = again.answers[0].header.reflected
+        assert 1e-3 * again.period_ms * first < 0.5, (
+            "a silence of 0.1 s is enough, with room for a busy machine"
+        )
+        again.active()
+        state = client.wait(ACTIVE)
+        assert state.q_sent.tolist() == pytest.approx(elsewhere), "it starts where that interpolator is"
+    assert "listening to" in " ".join(one.text for one in client.events())
 
 
 def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:

@@ -11,11 +11,13 @@ import numpy.typing as npt
 import pytest
 
 from heptarm.errors import ShapeError
+from heptarm.fri.guard.collision_watch import CollisionWatch
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import REPEATS, Cycle, Law
 from heptarm.fri.loop.user_api import Params, State
+from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, SessionState
@@ -39,6 +41,7 @@ class Bench:
         law: Law | None = None,
         policy: Policy | None = None,
         memory: npt.NDArray[np.float64] | None = None,
+        watch: CollisionWatch | None = None,
         **params: object,
     ) -> None:
         values, schema = Params.flat(params)  # type: ignore[arg-type]
@@ -56,6 +59,8 @@ class Bench:
             law=law,
             params=Params(np.zeros(values.size), schema),
             memory_values=None if memory is None else memory.copy(),
+            estimator=WrenchEstimator(chain_of(robot("iiwa14"))),
+            watch=watch,
         )
         self.controller = Controller(9, wire=wire, period_ms=1)
         self.controller._sock.close()

@@ -16,11 +16,13 @@ import pytest
 
 import heptarm as ha
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError
+from heptarm.fri import Client
 from heptarm.record import recorder as recording
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.wire import messages as wire
 from tests.arm.peer import Peer
 from tests.conftest import RunningCabinet
+from tests.fri_loop.controller import Controller
 from tests.simulators import PATIENT
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
@@ -184,3 +186,35 @@ def test_fri_cycles_are_recorded_at_their_own_rate(arm: ha.Arm, tmp_path: Path) 
     np.testing.assert_allclose(run["fri.q"][-1], HOME, atol=0.05)
     assert run["fri.t"][0] >= 0.0 and run["fri.t"][-1] <= run.t[-1] + 1.0
     assert any(one.text == "Fri" for one in run.motions)
+
+
+def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
+    with Client(0, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            client.wait("MONITORING_WAIT")
+            with ha.record_client(client, tmp_path / "fri.mcap") as rec:
+                controller.active()
+                begin = client.wait("COMMANDING_ACTIVE")
+                rec.note("commands are effective")
+                client.command(q=begin.q_ipo + 0.01)
+                for s in client:
+                    if s.q_sent[0] > begin.q_ipo[0] + 0.005:
+                        break
+            last = client.state
+        assert any("listening to" in one.text for one in client.events()), (
+            "the client's own events are left to it"
+        )
+    run = ha.load(tmp_path / "fri.mcap")
+    assert run.complete and run.lost == 0 and len(run) == 0 and run.facts["robot"] == "iiwa14"
+    steps = np.diff(run["fri.sequence"])
+    assert len(steps) > 50 and (steps == 1).all(), "every message, once"
+    assert run["fri.sequence"][-1] <= last.sequence
+    assert run["fri.t"][0] == 0.0 and run.duration == pytest.approx(run["fri.t"][-1])
+    assert np.nanmax(run["fri.q_sent"][:, 0]) > begin.q_ipo[0] + 0.005
+    assert [one.text for one in run.notes] == ["commands are effective"]
+    assert any("COMMANDING_ACTIVE" in one.text for one in run.events if one.kind == "fri")
+    assert len(run.between("commands are effective", "end")["fri.t"]) < len(run["fri.t"])
+    assert "cycles" in str(run) and len(run.to_pandas(fri=True)) == len(run["fri.t"])
+    with pytest.raises(HeptarmError), ha.record_client(client, tmp_path / "none" / "\0.mcap"):
+        pass

@@ -1,7 +1,9 @@
-"""Our definitions of control_msgs have upstream's check sums; otherwise no client could connect."""
+"""Our definitions of other packages have upstream's check sums; otherwise no client could connect."""
 
 from __future__ import annotations
 
+import iiwa_msgs.msg
+import iiwa_msgs.srv
 import pytest
 from control_msgs import msg, srv
 
@@ -28,3 +30,32 @@ def test_sum(name: str) -> None:
 
 def test_sum_of_the_service() -> None:
     assert srv.QueryTrajectoryState._md5sum == "ec93cdecbd8062d761aa52b7c90cd44b"
+
+
+#: As generated code of iiwa_stack's users has them.
+IIWA_SUMS = {
+    "msg.CartesianControlModeLimits": "36b3a99aeab262cf60ecef9129ccb529",
+    "msg.CartesianPose": "92a9835b358c99d9efbecb11c25db23d",
+    "msg.CartesianWrench": "b710d3269f35c0e4079ef3ef88f25c6c",
+    "msg.ControlMode": "fbf6f4c74f01882c27df4152be6af2d9",
+    "msg.DOF": "c1a133d87080cb4a84e23090e4a06363",
+    "msg.DesiredForceControlMode": "da11717a4c7e94e66d2e956ead0bf6f3",
+    "msg.JointPositionVelocity": "08519eea0692f4458e7be483616eb8cd",
+    "msg.JointQuantity": "b9f90cf50b6e4af396f731df7da11689",
+    "msg.SplineSegment": "ac36e232cb478b25636a98607933811b",
+    "srv.ConfigureControlMode": "680a54772ae74cfe325dd171700c3d78",
+    "srv.SetEndpointFrame": "422abb646a850d7c7d04073e2d2f950e",
+    "srv.SetPTPCartesianSpeedLimits": "f4c42c9db5a373c4820a5b6872a3a795",
+    "srv.SetPTPJointSpeedLimits": "e5ffdd082606e43192e0949ab1d5a1f3",
+    "srv.SetSmartServoJointSpeedLimits": "960e33fb145e93219db644650cd367e4",
+    "srv.SetSmartServoLinSpeedLimits": "ba27ded3da7c7c0e58e5316ff3ba3f60",
+    "srv.SetSpeedOverride": "5cb6d9d155adc8ed76143d144d178f68",
+    "srv.SetWorkpiece": "63c849990571529ad5b5c1483c88f899",
+    "srv.TimeToDestination": "b71b59cce98847d0bd0310eb052e8f3f",
+}
+
+
+@pytest.mark.parametrize("name", IIWA_SUMS)
+def test_sum_of_iiwa_stack(name: str) -> None:
+    part, _, kind = name.partition(".")
+    assert getattr(getattr(iiwa_msgs, part), kind)._md5sum == IIWA_SUMS[name]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Iterator
 
 import actionlib
@@ -14,9 +16,10 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from heptarm.ros.interface.names import PRESETS
-from tests.conformance import names
-from tests.conformance.stage import Stage
+from tests.conformance import iiwa_stack, names
+from tests.conformance.stage import ROOT, Stage
 from tests.ros1.peer import NodeProcess, active, collect, publisher, until
+from tests.ros1.test_examples import run
 from tests.ros1.test_surface import Client
 
 JOINTS = [f"iiwa_joint_{i}" for i in range(1, 8)]
@@ -55,6 +58,22 @@ def test_a_program_for_libiiwa(other: Client) -> None:
 @pytest.mark.parametrize("other", ["lbr_stack"], indirect=True)
 def test_a_program_for_lbr_stack(other: Client) -> None:
     names.a_program_for_lbr_stack(other)
+
+
+@pytest.mark.parametrize("other", ["iiwa_stack"], indirect=True)
+def test_a_program_for_iiwa_stacks_own_interface(other: Client) -> None:
+    iiwa_stack.a_program_for_iiwa_stack(other)
+    iiwa_stack.actions_of_iiwa_stack(other)
+    iiwa_stack.control_modes_of_iiwa_stack(other)
+    a_snippet_runs("/other")
+
+
+def a_snippet_runs(space: str) -> None:
+    """The guide's program for iiwa_stack, as it is; it receives the node's namespace as every ROS program does."""
+    text = (ROOT / "docs" / "guide" / "migration.md").read_text(encoding="utf-8")
+    source = text.partition("```python no-run\n")[2].partition("```")[0]
+    moved = [f"{name}:={space}{name}" for name in re.findall(r"/iiwa/\w+/\w+", source)]
+    assert len(moved) == 2 and run([sys.executable, "-c", source, *moved]).strip() == "there"
 
 
 def test_a_program_for_iiwa_stack(ros: None, spare: Stage) -> None:

@@ -19,6 +19,7 @@ from heptarm.testing import Outcome, Report, Risk, Verdict
 from heptarm.testing.runner import tidy
 from heptarm.testing.scenario import LINES
 from tests.long import LONG
+from tests.retry import answers_late, retry
 
 #: Simulated seconds per second.
 SPEED = 4.0
@@ -32,7 +33,28 @@ def arm() -> Iterator[ha.Arm]:
         yield arm
 
 
-@pytest.mark.parametrize("name", [one.name for one in testing.scenarios()])
+#: FRI sessions, which need answers within milliseconds of this machine's time.
+IN_REAL_TIME = [one.name for one in testing.scenarios() if one.group == "laws"]
+
+
+@pytest.fixture(scope="module")
+def slower_arm() -> Iterator[ha.Arm]:
+    with ha.connect(testing.stage(speed=1.0), watchdog=10.0, timeout=30.0) as arm:
+        yield arm
+
+
+@pytest.mark.parametrize("name", IN_REAL_TIME)
+def test_it_shows_the_ready_laws_in_real_time(slower_arm: ha.Arm, name: str) -> None:
+    def late(report: object) -> str:
+        failed = isinstance(report, Report) and not report.ok
+        return answers_late(report.outcomes[0].text) if failed else ""  # type: ignore[union-attr]
+
+    report = retry(lambda: testing.run(slower_arm, only=[name]), late)
+    assert report.outcomes[0].verdict is Verdict.SHOWN, report.table()
+    assert report.outcomes[0].measured
+
+
+@pytest.mark.parametrize("name", [one.name for one in testing.scenarios() if one.name not in IN_REAL_TIME])
 def test_the_virtual_cabinet_shows(arm: ha.Arm, name: str) -> None:
     report = testing.run(arm, only=[name])
     assert [one.scenario.name for one in report.outcomes] == [name]
@@ -42,7 +64,11 @@ def test_the_virtual_cabinet_shows(arm: ha.Arm, name: str) -> None:
 
 
 #: Where contact and force matter; the long run shows everything with noisy sensors.
-NOISY = [one.name for one in testing.scenarios() if LONG or one.risk is Risk.CONTACT]
+NOISY = [
+    one.name
+    for one in testing.scenarios()
+    if (LONG or one.risk is Risk.CONTACT) and one.name not in IN_REAL_TIME
+]
 
 
 @pytest.fixture(scope="module")

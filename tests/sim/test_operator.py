@@ -11,6 +11,7 @@ import pytest
 from heptarm.sim import seam
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.operator import WORDS, SimulatedOperator, timed, understood
 from heptarm.sim.seam import OperationMode, SafetyFlags, StateWords
 from tests.sim.driving import Ear, ready
@@ -157,8 +158,8 @@ def test_signals_that_are_set_at_once_are_edges_all_the_same() -> None:
 
     def type_lines() -> None:
         for value in (1, 0) * 5:
-            operator.await_tick(f"set Station.Start {value}")
             operator.do(f"set Station.Start {value}")
+            operator.await_tick()
 
     typing = threading.Thread(target=type_lines)
     typing.start()
@@ -167,3 +168,16 @@ def test_signals_that_are_set_at_once_are_edges_all_the_same() -> None:
         time.sleep(0.005)  # a machine with other work
     plant.step(2)
     assert edges == [True, False] * 5
+
+
+def test_after_an_action_the_robots_flags_are_known() -> None:
+    plant, flags = Plant(), list[int]()
+    plant.on_safety = lambda new, _: flags.append(new)
+    operator = SimulatedOperator(plant)
+    plant.step()
+    choosing = threading.Thread(target=lambda: (operator.do("t1"), operator.await_tick()))
+    choosing.start()
+    while choosing.is_alive():
+        plant.step()
+        time.sleep(0.005)  # a machine with other work
+    assert flags[-1] & SafetyFlags.PAUSED

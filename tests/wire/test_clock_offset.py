@@ -87,6 +87,17 @@ def test_a_stalled_clock_is_followed_at_once(step: float) -> None:
     assert estimate.rate == 1.0
 
 
+@pytest.mark.parametrize("rate", [1.0, 3.0])
+def test_a_clock_that_stands_for_a_moment_has_not_slowed_down(rate: float) -> None:
+    cabinet, estimate = Cabinet(), ClockOffset()
+    cabinet.rate, cabinet.offset = 0.0, 3e12
+    now = run(cabinet, estimate, start=1e9, pings=6, every=3e6)
+    assert estimate.rate == 1.0
+    cabinet.offset, cabinet.rate = cabinet.clock(now) - rate * now, rate
+    run(cabinet, estimate, start=now, pings=5, every=50e6)
+    assert estimate.rate == pytest.approx(rate, rel=0.01)
+
+
 def test_a_change_of_rate_is_followed_within_a_few_pings() -> None:
     cabinet, estimate = Cabinet(), ClockOffset()
     now = run(cabinet, estimate, start=1e9, pings=30, every=50e6)

@@ -10,9 +10,9 @@ from rclpy.node import Node
 
 from heptarm.errors import HeptarmError
 from heptarm.ros.interface.action import ActionDispatcher, ActionResult, RosAction, fill
-from heptarm.ros.interface.actions import ACTIONS
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.offered import offered_actions
 from heptarm.ros.trajectory.goal import GoalOutcome
 
 
@@ -23,10 +23,10 @@ class ActionServers:
     thread of the executor; a coroutine that waits would be polled by all of them.
     """
 
-    def __init__(self, node: Node, context: NodeContext, group: Any) -> None:
+    def __init__(self, node: Node, context: NodeContext, names: str, group: Any) -> None:
         self._node = node
         self._dispatcher = ActionDispatcher(context)
-        self._servers = [self._server(row, group) for row in ACTIONS]
+        self._servers = [self._server(row, group) for row in offered_actions(names)]
 
     def destroy(self) -> None:
         """Destroy the servers."""

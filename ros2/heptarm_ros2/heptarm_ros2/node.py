@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from heptarm.errors import HeptarmError
 from heptarm.ros.interface.context import NodeContext
-from heptarm.ros.interface.names import PRESETS
+from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.node import parameters
 from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration, Parameter
@@ -146,7 +146,7 @@ class HeptarmNode(LifecycleNode):
         self._trajectories = TrajectoryAction(
             self, self.ros, self.driver, ("~/follow_joint_trajectory", *others), group
         )
-        self._actions = ActionServers(self, context, group)
+        self._actions = ActionServers(self, context, values["names"], group)
         self._commands = Commands(self, context)
         self._report_timer = self.create_timer(
             1.0 / values["diagnostics_rate"],
@@ -242,6 +242,8 @@ class HeptarmNode(LifecycleNode):
         """Publish that a user key of the smartPAD was pressed or released."""
         if self._events is not None and self._can_publish:
             self._events.key(slot, down)
+        if self._presets is not None and self._can_publish:
+            self._presets.event(NameRole.KEY, f"key{slot}_{'pressed' if down else 'released'}")
 
     def on_event(self, number: int, event: MotionEvent) -> None:
         """Publish an event of a program."""
@@ -252,6 +254,11 @@ class HeptarmNode(LifecycleNode):
         """Publish a collision."""
         if self._events is not None and self._can_publish:
             self._events.collision(found)
+
+    def on_arrival(self) -> None:
+        """Publish that the arm is at its destination."""
+        if self._presets is not None and self._can_publish:
+            self._presets.event(NameRole.ARRIVED)
 
     # ---------------------------------------------------------------------------------- reporting
 

@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from heptarm.ros.interface.messages import RosAdapter, class_of
-from heptarm.ros.interface.names import PRESETS
-from heptarm.ros.interface.state_messages import preset_message
+from heptarm.ros.interface.names import PRESETS, NameRole, PresetName
+from heptarm.ros.interface.state_messages import preset_event, preset_message
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.state import State
 
 
 class PresetPublisher:
-    """Publishes states under the names that the parameter `names` adds."""
+    """Publishes states and events under the names that the parameter `names` adds."""
 
     def __init__(self, node: Node, ros: RosAdapter, configuration: NodeConfiguration) -> None:
         self._node, self._ros, self._names = node, ros, configuration
-        self._publishers = [
-            (
-                entry,
-                node.create_publisher(
-                    class_of(entry.type, "msg"),
-                    entry.name,
-                    10,
-                    qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-                ),
-            )
-            for entry in PRESETS[configuration.values["names"]].published()
-        ]
+        preset = PRESETS[configuration.values["names"]]
+        self._publishers = [(entry, self._publisher(entry)) for entry in preset.published()]
+        self._events = [(entry, self._publisher(entry)) for entry in preset.events()]
+
+    def _publisher(self, entry: PresetName) -> Publisher:
+        return self._node.create_publisher(
+            class_of(entry.type, "msg"),
+            entry.name,
+            10,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
 
     def state(self, state: State) -> None:
         """Publish a state."""
@@ -37,7 +37,13 @@ class PresetPublisher:
             if message is not None:
                 publisher.publish(message)
 
+    def event(self, role: NameRole, value: str = "") -> None:
+        """Publish that something has happened, on the topics of its role."""
+        for entry, publisher in self._events:
+            if entry.role is role:
+                publisher.publish(preset_event(self._ros, publisher.msg_type, value))
+
     def destroy(self) -> None:
         """Destroy the publishers."""
-        for _, publisher in self._publishers:
+        for _, publisher in self._publishers + self._events:
             self._node.destroy_publisher(publisher)

@@ -47,6 +47,7 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
+from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.values.workspace import Workspace
@@ -394,7 +395,7 @@ class Arm:
 
         `move` and `start` then refuse a path on which bodies would touch, and one that cannot be planned. Servo
         motions, FRI and hand guiding have no path that could be checked. It is no safety function: it knows only its
-        own model of the scene. It plans as `plan` does.
+        own model of the scene, and the shapes of the attached tool and workpiece. It plans as `plan` does.
         """
         return self._foresight.check
 
@@ -712,7 +713,8 @@ class Arm:
                 breaks=breaks,
             )
         speed, acceleration = request.joint_fractions(self._speed)
-        limits = JogLimits(speed, acceleration, request.silence, boundary, request.keep_clear_of)
+        clear = None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of)
+        limits = JogLimits(speed, acceleration, request.silence, boundary, clear)
         if kind == "velocity":
             return VelocityServo(
                 self._connection,
@@ -756,6 +758,8 @@ class Arm:
                 None: `Fri.command`.
             params: numbers and arrays by name for the law, which can change while it runs.
             memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
+            collision: bands of the external torques, as `collision_guard` makes them: the loop watches them in every
+                message, and the arm brakes at once. None: those of the `guarded` block, if there is one.
             policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
             limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
             pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
@@ -774,7 +778,11 @@ class Arm:
             settings["mode"] = None if word(kind, "kind", fri_settings.KINDS) == "monitor" else self._mode
         check_mode(settings["mode"])
         self._tooling.check_mode(settings["mode"])
-        return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))
+        on_collision = None
+        if settings.get("collision") is None and (rule := guarding.in_force(self)) is not None:
+            settings["collision"], on_collision = rule
+        request = fri_settings.request(self._connection, kind, **settings)
+        return Fri(self._connection, request, on_collision=on_collision)
 
     # -------------------------------------------------------------------------- stop and recover
 
@@ -846,6 +854,11 @@ class Arm:
     def tools(self) -> dict[str, KnownTool]:
         """Tools that can be attached by name: templates of the project, and defined ones."""
         return self._tooling.known
+
+    @property
+    def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
+        """Shapes of the attached tool and workpiece, each with its pose in the flange frame; see `heptarm.shapes`."""
+        return self._tooling.shapes
 
     @property
     def frames(self) -> dict[str, Pose]:

@@ -342,8 +342,8 @@ def start_together(
     handles: dict[Arm, MotionHandle] = {}
     try:
         _raise_first(_of_each(arms, Arm.pause))
-        slowest = min(arm.real_time_factor for arm in arms)
-        time.sleep(_PAUSING / min(1.0, slowest))  # until the speed override of each has come down
+        for arm in arms:
+            _wait_until_braked(arm)
         for arm in arms:
             handles[arm] = arm.start(motions[arm], speed=speed, mode=mode, when="reject")
         for arm in arms:
@@ -384,6 +384,12 @@ def _withdraw(arms: Sequence[Arm], handles: Mapping[Arm, MotionHandle]) -> None:
 
 def _is_idle(state: State) -> bool:
     return state.motion is None or not (state.motion.active or state.motion.queued)
+
+
+def _wait_until_braked(arm: Arm) -> None:
+    """Wait until the speed override of a paused arm has come down, by its own clock."""
+    ready = arm.state.stamp + round(_PAUSING * 1e9)
+    arm.wait_until(lambda state: state.stamp >= ready, timeout=check_timeout(_PATIENCE))
 
 
 def _wait_until_taken(arm: Arm, handle: MotionHandle) -> None:

@@ -44,6 +44,10 @@ class PlanOptions:
     out: Annotated[
         Path | None, Parameter(name=["--out", "-o"], help="Write a figure: .png, .svg, .pdf or .html.")
     ] = None
+    show: Annotated[
+        bool,
+        Parameter(negative="", help="Show it in an open panel, otherwise as a figure in the web browser."),
+    ] = False
     target: CommandTarget = NO_TARGET
     as_json: Json = False
 
@@ -131,6 +135,8 @@ def _plan(motion: Motion, options: PlanOptions) -> int:
         from heptarm.record import plot
 
         written = {"file": str(plot.save(preview.plot(), options.out))}
+    if options.show:
+        preview.show()
     if options.as_json:
         emit(preview_data(preview) | written)
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +22,14 @@ from heptarm.values.arrays import Array, array, finite, instance, integer, numbe
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
+#: Kind of a session.
+Kind: TypeAlias = Literal["torque", "position", "wrench"]
 _SOURCE = Path(__file__).with_name("ready.c")
-_HEADERS = (_SOURCE.with_name("model.h"), include_dir() / "heptarm_law.h")
+_HEADERS = (
+    _SOURCE.with_name("model.h"),
+    include_dir().with_name("kinematics.h"),
+    include_dir() / "heptarm_law.h",
+)
 _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
 #: Time constant of the low pass of the velocities [s].
@@ -71,11 +77,12 @@ class ReadyLaw(LibraryLaw):
     """
 
     def __init__(
-        self, name: str, params: Mapping[str, Any], memory: Mapping[str, npt.ArrayLike], *, kind: str
+        self, name: str, params: Mapping[str, Any], memory: Mapping[str, npt.ArrayLike], *, kind: Kind
     ) -> None:
         fixed = {key: value for key, value in params.items() if not callable(value)}
         super().__init__(_SOURCE, name, fixed, memory)
-        self._all, self.kind = dict(params), kind
+        self._all = dict(params)
+        self.kind: Kind = kind
 
     def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
         """Parameters and their initial values for a robot."""

@@ -1,4 +1,4 @@
-"""What is drawn in three dimensions: arm and scene, the path driven, the force of a contact, frames, taught points."""
+"""What is drawn in three dimensions: arm and scene, a plan, the path driven, the force of a contact, frames, points."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from heptarm.errors import require
-from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
-from heptarm.sim.plant.scene import Scene
+from heptarm.io.plan_box import PlanOutline
+from heptarm.sim.plant.appearance import ArmMeshes
+from heptarm.sim.plant.carried import GEOMS, mujoco_size
+from heptarm.sim.plant.scene import Scene, is_mounted
+from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from heptarm.values.shape import Shape
 
-_COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
+_GHOST, _TOUCH = (90, 170, 255), (224, 49, 49)
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
 #: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
 _ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.01, 0.6, 2.0
@@ -55,50 +58,44 @@ class DrawnWorld:
         *,
         root: str = "",
     ) -> None:
-        self._root = root
         self._model = compiled(model, (), scene, meshes or ArmMeshes())
         self._data = mujoco.MjData(self._model)
         self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
         self._handles = [
-            (index, self._shape(server, index)) for index in range(self._model.ngeom) if self._is_drawn(index)
+            (
+                one.index,
+                server.scene.add_mesh_simple(
+                    f"{root}/world/{one.index}", one.vertices, one.faces, color=one.colour
+                ),
+            )
+            for one in drawn_shapes(self._model)
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
+        self._scene, self._root, self._has_tool = server.scene, root, is_mounted(self._model)
+        self._carried: tuple[tuple[Shape, Pose], ...] = ()
+        self._carried_handles: list[Any] = []
 
-    def _is_drawn(self, index: int) -> bool:
-        kind = int(self._model.geom_type[index])
-        endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-        return not endless and int(self._model.geom_group[index]) < HIDDEN_GROUP
+    def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
+        """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
 
-    def _shape(self, server: Any, index: int) -> Any:
-        vertices, faces = self._mesh(index)
-        model, red_green_blue = self._model, self._model.geom_rgba[index, :3]
-        material = model.geom_matid[index]
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MATERIAL, material) if material >= 0 else ""
-        colour = _COLOURS.get(name) or tuple(round(255 * float(part)) for part in red_green_blue)
-        return server.scene.add_mesh_simple(f"{self._root}/world/{index}", vertices, faces, color=colour)
-
-    def _mesh(self, index: int) -> tuple[Array, Array]:
-        """Vertices and faces of a shape in its own frame."""
-        creation = require("trimesh.creation", extra="viz")
-        model, kind = self._model, self._model.geom_type[index]
-        radius, half, depth = model.geom_size[index].tolist()
-        if kind == mujoco.mjtGeom.mjGEOM_MESH:
-            one = int(model.geom_dataid[index])
-            first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
-            vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
-            return np.array(vertices), np.array(model.mesh_face[face : face + int(model.mesh_facenum[one])])
-        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
-            mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
-        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            mesh = creation.cylinder(radius=radius, height=2 * half, sections=32)
-        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-            mesh = creation.box(extents=(2 * radius, 2 * half, 2 * depth))
-        else:  # a sphere has one radius, an ellipsoid three
-            mesh = creation.icosphere(subdivisions=3, radius=1.0)
-            mesh.apply_scale((radius, half or radius, depth or radius))
-        return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+        Where the scene has a tool on the flange, that one is drawn alone.
+        """
+        if self._has_tool or shapes == self._carried:
+            return
+        for handle in self._carried_handles:
+            handle.remove()
+        self._carried = shapes
+        self._carried_handles = [
+            self._scene.add_mesh_simple(
+                f"{self._root}/flange/carried/{number}",
+                *solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
+                color=_TOOL,
+                position=pose.xyz,
+                wxyz=wxyz(pose),
+            )
+            for number, (one, pose) in enumerate(shapes)
+        ]
 
     def show(self, q: Array) -> None:
         """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""
@@ -119,6 +116,64 @@ class DrawnWorld:
     def flange(self) -> Any:
         """MuJoCo's view of the flange, as it was shown last: `xpos` is its position in the base, shape (3,) [m]."""
         return self._data.site("flange")
+
+
+class DrawnGhost:
+    """A plan in viser: a translucent arm that moves along it, its path, and where bodies would touch.
+
+    Args:
+        server: a viser server.
+        model: "iiwa7", "iiwa14", "med7" or "med14".
+        meshes: of the arm.
+        root: node of viser's scene that is the base of the arm.
+    """
+
+    def __init__(self, server: Any, model: str, meshes: ArmMeshes, root: str) -> None:
+        self._scene, self._root = server.scene, f"{root}/plan"
+        self._model = compiled(model, (), None, meshes)
+        self._data = mujoco.MjData(self._model)
+        self._plan: PlanOutline | None = None
+        self._shapes: list[tuple[int, Any]] = []
+        self._lines: list[Any] = []
+
+    def show(self, plan: PlanOutline | None, t: float) -> None:
+        """Move the ghost to a time of a plan [s]; None: hide it."""
+        if plan is not self._plan:
+            self._plan = plan
+            self._draw_path(plan)
+            for _, handle in self._shapes:
+                handle.visible = plan is not None
+        if plan is None:
+            return
+        if not self._shapes:
+            self._shapes = [(one.index, self._translucent(one)) for one in drawn_shapes(self._model)]
+        self._data.qpos[:7] = [np.interp(t, plan.t, column) for column in plan.q.T]
+        mujoco.mj_kinematics(self._model, self._data)
+        quat = np.zeros(4)
+        for index, handle in self._shapes:
+            mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
+            handle.position, handle.wxyz = self._data.geom_xpos[index].copy(), quat.copy()
+
+    def _translucent(self, one: DrawnShape) -> Any:
+        node = f"{self._root}/{one.index}"
+        return self._scene.add_mesh_simple(node, one.vertices, one.faces, color=_GHOST, opacity=0.35)
+
+    def _draw_path(self, plan: PlanOutline | None) -> None:
+        for handle in self._lines:
+            handle.remove()
+        self._lines = []
+        if plan is None or len(plan.path) < 2:
+            return
+        segments = np.stack([plan.path[:-1], plan.path[1:]], axis=1).astype(np.float32)
+        self._lines.append(
+            self._scene.add_line_segments(
+                f"{self._root}/path", segments, _GHOST, thickness=3.0, thickness_units="screen"
+            )
+        )
+        for number, t in enumerate(plan.touches):
+            place = np.array([np.interp(t, plan.t, column) for column in plan.path.T])
+            node = f"{self._root}/touch{number}"
+            self._lines.append(self._scene.add_icosphere(node, radius=0.02, color=_TOUCH, position=place))
 
 
 class DrawnMarks:

@@ -144,8 +144,9 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """From the first to the last pushed state [s]."""
-        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+        """From the first to the last pushed state, or FRI cycle if there are no states [s]."""
+        t = self.t if len(self.t) else self.signals.get(f"{FRI}t", self.t)
+        return float(t[-1] - t[0]) if len(t) else 0.0
 
     @property
     def robot(self) -> RobotModel | None:
@@ -384,6 +385,9 @@ def _recording(path: Path, content: _Content) -> Recording:
     if len(t) and content.earliest is not None:  # of several arms: zero is the first state of all
         t = t + (content.published[0] - content.earliest) * 1e-9 * rate
     line = _TimeLine(published[order], t[order], rate)
+    if not len(t) and content.cycled:  # of an FRI client: zero is its first cycle
+        cycled = np.array(content.cycled, dtype=np.float64)
+        line = _TimeLine(cycled, (cycled - cycled[0]) * 1e-9, 1.0)
     signals["t"] = t
     signals |= signals_of(states)
     if content.cycled:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
-from weakref import WeakSet
+from typing import TYPE_CHECKING, TypeAlias
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +28,14 @@ _REST = 0.01
 #: Longest sleep of the watching thread without a state [s].
 _NAP = 0.2
 
-#: Arms with a guard in force: two guards would contradict each other.
-_guarded: WeakSet[Arm] = WeakSet()
+_OnCollision: TypeAlias = "Callable[[Collision], None] | None"
+#: Arms with a guard in force, with what is called: two guards would contradict each other.
+_guarded: WeakKeyDictionary[Arm, tuple[CollisionGuard, _OnCollision]] = WeakKeyDictionary()
+
+
+def in_force(arm: Arm) -> tuple[CollisionGuard, _OnCollision] | None:
+    """The guard of the block that `guarded` has begun, and what is called at a collision; None: there is no block."""
+    return _guarded.get(arm)
 
 
 def collision_guard(
@@ -75,11 +81,11 @@ def guarded(
     on_collision: Callable[[Collision], None] | None = None,
     then: Reaction = "relax",
 ) -> Iterator[CollisionGuard]:
-    """A block whose motions and servo motions end at a collision.
+    """A block whose motions, servo motions and FRI sessions end at a collision.
 
     The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path and relaxes. A
     guard with a margin is monitored by this program, in every pushed state, and stops the arm as hard as possible; it
-    reacts later by the delay of the network.
+    reacts later by the delay of the network. The loop of an FRI session monitors either kind in every message.
 
     Args:
         arm: in control.
@@ -97,7 +103,7 @@ def guarded(
     if on_collision is not None:
         callback(on_collision, "on_collision")
     bands = collision_guard(arm) if guard is None else instance(guard, CollisionGuard, "guard")
-    _guarded.add(arm)
+    _guarded[arm] = (bands, on_collision)
     try:
         with (
             _watched(arm, bands, on_collision)
@@ -106,7 +112,7 @@ def guarded(
         ):
             yield bands
     finally:
-        _guarded.discard(arm)
+        del _guarded[arm]
 
 
 @contextlib.contextmanager

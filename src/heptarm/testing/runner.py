@@ -30,6 +30,7 @@ GROUPS = (
     "patterns",
     "conditions",
     "servo",
+    "laws",
     "tools",
     "signals",
     "contact",

@@ -17,6 +17,8 @@ from typing import NamedTuple
 DRIFT = 1e-4
 #: Largest deviation from the estimate that does not count as a step [ns].
 TOLERANCE = 300_000
+#: A clock slower than this rate over a time shorter than this [ns] stands for a moment; that is not its rate.
+STALLED, SHORT = 0.05, 500_000_000
 
 
 class _Sample(NamedTuple):
@@ -84,6 +86,8 @@ class ClockOffset:
         rate, slack = (new.theirs - old.theirs) / base, (old.slack * max(self._rate, 1.0) + new.slack) / base
         if abs(rate - 1.0) <= slack + DRIFT:
             return 1.0
+        if rate < STALLED and base < SHORT:
+            return self._rate
         # drift and round trips do not explain it: the clock runs at another rate
         return max(rate, 0.0)
 

@@ -37,6 +37,15 @@ class Role(enum.IntEnum):
     CONTROL = 1
 
 
+class ShapeKind(enum.IntEnum):
+    """Kind of a solid shape."""
+
+    BOX = 0
+    CYLINDER = 1
+    SPHERE = 2
+    CAPSULE = 3
+
+
 class When(enum.IntEnum):
     """What to do with a program while another one runs."""
 
@@ -1942,6 +1951,37 @@ class FrameInfo:
         self.pose._check(path + "pose.")
 
 
+_Shape_0 = Struct(">B3d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """A solid shape of a tool or a workpiece."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"size": (0.0, 4.0)}
+
+    kind: ShapeKind
+    size: tuple[float, ...]
+    pose: Pose
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Shape_0.pack(self.kind, *self.size))
+        self.pose._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Shape, int]:
+        v = codec.unpack(_Shape_0, data, pos)
+        pos += _Shape_0.size
+        kind = codec.read_enum(ShapeKind, v[0])
+        size = v[1:4]
+        pose, pos = Pose._read(data, pos)
+        return cls(kind=kind, size=size, pose=pose), pos
+
+    def _check(self, path: str) -> None:
+        codec.check_array(self.size, path + "size", 0.0, 4.0, False, False)
+        self.pose._check(path + "pose.")
+
+
 _ToolInfo_0 = Struct(">d3d6d")
 
 
@@ -1956,6 +1996,7 @@ class ToolInfo:
     com: tuple[float, ...]
     inertia: tuple[float, ...]
     frames: tuple[FrameInfo, ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -1963,6 +2004,9 @@ class ToolInfo:
         out.append(codec.put_count(len(self.frames)))
         for one_frames in self.frames:
             one_frames._write(out)
+        out.append(codec.put_count(len(self.shapes)))
+        for one_shapes in self.shapes:
+            one_shapes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ToolInfo, int]:
@@ -1978,7 +2022,13 @@ class ToolInfo:
             one_frames, pos = FrameInfo._read(data, pos)
             frames_list.append(one_frames)
         frames = tuple(frames_list)
-        return cls(name=name, mass=mass, com=com, inertia=inertia, frames=frames), pos
+        size, pos = codec.read_count(data, pos)
+        shapes_list: list[Shape] = []
+        for _ in range(size):
+            one_shapes, pos = Shape._read(data, pos)
+            shapes_list.append(one_shapes)
+        shapes = tuple(shapes_list)
+        return cls(name=name, mass=mass, com=com, inertia=inertia, frames=frames, shapes=shapes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.name.encode()), path + "name", 1, 64)
@@ -1988,6 +2038,9 @@ class ToolInfo:
         codec.check_length(len(self.frames), path + "frames", 0, 32)
         for index, its_frames in enumerate(self.frames):
             its_frames._check(f"{path}frames[{index}].")
+        codec.check_length(len(self.shapes), path + "shapes", 0, 16)
+        for index, its_shapes in enumerate(self.shapes):
+            its_shapes._check(f"{path}shapes[{index}].")
 
 
 _SignalInfo_0 = Struct(">BBdd")
@@ -4976,6 +5029,68 @@ class ControlChanged:
         self._check("")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolChanged:
+    """The attached tool or workpiece has changed, or was defined again."""
+
+    TYPE: ClassVar[int] = 106
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    tool: ToolInfo | None = None
+    workpiece: ToolInfo | None = None
+
+    def _write(self, out: list[bytes]) -> None:
+        if self.tool is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.tool._write(out)
+        if self.workpiece is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.workpiece._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ToolChanged, int]:
+        present, pos = codec.read_flag(data, pos)
+        tool: ToolInfo | None = None
+        if present:
+            tool, pos = ToolInfo._read(data, pos)
+        present, pos = codec.read_flag(data, pos)
+        workpiece: ToolInfo | None = None
+        if present:
+            workpiece, pos = ToolInfo._read(data, pos)
+        return cls(tool=tool, workpiece=workpiece), pos
+
+    def _check(self, path: str) -> None:
+        if self.tool is not None:
+            self.tool._check(path + "tool.")
+        if self.workpiece is not None:
+            self.workpiece._check(path + "workpiece.")
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> ToolChanged:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "ToolChanged")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _SafetyChanged_0 = Struct(">HB")
 
 
@@ -5243,7 +5358,7 @@ _DialogClosed_0 = Struct(">Ii")
 class DialogClosed:
     """The operator has answered a dialog."""
 
-    TYPE: ClassVar[int] = 106
+    TYPE: ClassVar[int] = 107
     KIND: ClassVar[str] = "event"
     SOURCE: ClassVar[str] = "cabinet"
     ROLE: ClassVar[str] = "any"
@@ -5410,7 +5525,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | DialogClosed | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | DialogClosed | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5466,12 +5581,13 @@ MESSAGES: dict[int, type[Message]] = {
     98: TriggerFired,
     99: MotionFinished,
     100: ControlChanged,
+    106: ToolChanged,
     101: SafetyChanged,
     102: KeyPressed,
     103: Notice,
     104: ConditionFired,
     105: SegmentReached,
-    106: DialogClosed,
+    107: DialogClosed,
     112: State,
 }
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)

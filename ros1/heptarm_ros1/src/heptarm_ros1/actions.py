@@ -12,19 +12,23 @@ from actionlib_msgs.msg import GoalStatus
 
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.ros.interface.action import ActionDispatcher, ActionResult, GoalWork, RosAction, fill
-from heptarm.ros.interface.actions import ACTIONS
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.offered import offered_actions
 from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm_ros1 import convert
 
 
 class ActionServers:
-    """Passes goals to their handlers, and feedback and results to their clients."""
+    """Passes goals to their handlers, and feedback and results to their clients.
 
-    def __init__(self) -> None:
+    Args:
+        names: the parameter of that name.
+    """
+
+    def __init__(self, names: str) -> None:
         self._dispatcher: ActionDispatcher | None = None
-        self._servers = [self._server(row) for row in ACTIONS]
+        self._servers = [self._server(row) for row in offered_actions(names)]
         for server in self._servers:
             server.start()
 

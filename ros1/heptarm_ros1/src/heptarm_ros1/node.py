@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.names import NameRole
 from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration
 from heptarm.ros.trajectory.goal import GoalResult
@@ -52,7 +53,7 @@ class HeptarmNode:
         self._wake = threading.Event()
         # actionlib cannot destroy a server, so they live as long as the node, and reject while it is not configured
         self._trajectories = TrajectoryAction(("~follow_joint_trajectory", *parameters.preset().actions()))
-        self._actions = ActionServers()
+        self._actions = ActionServers(str(rospy.get_param("~names", "heptarm")))
         steps: tuple[tuple[type, str, Callable[[], str]], ...] = (
             (Trigger, "~configure", self.configure),
             (Trigger, "~activate", self.activate),
@@ -236,6 +237,8 @@ class HeptarmNode:
         """Publish that a user key of the smartPAD was pressed or released."""
         if self._events is not None and not rospy.is_shutdown():
             self._events.key(slot, down)
+        if self._presets is not None and not rospy.is_shutdown():
+            self._presets.event(NameRole.KEY, f"key{slot}_{'pressed' if down else 'released'}")
 
     def on_event(self, number: int, event: MotionEvent) -> None:
         """Publish an event of a program."""
@@ -246,6 +249,11 @@ class HeptarmNode:
         """Publish a collision."""
         if self._events is not None and not rospy.is_shutdown():
             self._events.collision(found)
+
+    def on_arrival(self) -> None:
+        """Publish that the arm is at its destination."""
+        if self._presets is not None and not rospy.is_shutdown():
+            self._presets.event(NameRole.ARRIVED)
 
     # ---------------------------------------------------------------------------------- reporting
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from heptarm.ros.interface.messages import class_of
-from heptarm.ros.interface.names import PRESETS
-from heptarm.ros.interface.state_messages import preset_message
+from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.state_messages import preset_event, preset_message
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
@@ -12,13 +12,17 @@ from heptarm_ros1.publishers import publisher
 
 
 class PresetPublisher:
-    """Publishes states under the names that the parameter `names` adds."""
+    """Publishes states and events under the names that the parameter `names` adds."""
 
     def __init__(self, configuration: NodeConfiguration) -> None:
         self._names = configuration
         self._publishers = [
             (entry, publisher(class_of(entry.type, "msg"), entry.name))
             for entry in PRESETS[configuration.values["names"]].published()
+        ]
+        self._events = [
+            (entry, publisher(class_of(entry.type, "msg"), entry.name))
+            for entry in PRESETS[configuration.values["names"]].events()
         ]
 
     def state(self, state: State) -> None:
@@ -28,7 +32,13 @@ class PresetPublisher:
             if message is not None:
                 one.publish(message)
 
+    def event(self, role: NameRole, value: str = "") -> None:
+        """Publish that something has happened, on the topics of its role."""
+        for entry, one in self._events:
+            if entry.role is role:
+                one.publish(preset_event(ROS, one.data_class, value))
+
     def destroy(self) -> None:
         """Destroy the publishers."""
-        for _, one in self._publishers:
+        for _, one in self._publishers + self._events:
             one.unregister()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy.typing as npt
 
@@ -12,6 +13,7 @@ from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import instance
+from heptarm.values.clearance import CarriesTools
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.mode.impedance import CartesianImpedance
@@ -20,11 +22,13 @@ from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body
+from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
 
 _ORIGIN = Pose.of((0.0, 0.0, 0.0))
+_Model = TypeVar("_Model")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +68,11 @@ class Tooling:
 
     @property
     def known(self) -> dict[str, KnownTool]:
-        """Tools by name: templates that the cabinet reported, and tools that this client defined."""
-        templates = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
-        return templates | self._defined
+        """Tools by name: those that the cabinet reported, and those that this client defined."""
+        reported = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
+        event = self._connection.events.attached
+        latest = {} if event is None or event.tool is None else {event.tool.name: known_tool(event.tool)}
+        return reported | self._defined | latest
 
     @property
     def taught(self) -> dict[str, Pose]:
@@ -93,6 +99,34 @@ class Tooling:
         held = self._workpiece.body.placed(self.on_flange(attached.frame))
         return held if tool is None else tool.body.joined(held)
 
+    def _carried(self) -> tuple[KnownTool | None, Workpiece | KnownTool | None, Pose]:
+        """The attached tool and workpiece as far as they are known, and the frame that holds the workpiece."""
+        attached = self.attached
+        if attached is None:
+            return None, None, _ORIGIN
+        event = self._connection.events.attached
+        held: Workpiece | KnownTool | None = self._workpiece
+        if held is None and event is not None and event.workpiece is not None:
+            held = known_tool(event.workpiece)
+        if held is not None and attached.workpiece != held.name:
+            held = None
+        return self.known.get(attached.tool), held, self.on_flange(attached.frame)
+
+    def loaded(self, model: _Model) -> _Model:
+        """A model of collisions with the shapes of what is attached, if it has a place for them."""
+        if not isinstance(model, CarriesTools):
+            return model
+        tool, held, at = self._carried()
+        loaded: _Model = model.carrying(tool, held, at=at)
+        return loaded
+
+    @property
+    def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
+        """Shapes of what is attached, each with its pose in the flange frame."""
+        tool, held, at = self._carried()
+        own = () if tool is None else tuple((one, one.pose) for one in tool.shapes)
+        return own if held is None else own + tuple((one, at @ one.pose) for one in held.shapes)
+
     # ------------------------------------------------------------------------------- attaching
 
     def attach(self, tool: Tool | str, frame: str | None) -> None:
@@ -104,7 +138,9 @@ class Tooling:
             if frame is not None:
                 tool.frame(frame)
             self._connection.request(wire.DefineTool(tool=tool_message(tool)))
-            self._defined[tool.name] = KnownTool(tool.name, tool.mass, tool.frames, tool.com, tool.inertia)
+            self._defined[tool.name] = KnownTool(
+                tool.name, tool.mass, tool.frames, tool.com, tool.inertia, tool.shapes
+            )
             name = tool.name
         elif isinstance(tool, str):
             name, main = tool, frame or ""

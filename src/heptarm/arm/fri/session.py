@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy.typing as npt
@@ -26,6 +26,7 @@ from heptarm.arm.fri.settings import FriRequest, check_command
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import Block, MotionHandle
 from heptarm.errors import (
+    CollisionDetected,
     CommandRejected,
     ConnectFailed,
     HeptarmError,
@@ -34,6 +35,7 @@ from heptarm.errors import (
     MotionAborted,
     NeedsOperator,
     NotReady,
+    QualityLost,
     SafetyStop,
     StreamError,
     Timeout,
@@ -48,6 +50,7 @@ from heptarm.fri.session.session import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
 from heptarm.record.journal import FRI
 from heptarm.values.arrays import within
+from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause, Result
@@ -70,11 +73,20 @@ class Fri(Block):
     Args:
         connection: to the cabinet.
         request: the checked request.
+        on_collision: called with a collision, as soon as the program looks at the session.
     """
 
     what = "FRI session"
 
-    def __init__(self, connection: Connection, request: FriRequest) -> None:
+    def __init__(
+        self,
+        connection: Connection,
+        request: FriRequest,
+        *,
+        on_collision: Callable[[Collision], None] | None = None,
+    ) -> None:
+        self._on_collision = on_collision
+        self._collision: Collision | None = None
         self._connection = connection
         self._request = request
         self._host = request.message.host
@@ -173,6 +185,7 @@ class Fri(Block):
             QualityLost: the quality of the connection became too bad; the hint gives the likely cause.
             MotionAborted: the cabinet ended the motion, by a safety stop for instance.
             StreamError: the law raised an error, or the cabinet closed a monitoring session.
+            CollisionDetected: the external torque of a joint left its band.
             ConnectionLost: the connection to the cabinet has ended.
         """
         if self._closed or self._client is None:
@@ -182,7 +195,14 @@ class Fri(Block):
         try:
             self._end()
         except MotionAborted as error:
-            raise self._early_end(error, hint) from error
+            if self._collision is not None:
+                raise self._collided(error.result) from error
+            early = self._early_end(error, hint)
+            if self._law_error and isinstance(early, QualityLost):  # the law kept the loop from answering
+                raise StreamError(self._law_error, hint="the cabinet stopped the arm") from error
+            raise early from error
+        if self._collision is not None:
+            raise self._collided(self._result)
         if self._law_error:
             raise StreamError(self._law_error, hint="the guard braked the arm within its limits")
         if self.kind == "monitor" and not was_open:
@@ -214,6 +234,16 @@ class Fri(Block):
             limited=self.client.limited,
         )
 
+    def _collided(self, result: Result | None) -> CollisionDetected:
+        """The error of a session that ended at a collision."""
+        return CollisionDetected(
+            f"collision at {self._collision}",
+            collision=self._collision,
+            result=result,
+            history=self._connection.history(),
+            hint="the guard braked the arm within its limits; check what the arm has hit",
+        )
+
     def _last_report(self) -> wire.FriChanged:
         """The cabinet's last report on this session."""
         return self._connection.events.fri_change(self._number) or no_report(self._number)
@@ -230,9 +260,10 @@ class Fri(Block):
 
     @property
     def active(self) -> bool:
-        """Whether the session is open and its law, if it has one, has not failed."""
+        """Whether the session is open, without a collision, and its law, if it has one, has not failed."""
         self._take_events()
-        return not self._closed and not self._law_error and self._is_open
+        has_failed = self._law_error or self._collision is not None
+        return not self._closed and not has_failed and self._is_open
 
     @property
     def result(self) -> Result | None:
@@ -396,6 +427,10 @@ class Fri(Block):
         return taken
 
     def _take_events(self) -> None:
+        if self._collision is None and (found := self.client.collision) is not None:
+            self._collision = found
+            if self._on_collision is not None:
+                self._on_collision(found)
         for event in self.client.events():
             self._events.append(event)
             self._connection.journal.add(FRI, event.text, at=event.at)

@@ -23,6 +23,7 @@ from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
 from heptarm.io.udp import UdpSocket
 from heptarm.values.arrays import instance, integer, scalar, shown, within, word
+from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
@@ -64,6 +65,7 @@ class FriKeywords(TypedDict, total=False):
     law: Law | None
     params: Mapping[str, npt.ArrayLike] | None
     memory: Mapping[str, npt.ArrayLike] | None
+    collision: CollisionGuard | None
     policy: Policy | None
     limits: Limits | None
     pose_limits: PoseLimits | None
@@ -104,6 +106,7 @@ def request(
     law: Law | None = None,
     params: Mapping[str, npt.ArrayLike] | None = None,
     memory: Mapping[str, npt.ArrayLike] | None = None,
+    collision: CollisionGuard | None = None,
     policy: Policy | None = None,
     limits: Limits | None = None,
     pose_limits: PoseLimits | None = None,
@@ -148,6 +151,7 @@ def request(
         law=law,
         params=params,
         memory=memory,
+        collision=collision,
         history=history,
         realtime=realtime,
         cpu=cpu,
@@ -177,6 +181,7 @@ def request(
                 law=law,
                 params=params,
                 memory=memory,
+                collision=collision,
                 history=history,
                 realtime=realtime,
                 cpu=cpu,

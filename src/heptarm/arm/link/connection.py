@@ -29,6 +29,7 @@ from heptarm.errors import (
     HeptarmError,
     LocalProtocolError,
     ModeConflict,
+    NotInControl,
     SafetyStop,
     StaleState,
     Timeout,
@@ -142,6 +143,7 @@ class Events:
 
     Attributes:
         key_listeners: called with (slot, pressed) of each user key of the smartPAD.
+        attached: the cabinet's last report on tool and workpiece; None: nothing has changed since the connection.
         dialog_listeners: called with the number, the pressed button and the problem of each closed dialog.
     """
 
@@ -152,6 +154,7 @@ class Events:
         self._servo_status: wire.ServoStatus | None = None
         self._fri_changes: dict[int, wire.FriChanged] = {}
         self.key_listeners: list[Callable[[int, bool], None]] = []
+        self.attached: wire.ToolChanged | None = None
         self.dialog_listeners: list[Callable[[int, int, str], None]] = []
 
     def dispatch(self, message: Message) -> None:
@@ -175,6 +178,8 @@ class Events:
                 closed(message.dialog, message.button, message.text)
         elif isinstance(message, wire.FriChanged):
             self._note_fri(message)
+        elif isinstance(message, wire.ToolChanged):
+            self.attached = message
         elif isinstance(message, wire.ControlChanged):
             self._on_control(message)
         elif isinstance(message, wire.SafetyChanged):
@@ -201,8 +206,9 @@ class Events:
         return sum(program.limit for program in list(self._programs.values()))
 
     def forget_unclaimed(self) -> None:
-        """Drop events of the previous link: its program numbers mean nothing on a new one."""
+        """Drop events of the previous link: they mean nothing on a new one."""
         self._unclaimed.clear()
+        self.attached = None
 
     def lose(self, error: HeptarmError) -> None:
         """End all accepted programs with an error."""
@@ -399,7 +405,19 @@ class Connection:
                 self._link.close()
             self.open()
             if had_control:
-                self.take_control()
+                self._regain_control()
+
+    def _regain_control(self) -> None:
+        """Take control as soon as the cabinet has stopped the arm and ended this client's previous session."""
+        deadline = self.clock.nanos() + round(self.options.timeout * 1e9)
+        while True:
+            try:
+                return self.take_control()
+            except NotInControl:
+                is_ours = self.controller in ("", self.options.name)  # "": it has just ended
+                if not is_ours or self.clock.nanos() > deadline:
+                    raise
+            self.clock.sleep(PAUSE)
 
     def close(self) -> None:
         """End the link, everything that waits for it, and a private cabinet."""
@@ -793,7 +811,7 @@ class Connection:
 
     def _on_control(self, message: wire.ControlChanged) -> None:
         self.controller = message.controller
-        if self.in_control and message.session != self.welcome.session:
+        if self.in_control and self.is_connected and message.session != self.welcome.session:
             self.in_control = False
             _log.warning("control is lost: %s", message.text)
 

@@ -108,11 +108,12 @@ class Foresight:
             _BRIEF if isinstance(one, Hold) and isinf(one.duration) else one for one in motions[:guided]
         ]
         program = self._planned(finite, np.asarray(start), ceiling, _STEP)
+        check = None if self.check is None else self._tooling.loaded(self.check)
         for index, path in enumerate(_paths(program)):
             name = f"motions[{index}]" if len(motions) > 1 else "motion"
             if boundary is not None:
                 _check_inside(path, boundary, name)
-            touch = None if self.check is None else self.check.first_on(path)
+            touch = None if check is None else check.first_on(path)
             if touch is not None:
                 of = f"motions[{index}]: " if len(motions) > 1 else ""
                 raise CollisionForeseen(
@@ -155,6 +156,7 @@ class Foresight:
         torques = np.array([inverse_dynamics(robot, *row, load=load) for row in rows])
         tau = np.array([np.interp(program.t, program.t[kept], column) for column in torques.T]).T
         used = self.check if check is None else check
+        used = None if used is None else tooling.loaded(used)
         return ProgramPreview(
             robot,
             program.t,

@@ -20,6 +20,7 @@ from heptarm.errors import (
     ShapeError,
     refuse_windows,
 )
+from heptarm.fri.guard.collision_watch import as_numbers
 from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
@@ -28,12 +29,15 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import Law
 from heptarm.fri.loop.law_interface import LiveMemory, flat
+from heptarm.fri.loop.law_limit import LawWatch
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
+from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
 from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
+from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -56,6 +60,7 @@ def check_settings(
     law: Law | CompiledLaw | None,
     params: Mapping[str, npt.ArrayLike] | None,
     memory: Mapping[str, npt.ArrayLike] | None,
+    collision: CollisionGuard | None,
     history: int,
     realtime: bool,
     cpu: int | None,
@@ -77,6 +82,7 @@ def check_settings(
         (limits, Limits, "limits"),
         (pose_limits, PoseLimits, "pose_limits"),
         (policy, Policy, "policy"),
+        (collision, CollisionGuard, "collision"),
     ):
         if value is not None:
             instance(value, kind, name)
@@ -117,6 +123,8 @@ class Client(Reader):
             calls it. None: commands come from `command`.
         params: parameters of the law, numbers and arrays by name.
         memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
+        collision: bands of the external torques; at a torque outside its band the arm brakes at once, and the client
+            commands nothing more: `collision` names the joint. None: no such bands.
         history: number of states that are kept.
         realtime: request real-time priority and locked memory.
         cpu: processor of the loop; None for any.
@@ -126,6 +134,7 @@ class Client(Reader):
         params: parameters of the law; assign to change them while it runs.
         memory: memory of the law; read it and assign to it while it runs.
         port: bound UDP port.
+        model: the robot.
 
     Raises:
         ConnectFailed: the port cannot be bound, or the loop did not start.
@@ -146,6 +155,7 @@ class Client(Reader):
         law: Law | CompiledLaw | None = None,
         params: Mapping[str, npt.ArrayLike] | None = None,
         memory: Mapping[str, npt.ArrayLike] | None = None,
+        collision: CollisionGuard | None = None,
         history: int = 2048,
         realtime: bool = True,
         cpu: int | None = None,
@@ -160,6 +170,7 @@ class Client(Reader):
             law=law,
             params=params,
             memory=memory,
+            collision=collision,
             history=history,
             realtime=realtime,
             cpu=cpu,
@@ -170,6 +181,7 @@ class Client(Reader):
                 instance(address, str, what)
         within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
+        self.model = arm
         self._limits = limits or Limits.of(arm)
         name = process.importable(law)
         sent = b"" if law is None or name else process.by_value(law)
@@ -193,8 +205,10 @@ class Client(Reader):
                     "version": wire,
                     "limits": asdict(self._limits),
                     "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
+                    "chain": chain_of(arm),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
+                    "collision": None if collision is None else as_numbers(collision),
                     "law": name,
                     "params": schema,
                     "memory": kept,
@@ -224,6 +238,8 @@ class Client(Reader):
         finally:
             block.unlink()
         self.port = int(self._header[at.PORT])
+        is_python = law is not None and not isinstance(law, CompiledLaw)
+        self._watch = LawWatch(self._layout, self._worker.kill) if is_python else None
 
     def _wait_for_loop(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
@@ -388,6 +404,8 @@ class Client(Reader):
             return
         self._closed = True
         self._header[at.STOP] = 1
+        if self._watch is not None:
+            self._watch.close()
         self._worker.join(timeout)
         if self._worker.is_alive():
             self._worker.kill()

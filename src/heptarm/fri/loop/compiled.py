@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
+from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
 from heptarm.values.arrays import callback, instance, within
 from heptarm.values.robot import RobotModel, robot
 
@@ -304,6 +305,7 @@ class LawTrial:
         self.params = interface.Memory(self._params, schema)
         self.memory = interface.Memory(self._memory, remembered)
         self._state = np.full(_words(interface.STATE), np.nan)
+        self._estimator = WrenchEstimator(chain_of(arm))
         self._command = np.zeros(_words(interface.COMMAND))
         self._shown = interface.Memory(self._state, _places(interface.STATE))
         self._made = interface.Memory(self._command, _places(interface.COMMAND))
@@ -323,7 +325,7 @@ class LawTrial:
             q: measured positions, shape (7,) [rad].
             dq: velocities, shape (7,) [rad/s]; None: zero.
             q_ipo: interpolator's positions, shape (7,) [rad]; None: those of the first call.
-            tau_ext: external torques, shape (7,) [Nm]; None: zero.
+            tau_ext: external torques, shape (7,) [Nm]; None: zero. The law's `wrench` is estimated from them.
 
         Returns:
             Its command: `q`, `tau`, `wrench`; the arrays are overwritten by the next call.
@@ -333,7 +335,10 @@ class LawTrial:
         """
         shown, out = self._shown, self._made
         shown.q, shown.dq = q, np.zeros(7) if dq is None else dq
-        shown.tau_ext = np.zeros(7) if tau_ext is None else tau_ext
+        shown.tau_ext, shown.wrench = np.zeros(7), np.zeros(6)
+        if tau_ext is not None:
+            shown.tau_ext = tau_ext
+            shown.wrench = self._estimator.wrench(np.asarray(q).tolist(), np.asarray(tau_ext).tolist())
         if q_ipo is not None or self.t == 0.0:
             shown.q_ipo = q if q_ipo is None else q_ipo
         shown.t, shown.dt = self.t, self._dt

@@ -12,6 +12,7 @@ from heptarm.fri.guard.pose_guard import PARTS, PoseReport
 from heptarm.fri.protocol.messages import JOINTS, MAX_IO, MONITORED
 from heptarm.fri.session.statistics import BINS, COUNTERS
 from heptarm.io.shared import MemoryBlock, Note, Ring
+from heptarm.values.condition.collision import Collision
 
 # words of the header
 STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, NATIVE, HISTORY, SIZE = range(12)
@@ -19,11 +20,15 @@ STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, NATIVE, HISTORY
 MEMORY_SIZE, MEMORY, MEMORY_SET, OVERRUNS = range(12, 16)
 COUNTS = 16
 LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED = 32, 81, 130
+#: Since when a law in Python runs, monotonic clock [ns]; 0: none runs.
+LAW_SINCE = 180
 LATENCY = 192
 JITTER = LATENCY + BINS + 1
 POSE_COUNTS = JITTER + BINS + 1
 POSE_WORST, POSE_ALLOWED = POSE_COUNTS + 12, POSE_COUNTS + 24
-HEADER_WORDS = POSE_COUNTS + 36
+#: The first collision: 1 + joint (0: none), torque and allowed deviation [Nm].
+COLLIDED, COLLISION_TORQUE, COLLISION_ALLOWED = range(POSE_COUNTS + 36, POSE_COUNTS + 39)
+HEADER_WORDS = POSE_COUNTS + 39
 
 assert COUNTS + len(COUNTERS) <= LIMITED_COUNTS
 
@@ -48,10 +53,11 @@ assert COUNTS + len(COUNTERS) <= LIMITED_COUNTS
     S_REFLECTED,
     S_SENT,
     S_TICKS,
-) = range(19)
-S_TRACKING = 19
+    S_STRATEGY,
+) = range(20)
+S_TRACKING = 20
 #: The joint arrays: those that FRI monitors, then the interpolator's position.
-S_ARRAYS = 20
+S_ARRAYS = S_TRACKING + 1
 ARRAYS = {
     name: slice(S_ARRAYS + JOINTS * i, S_ARRAYS + JOINTS * (i + 1))
     for i, name in enumerate((*MONITORED, "q_ipo"))
@@ -71,8 +77,8 @@ STATE_WORDS = S_IO + MAX_IO
 #: Value of an enumeration that the controller did not send.
 ABSENT = -1
 
-# bits of the flags
-ANSWERED, FILLED, LIMITED, BRAKING = 1, 2, 4, 8
+# bits of the flags; ESTIMATED: of the wrench
+ANSWERED, FILLED, LIMITED, BRAKING, ESTIMATED = 1, 2, 4, 8, 16
 
 # words of a command: sequence, time [ns], bits of the parts that it has, then the numbers
 C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1 = 1, 2, 3, 10, 17, 23, 30
@@ -155,6 +161,23 @@ def write_report(layout: Layout, report: JointReport | PoseReport) -> None:
         ints[counts + start : counts + end] = report.counts[kind]
         floats[worst + start : worst + end] = report.worst[kind]
         floats[allowed + start : allowed + end] = report.allowed[kind]
+
+
+def write_collision(layout: Layout, found: Collision) -> None:
+    """Write the first collision."""
+    floats = layout.block.floats
+    floats[COLLISION_TORQUE], floats[COLLISION_ALLOWED] = found.torque, found.allowed
+    layout.block.ints[COLLIDED] = 1 + found.joint  # last: a reader then finds the others
+
+
+def read_collision(layout: Layout) -> Collision | None:
+    """Read the first collision; None: there was none."""
+    ints, floats = layout.block.ints, layout.block.floats
+    if not ints[COLLIDED]:
+        return None
+    return Collision(
+        int(ints[COLLIDED]) - 1, float(floats[COLLISION_TORQUE]), float(floats[COLLISION_ALLOWED])
+    )
 
 
 def report_lines(layout: Layout) -> list[str]:

@@ -58,7 +58,8 @@ class ActionResult:
     def fill(self, result: Any) -> Any:
         """Fill a ROS result."""
         success = self.outcome is GoalOutcome.SUCCEEDED if self.success is None else self.success
-        fill(result, {"success": success, "message": self.text, **self.fields})
+        error = "" if success else self.text  # of a result of iiwa_stack
+        fill(result, {"success": success, "message": self.text, "error": error, **self.fields})
         return result
 
 

@@ -118,6 +118,17 @@ def _move(context: NodeContext, goal: Any, motion: Motion) -> GoalWork:
     return _start(context, goal, (with_triggers(motion, goal.triggers),))
 
 
+def run_motion(context: NodeContext, motion: Motion, *, speed: float | None = None) -> GoalWork:
+    """Start a motion in place of any other.
+
+    Args:
+        context: of the node.
+        motion: to start.
+        speed: speed limit, (0, 1]; None: that of the parameter `speed`.
+    """
+    return _ProgramGoal(context, context.driver.start(motion, speed=speed)).run
+
+
 def _start(context: NodeContext, goal: Any, program: Sequence[Motion]) -> GoalWork:
     when: Any = getattr(goal, "when", "") or "replace"
     speed = None if goal.speed == 0.0 else goal.speed
@@ -294,9 +305,7 @@ class _GuidingGoal:
         """Record states until the motion has ended; returns why this goal ended it, empty: something else did."""
         published = 0
         why = ""
-        for state in self._arm.states():
-            if self._handle.done:
-                break
+        for state in self._handle.states():  # to its end, also those that are read late
             self.recorded.append(state)
             if state.stamp - published >= FEEDBACK_PERIOD * 1e9:
                 published = state.stamp

@@ -6,6 +6,7 @@ import contextlib
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import NotReady, Timeout
+from heptarm.ros.interface.iiwa_settings import IiwaStackSettings
 from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.node.driver import Driver
 from heptarm.skills.gripper import TwoSignalGripper
@@ -31,6 +32,7 @@ class NodeContext:
         taught: trajectories recorded by the action `teach`, by name.
         gripper: of the action `gripper_cmd`; None: it has had no goal yet.
         gripper_goal: number of its newest goal; 0: none.
+        iiwa_stack: what the services with names of iiwa_stack have set.
     """
 
     def __init__(self, driver: Driver, ros: RosAdapter) -> None:
@@ -40,6 +42,7 @@ class NodeContext:
         self.taught: dict[str, Trajectory] = {}
         self.gripper: TwoSignalGripper | None = None
         self.gripper_goal = 0
+        self.iiwa_stack = IiwaStackSettings()
         self._mode = contextlib.ExitStack()
 
     @property

@@ -37,6 +37,11 @@ class NameRole(Enum):
     LBR_TORQUE = auto()
     LBR_WRENCH = auto()
     FORWARD = auto()
+    OWN_STATE = auto()
+    OWN_COMMAND = auto()
+    ACTION = auto()
+    ARRIVED = auto()
+    KEY = auto()
 
 
 _TYPES = {
@@ -54,15 +59,20 @@ _TYPES = {
     NameRole.LBR_TORQUE: "lbr_fri_idl/LBRTorqueCommand",
     NameRole.LBR_WRENCH: "lbr_fri_idl/LBRWrenchCommand",
     NameRole.FORWARD: "std_msgs/Float64MultiArray",
+    NameRole.ARRIVED: "std_msgs/Time",
+    NameRole.KEY: "std_msgs/String",
 }
-#: Roles that the node publishes; it subscribes to the others or serves them.
+#: Roles that the node publishes with each state.
 _PUBLISHED = (
     NameRole.JOINT_STATES,
     NameRole.POSE,
     NameRole.WRENCH,
     NameRole.STAMPED_WRENCH,
     NameRole.LBR_STATE,
+    NameRole.OWN_STATE,
 )
+#: Roles that the node publishes when something happens; it subscribes to the others or serves them.
+_EVENTS = (NameRole.ARRIVED, NameRole.KEY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,30 +83,47 @@ class PresetName:
         name: relative to the node's namespace.
         role: what it is for.
         native: heptarm's own name for it, "~/" for the node's.
-        external: the efforts of its joint states are external torques, not measured ones.
-        service: type of a service, as "package/Type".
+        external: its torques are external ones, not measured ones.
+        own_type: its type where the role alone does not give it, as "package/Type".
+        needs: a package of the other driver without which it is of no use, though its type is in another one.
     """
 
     name: str
     role: NameRole
     native: str
     external: bool = False
-    service: str = ""
+    own_type: str = ""
+    needs: str = ""
 
     @property
     def type(self) -> str:
         """Its type, as "package/Type"."""
-        return self.service or _TYPES[self.role]
+        return self.own_type or _TYPES[self.role]
+
+    @property
+    def last(self) -> str:
+        """The last part of its name."""
+        return self.name.rpartition("/")[2]
+
+    @property
+    def package(self) -> str:
+        """The package that has to be installed for it."""
+        return self.needs or self.type.partition("/")[0]
 
     @property
     def is_available(self) -> bool:
         """Whether the package of its type is installed."""
-        return importlib.util.find_spec(self.type.partition("/")[0]) is not None
+        return importlib.util.find_spec(self.package) is not None
 
     @property
     def is_published(self) -> bool:
-        """Whether the node publishes it."""
+        """Whether the node publishes it with each state."""
         return self.role in _PUBLISHED
+
+    @property
+    def is_event(self) -> bool:
+        """Whether the node publishes it when something happens."""
+        return self.role in _EVENTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +146,13 @@ class Preset:
         """Its topics that the node publishes, of those whose types are installed."""
         return tuple(entry for entry in self.entries if entry.is_published and entry.is_available)
 
+    def events(self) -> tuple[PresetName, ...]:
+        """Its topics that the node publishes when something happens, of those whose types are installed."""
+        return tuple(entry for entry in self.entries if entry.is_event and entry.is_available)
+
     def missing(self) -> tuple[str, ...]:
         """Packages of types that are not installed."""
-        return tuple(
-            sorted({entry.type.partition("/")[0] for entry in self.entries if not entry.is_available})
-        )
+        return tuple(sorted({entry.package for entry in self.entries if not entry.is_available}))
 
 
 def _iiwa(flange: str) -> Mapping[str, object]:
@@ -139,7 +168,8 @@ def _iiwa(flange: str) -> Mapping[str, object]:
 def _libiiwa(kind: str, native: str, *names: str) -> tuple[PresetName, ...]:
     """Services of libiiwa of one type."""
     return tuple(
-        PresetName(f"iiwa/{name}", NameRole.SERVICE, native, service=f"libiiwa_msgs/{kind}") for name in names
+        PresetName(f"iiwa/{name}", NameRole.SERVICE, native, own_type=f"libiiwa_msgs/{kind}")
+        for name in names
     )
 
 
@@ -179,9 +209,82 @@ _LIBIIWA_SERVICES = (
         "set_cartesian_max_path_deviation",
     ),
     *_libiiwa("SetArray", "~/set_guard", "set_force_condition", "set_joint_torque_condition"),
-    PresetName("iiwa/reset_conditions", NameRole.SERVICE, "~/set_guard", service="std_srvs/Empty"),
+    PresetName("iiwa/reset_conditions", NameRole.SERVICE, "~/set_guard", own_type="std_srvs/Empty"),
 )
 _CONTROLLER = "iiwa/PositionJointInterface_trajectory_controller"
+
+
+def _iiwa_stack(
+    role: NameRole, native: str, kind: str, *names: str, external: bool = False
+) -> tuple[PresetName, ...]:
+    """Topics, services or actions of iiwa_stack of one type."""
+    given = kind if "/" in kind else f"iiwa_msgs/{kind}"
+    return tuple(
+        PresetName(f"iiwa/{name}", role, native, external=external, own_type=given, needs="iiwa_msgs")
+        for name in names
+    )
+
+
+#: With its newest types; older releases, in which state/CartesianPose is a PoseStamped, have others.
+_IIWA_STACK = (
+    *_iiwa_stack(NameRole.OWN_STATE, "~/pose", "CartesianPose", "state/CartesianPose"),
+    *_iiwa_stack(NameRole.OWN_STATE, "~/wrench", "CartesianWrench", "state/CartesianWrench"),
+    *_iiwa_stack(NameRole.OWN_STATE, "joint_states", "JointPosition", "state/JointPosition"),
+    *_iiwa_stack(NameRole.OWN_STATE, "joint_states", "JointPositionVelocity", "state/JointPositionVelocity"),
+    *_iiwa_stack(NameRole.OWN_STATE, "joint_states", "JointVelocity", "state/JointVelocity"),
+    *_iiwa_stack(NameRole.OWN_STATE, "joint_states", "JointTorque", "state/JointTorque"),
+    *_iiwa_stack(
+        NameRole.OWN_STATE, "~/external_torques", "JointTorque", "state/ExternalJointTorque", external=True
+    ),
+    *_iiwa_stack(NameRole.ARRIVED, "~/state", "std_msgs/Time", "state/DestinationReached"),
+    *_iiwa_stack(NameRole.KEY, "~/keys", "std_msgs/String", "state/buttonEvent"),
+    *_iiwa_stack(NameRole.OWN_COMMAND, "~/servo/joint", "JointPosition", "command/JointPosition"),
+    *_iiwa_stack(
+        NameRole.OWN_COMMAND, "~/servo/joint", "JointPositionVelocity", "command/JointPositionVelocity"
+    ),
+    *_iiwa_stack(NameRole.OWN_COMMAND, "~/servo/velocity", "JointVelocity", "command/JointVelocity"),
+    *_iiwa_stack(NameRole.OWN_COMMAND, "~/servo/pose", "geometry_msgs/PoseStamped", "command/CartesianPose"),
+    *_iiwa_stack(
+        NameRole.OWN_COMMAND, "~/servo/lin", "geometry_msgs/PoseStamped", "command/CartesianPoseLin"
+    ),
+    *_iiwa_stack(
+        NameRole.OWN_COMMAND, "~/servo/twist", "geometry_msgs/TwistStamped", "command/CartesianVelocity"
+    ),
+    *_iiwa_stack(NameRole.SERVICE, _CARTESIAN, "ConfigureControlMode", "configuration/ConfigureControlMode"),
+    *_iiwa_stack(NameRole.SERVICE, "~/set_override", "SetSpeedOverride", "configuration/setSpeedOverride"),
+    *_iiwa_stack(
+        NameRole.SERVICE,
+        "~/servo/joint",
+        "SetSmartServoJointSpeedLimits",
+        "configuration/setSmartServoLimits",
+    ),
+    *_iiwa_stack(
+        NameRole.SERVICE,
+        "~/servo/lin",
+        "SetSmartServoLinSpeedLimits",
+        "configuration/setSmartServoLinLimits",
+    ),
+    *_iiwa_stack(NameRole.SERVICE, "~/servo/joint", "SetPathParameters", "configuration/pathParameters"),
+    *_iiwa_stack(NameRole.SERVICE, "~/servo/lin", "SetPathParametersLin", "configuration/pathParametersLin"),
+    *_iiwa_stack(
+        NameRole.SERVICE, "~/move_joints", "SetPTPJointSpeedLimits", "configuration/setPTPJointLimits"
+    ),
+    *_iiwa_stack(
+        NameRole.SERVICE, "~/move_pose", "SetPTPCartesianSpeedLimits", "configuration/setPTPCartesianLimits"
+    ),
+    *_iiwa_stack(NameRole.SERVICE, "~/move_pose", "SetEndpointFrame", "configuration/setEndpointFrame"),
+    *_iiwa_stack(NameRole.SERVICE, "~/detach_workpiece", "SetWorkpiece", "configuration/setWorkpiece"),
+    *_iiwa_stack(NameRole.SERVICE, "~/state", "TimeToDestination", "state/timeToDestination"),
+    *_iiwa_stack(NameRole.ACTION, "~/move_joints", "MoveToJointPosition", "action/move_to_joint_position"),
+    *_iiwa_stack(
+        NameRole.ACTION,
+        "~/move_pose",
+        "MoveToCartesianPose",
+        "action/move_to_cartesian_pose",
+        "action/move_to_cartesian_pose_lin",
+    ),
+    *_iiwa_stack(NameRole.ACTION, "~/move_spline", "MoveAlongSpline", "action/move_along_spline"),
+)
 
 #: By the parameter `names`.
 PRESETS: Mapping[str, Preset] = MappingProxyType(
@@ -242,6 +345,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
                 PresetName(
                     f"{_CONTROLLER}/follow_joint_trajectory", NameRole.FOLLOW, "~/follow_joint_trajectory"
                 ),
+                *_IIWA_STACK,
             ),
         ),
     }

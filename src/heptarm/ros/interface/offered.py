@@ -1,4 +1,4 @@
-"""Which topics and services a node offers: heptarm's own, and those of the driver that the parameter `names` selects.
+"""What a node offers: heptarm's own topics, services and actions, and those of the driver that `names` selects.
 
 A node subscribes to every topic and serves every service::
 
@@ -14,8 +14,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from heptarm.ros.interface import iiwa_stack
+from heptarm.ros.interface.action import RosAction
+from heptarm.ros.interface.actions import ACTIONS
 from heptarm.ros.interface.libiiwa import LibiiwaServer
-from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.names import PRESETS, NameRole, PresetName
 from heptarm.ros.interface.service import Service
 from heptarm.ros.interface.services import SERVICES
 from heptarm.ros.interface.topics import Topic, topics_of
@@ -50,6 +53,29 @@ def offered(values: Mapping[str, Any]) -> OfferedInterface:
             topics.append(Topic(entry.name, entry.type, server.joint))
         elif entry.role is NameRole.CARTESIAN:
             topics.append(Topic(entry.name, entry.type, server.pose))
+        elif entry.role is NameRole.OWN_COMMAND and entry.is_available:
+            topics.append(Topic(entry.name, entry.type, iiwa_stack.TOPICS[entry.last]))
         elif entry.role is NameRole.SERVICE and entry.is_available:
-            services.append(server.service(entry.name.rpartition("/")[2], entry.type))
+            services.append(_service(server, entry))
     return OfferedInterface(tuple(topics), tuple(services), preset.missing())
+
+
+def _service(libiiwa: LibiiwaServer, entry: PresetName) -> Service:
+    """The row of a service of another driver: of iiwa_stack, or of libiiwa."""
+    if entry.package == "iiwa_msgs":
+        return Service(entry.name, entry.type, iiwa_stack.SERVICES[entry.last])
+    return libiiwa.service(entry.last, entry.type)
+
+
+def offered_actions(names: str) -> tuple[RosAction, ...]:
+    """List the actions that a node serves, except those for trajectories.
+
+    Args:
+        names: the parameter of that name; an unknown one adds nothing.
+    """
+    preset = PRESETS.get(names, PRESETS["heptarm"])
+    return ACTIONS + tuple(
+        RosAction(entry.name, entry.type, iiwa_stack.ACTIONS[entry.last])
+        for entry in preset.entries
+        if entry.role is NameRole.ACTION and entry.is_available
+    )

@@ -37,6 +37,8 @@ class ServiceResponse:
             The response; None: not successful, and its type cannot say so (a standard type of ROS 1).
         """
         fields: dict[str, Any] = {"success": self.success, "message": self.message}
+        if hasattr(response, "error"):  # of iiwa_stack: the text of an error, and nothing else
+            fields = {"success": self.success, "error": "" if self.success else self.message}
         if not hasattr(response, "success"):
             if not self.success:
                 return None
@@ -51,7 +53,7 @@ class Service:
 
     Attributes:
         name: as in ROS 2, "~/" for the node's own.
-        type: "package/Type"; its response has `success` and `message`, and fields of its own.
+        type: "package/Type"; its response has `success` and `message` or `error`, and fields of its own.
         handler: carries a request out; a returned text is a success with that message.
         at_once: never waits for another service.
     """

@@ -9,6 +9,7 @@ import numpy as np
 
 from heptarm.model.kinematics import forward
 from heptarm.ros.interface import messages
+from heptarm.ros.interface.iiwa_messages import iiwa_state
 from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.interface.names import NameRole, PresetName
 from heptarm.ros.node.diagnostics import Diagnosis
@@ -216,6 +217,8 @@ def preset_message(
         names: of joints and frames.
     """
     stamp = ros.time(_measured(ros, state, state.groups.joints))
+    if entry.role is NameRole.OWN_STATE:
+        return iiwa_state(ros, kind(), state, stamp, names.frame("base"), external=entry.external)
     if entry.role is NameRole.POSE:
         return None if state.groups.pose is None else messages.pose_message(ros, state.pose)
     if entry.role in (NameRole.WRENCH, NameRole.STAMPED_WRENCH):
@@ -228,6 +231,19 @@ def preset_message(
         return _lbr_state(kind(), state, max(0, ros.now() - max(0, round(state.age * 1e9))))
     message = messages.joint_state(ros, state, names.joints, external=entry.external)
     return _stamped(message, stamp)
+
+
+def preset_event(ros: RosAdapter, kind: Any, value: str) -> Any:
+    """Make a message for a topic of another driver about something that has happened.
+
+    Args:
+        ros: types and time of the ROS.
+        kind: std_msgs/Time or std_msgs/String.
+        value: the text, of a text.
+    """
+    message = kind()
+    message.data = value if isinstance(message.data, str) else ros.time(ros.now())
+    return message
 
 
 #: Codes of FRI: of operation modes, safety states (normal, stop 1, stop 2) and drive states (off, active).

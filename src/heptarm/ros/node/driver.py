@@ -18,12 +18,14 @@ from heptarm.arm.link.state_stream import GROUPS
 from heptarm.arm.link.target import parse_target
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.errors import ConnectFailed, HeptarmError, NotReady
+from heptarm.model.kinematics import forward
 from heptarm.ros.node.collision_guard import CollisionReaction
+from heptarm.ros.node.destination import Destination, DestinationKeeper
 from heptarm.ros.node.diagnostics import Diagnosis, diagnose
 from heptarm.ros.node.fri_session import NodeFriSession
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.node.state_feed import ReconnectingStates
-from heptarm.ros.node.target_stream import TargetStream
+from heptarm.ros.node.target_stream import StreamLimits, TargetStream
 from heptarm.ros.node.task import ArmTask
 from heptarm.ros.trajectory.check import check_form
 from heptarm.ros.trajectory.execution import Execution, GoalListener
@@ -37,6 +39,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.condition.collision import Collision
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.reaction import Reaction
+from heptarm.values.frames import TOOL
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
@@ -67,6 +70,10 @@ class DriverListener(GoalListener, Protocol):
         """The collision guard detected a collision."""
         ...
 
+    def on_arrival(self) -> None:
+        """The arm is at the destination of `Driver.go_to`, or `Driver.announce_arrival` was called."""
+        ...
+
 
 _log = logging.getLogger("heptarm.ros")
 
@@ -74,6 +81,10 @@ _log = logging.getLogger("heptarm.ros")
 _REST_TIMEOUT = 5.0
 #: When the arm is to be at a streamed position that has no time [s].
 _STREAM_AHEAD = 0.01
+#: Repetitions of the target on the way to a destination within `command_timeout`.
+_REPETITIONS = 4
+#: How near the set-point is to a destination that is reached: joints and angle [rad], position [m].
+_AT_ANGLE, _AT_POSITION = 1e-3, 5e-4
 
 
 class Driver:
@@ -108,6 +119,7 @@ class Driver:
             name=_name(),
             groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
             watchdog=values["watchdog"],
+            datagrams=values["datagrams"],
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = NodeFriSession(self._arm)
@@ -120,6 +132,12 @@ class Driver:
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
+        )
+        self._destinations = DestinationKeeper(
+            self._stream,
+            lambda: self.state,
+            period=values["command_timeout"] / _REPETITIONS,
+            arrived=listener.on_arrival,
         )
         self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
 
@@ -175,6 +193,7 @@ class Driver:
         self.deactivate()
         self._feed.end()
         self.collisions.disable()
+        self._destinations.close()
         self._execution.close()
         self._arm.close()
         self._feed.join()
@@ -197,10 +216,12 @@ class Driver:
     def diagnosis(self) -> Diagnosis:
         """Diagnose the arm."""
         try:
-            state = self._arm.state
+            state, datagrams = self._arm.state, self._arm.connection.datagrams
         except HeptarmError as error:
             return diagnose(None, link_error=self.link_error or str(error), active=self._active)
-        return diagnose(state, link_error=self.link_error, active=self._active, age=state.age)
+        return diagnose(
+            state, link_error=self.link_error, active=self._active, age=state.age, datagrams=datagrams
+        )
 
     def _on_state(self, state: State) -> None:
         safety = state.groups.safety
@@ -360,6 +381,59 @@ class Driver:
             self._stream.pose(target, straight=straight)
         else:
             self._stream.joints(target, dq)
+
+    def go_to(
+        self,
+        target: Array | Pose,
+        dq: Array | None = None,
+        *,
+        straight: bool = False,
+        moving: str = TOOL,
+        offset: Pose | None = None,
+        limits: StreamLimits | None = None,
+        stays: bool = False,
+    ) -> None:
+        """Go to a target of a servo topic, also when no other message comes; then report it.
+
+        Args:
+            target: joint positions, shape (7,) [rad], or a pose of the motion frame in the base.
+            dq: velocity to pass the joint positions with, shape (7,) [rad/s].
+            straight: move to a pose on straight lines.
+            moving: the motion frame of a pose, see `Arm.servo`.
+            offset: its pose in the flange; None: it is the motion frame of the arm.
+            limits: None: those of the parameters.
+            stays: the servo motion stays open at the target, as a compliant arm needs.
+
+        Raises:
+            HeptarmError: refused; the text gives the reason.
+        """
+        self._prepare_stream()
+        if isinstance(target, Pose):
+            pose = self._stream.pose(target, straight=straight, moving=moving, limits=limits)
+            robot = self._arm.robot
+
+            def reached(state: State) -> bool:
+                here = (
+                    state.pose_cmd
+                    if offset is None
+                    else Pose.from_matrix(forward(robot, state.q_cmd)) @ offset
+                )
+                return here.distance_to(pose) < _AT_POSITION and here.angle_to(pose) < _AT_ANGLE
+        else:
+            sent = self._stream.joints(target, dq, limits=limits)
+
+            def reached(state: State) -> bool:
+                return bool(np.abs(state.q_cmd - sent).max() < _AT_ANGLE)
+
+        self._destinations.go(Destination(reached, stays))
+
+    def end_stream(self) -> None:
+        """End the servo motion of the topics, at rest."""
+        self._stream.close()
+
+    def announce_arrival(self) -> None:
+        """Report that the arm is where it was to go."""
+        self._listener.on_arrival()
 
     def follow_velocity(self, dq: Array) -> None:
         """Move with joint velocities, shape (7,) [rad/s], until none arrive for `command_timeout`.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -18,6 +19,7 @@ from heptarm.model.velocity import MARGIN, VelocityPath, joint_velocity, limited
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.values.arrays import Array, array
 from heptarm.values.condition.condition import Condition
+from heptarm.values.frames import TOOL
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause
 
@@ -27,6 +29,23 @@ _log = logging.getLogger("heptarm.ros")
 _AHEAD = 0.05
 #: The first velocity command counts as if the one before had come so long ago [s].
 _FIRST = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class StreamLimits:
+    """Limits of a servo motion that replace those of the parameters.
+
+    Attributes:
+        speed: of the joints, a fraction of each axis' maximum in (0, 1].
+        acceleration: likewise.
+        line_speed: along each axis of the base on straight lines [m/s].
+        turn_speed: about each axis of the base on straight lines [rad/s].
+    """
+
+    speed: float
+    acceleration: float
+    line_speed: float
+    turn_speed: float
 
 
 class TargetStream:
@@ -60,7 +79,8 @@ class TargetStream:
         self._last = 0
         self._guard: Condition | None = None
         self._blocked = ""  # what ended the last servo motion; setting a guard clears it
-        self._kind = ""  # of poses
+        self._opened: dict[str, Any] = {}  # how the open servo motion was opened
+        self._again: Callable[[], object] | None = None  # sends the newest target again
 
     @property
     def guard(self) -> Condition | None:
@@ -82,12 +102,20 @@ class TargetStream:
         servo = self._servo
         return servo is not None and servo.active
 
-    def joints(self, q: Array, dq: Array | None = None) -> None:
-        """Follow joint positions, shape (7,) [rad], passed with `dq` [rad/s]."""
+    def joints(self, q: Array, dq: Array | None = None, *, limits: StreamLimits | None = None) -> Array:
+        """Follow joint positions, shape (7,) [rad], passed with `dq` [rad/s].
+
+        Returns:
+            The positions sent, inside the limits of the joints, shape (7,) [rad].
+        """
         with self._lock:
             target = array(q, 7, "position")
-            self._joint_servo().set(target, None if dq is None else array(dq, 7, "velocity"))
+            velocity = None if dq is None else array(dq, 7, "velocity")
+            servo = self._joint_servo(limits)
+            sent = servo.set(target, velocity)
+            self._again = lambda: servo.set(target, velocity)
             self._path = None
+            return sent
 
     def velocity(self, dq: Array) -> None:
         """Move with joint velocities, shape (7,) [rad/s], slowed down in step to the limits of the robot."""
@@ -140,22 +168,57 @@ class TargetStream:
             self._last = now
             self._path.advance(command_at(self._path.q), passed)
             servo.set(*self._path.target(_AHEAD))
+            self._again = None
 
-    def pose(self, pose: Pose, *, straight: bool = False) -> None:
-        """Follow a pose of the flange in the base, on straight lines or by interpolating joints."""
+    def pose(
+        self,
+        pose: Pose,
+        *,
+        straight: bool = False,
+        moving: str = TOOL,
+        limits: StreamLimits | None = None,
+    ) -> Pose:
+        """Follow a pose of the motion frame in the base, on straight lines or by interpolating joints.
+
+        Args:
+            pose: the target.
+            straight: move on straight lines.
+            moving: the motion frame, see `Arm.servo`.
+            limits: None: those of the parameters.
+
+        Returns:
+            The pose sent, inside the workspace.
+        """
         kind: Literal["pose", "lin"] = "lin" if straight else "pose"
         with self._lock:
+            settings = self._settings_of(kind, limits) | {"moving": moving}
             servo = self._servo
-            if not isinstance(servo, PoseServo) or not servo.active or self._kind != kind:
+            if not isinstance(servo, PoseServo) or not servo.active or self._opened != settings:
                 self._prepare()
-                servo = self._servo = self._arm.servo(kind, **self._settings_of(kind)).__enter__()
-                self._kind = kind
-            servo.set(pose)
+                servo = self._servo = self._arm.servo(kind, until=self._guard, **settings).__enter__()
+                self._opened = settings
+            sent = servo.set(pose)
+            opened = servo
+            self._again = lambda: opened.set(pose)
+            return sent
+
+    def repeat(self) -> bool:
+        """Send the newest target again, so that the arm goes on to it.
+
+        Returns:
+            False: its servo motion has ended, or velocities have replaced it.
+        """
+        with self._lock:
+            if self._again is None or not self.active:
+                self._again = None
+                return False
+            self._again()
+            return True
 
     def close(self) -> None:
         """End the servo motion at rest; if it ended earlier, log why."""
         with self._lock:
-            servo, self._servo = self._servo, None
+            servo, self._servo, self._again = self._servo, None, None
             if servo is not None:
                 try:
                     servo.close()
@@ -165,11 +228,13 @@ class TargetStream:
                 if result is not None and result.cause is Cause.CONDITION:
                     self._blocked = "the guard" if result.stopped_by is None else str(result.stopped_by)
 
-    def _joint_servo(self) -> JointServo:
+    def _joint_servo(self, limits: StreamLimits | None = None) -> JointServo:
         servo = self._servo
-        if not isinstance(servo, JointServo) or not servo.active:
+        settings = self._settings_of("joint", limits)
+        if not isinstance(servo, JointServo) or not servo.active or self._opened != settings:
             self._prepare()
-            servo = self._servo = self._arm.servo("joint", **self._settings).__enter__()
+            servo = self._servo = self._arm.servo("joint", until=self._guard, **settings).__enter__()
+            self._opened = settings
         return servo
 
     def _prepare(self) -> None:
@@ -184,24 +249,17 @@ class TargetStream:
                 f"servo topics are blocked: {self._blocked}", hint="set the guard again, or an empty one"
             )
 
-    def _settings_of(self, kind: str) -> dict[str, Any]:
-        """Settings of a servo motion of poses: on straight lines the limits hold along the path."""
-        settings = self._settings
-        if kind == "lin":
-            for name in ("speed", "acceleration", "engine"):
-                del settings[name]
-            settings["speed_mps"] = self._line_speed
-        return settings
-
-    @property
-    def _settings(self) -> dict[str, Any]:
+    def _settings_of(self, kind: str, limits: StreamLimits | None) -> dict[str, Any]:
+        """Settings of a servo motion: on straight lines ("lin") the limits hold along the path."""
         options = self._options
-        return {
+        settings: dict[str, Any] = {
             "rate": max(options.rate, 1.0 / self._timeout),
             "watchdog": self._timeout,
-            "engine": "smart",
-            "speed": options.speed,
-            "acceleration": options.acceleration,
             "mode": options.mode,
-            "until": self._guard,
         }
+        if kind != "lin":
+            one = options if limits is None else limits
+            return settings | {"engine": "smart", "speed": one.speed, "acceleration": one.acceleration}
+        if limits is None:
+            return settings | {"speed_mps": self._line_speed}
+        return settings | {"speed_mps": limits.line_speed, "speed_radps": limits.turn_speed}

@@ -288,8 +288,8 @@ def _operate(operator: SimulatedOperator, words: str) -> None:
     shown = error = ""
     try:
         if words:
-            operator.await_tick(words)
             shown = operator.do(words)
+            operator.await_tick()
     except ValueError as refused:
         error = str(refused)
     print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)

@@ -83,7 +83,7 @@ _COUNTS = {
     "press": (1, 3),
     "answer": (1, 1),
 }
-#: A tick that began after a signal was set has ended when so many ticks have begun.
+#: A tick that began after an action has ended when so many ticks have begun.
 SEEN = 2
 #: So long a line waits for a tick at most: the simulation may stand still [s].
 LONGEST_WAIT = 1.0
@@ -170,7 +170,7 @@ class SimulatedOperator:
         self._plant = plant
         self._due: list[tuple[int, int, str]] = []
         self._numbers = count()
-        self._set_at = -SEEN
+        self._acted_at = -SEEN
         self._verbs: dict[str, Callable[..., str | None]] = {
             **{request.value: self._requesting(request) for request in StopRequest},
             **{mode.name.lower(): self._choosing(mode) for mode in OperationMode},
@@ -233,25 +233,22 @@ class SimulatedOperator:
         """
         name, values = understood(words)
         shown = self._verbs[name](*values) or ""
+        self._acted_at = self._plant.tick_count
         self.on_action()
         return shown
 
-    def await_tick(self, words: str) -> None:
-        """Before a signal is set: wait until conditions have been evaluated with the signal that was set last.
+    def await_tick(self) -> None:
+        """Wait until the robot's flags and the conditions of motions have been evaluated with the last action.
 
-        Two lines that come at once, `set Start 0` and `set Start 1`, are a rising edge then. The ticks never call this.
+        Two lines that come at once, `set Start 0` and `set Start 1`, are a rising edge then, and a program that has
+        chosen T1 sees the pause which that causes. The ticks never call this.
         """
         until = time.monotonic() + LONGEST_WAIT
-        while (
-            words[:4].lower() == "set "
-            and self._plant.tick_count < self._set_at + SEEN
-            and time.monotonic() < until
-        ):
+        while self._plant.tick_count < self._acted_at + SEEN and time.monotonic() < until:
             time.sleep(0.5 * TICK)
 
     def _set(self, name: str, value: float) -> None:
         self._plant.signals.set(name, value)
-        self._set_at = self._plant.tick_count
 
     def _requesting(self, request: StopRequest) -> Callable[[], None]:
         return lambda: self._plant.safety.request_stop(request)

@@ -136,6 +136,7 @@ def observer(arm: Arm) -> None:
 def kinds(arm: Arm) -> None:
     """A stop after the motion finishes it and drops the queue."""
     first, second = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 20))), arm.start(ptp(HOME))
+    first.wait_started(20.0)
     arm.stop("after_motion")
     holds(first.wait().arrived, "what runs finishes")
     try:

@@ -16,7 +16,7 @@ public final class DialogClosed extends Message {
         this.text = text;
     }
 
-    public static final int TYPE = 106;
+    public static final int TYPE = 107;
 
     public int type() {
         return TYPE;

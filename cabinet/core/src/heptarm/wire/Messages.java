@@ -164,6 +164,9 @@ public final class Messages {
             case 100:
                 message = ControlChanged.read(in);
                 break;
+            case 106:
+                message = ToolChanged.read(in);
+                break;
             case 101:
                 message = SafetyChanged.read(in);
                 break;
@@ -179,7 +182,7 @@ public final class Messages {
             case 105:
                 message = SegmentReached.read(in);
                 break;
-            case 106:
+            case 107:
                 message = DialogClosed.read(in);
                 break;
             case 112:

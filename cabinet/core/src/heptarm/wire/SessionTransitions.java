@@ -107,12 +107,13 @@ public final class SessionTransitions {
                     case 98:
                     case 99:
                     case 100:
+                    case 106:
                     case 101:
                     case 102:
                     case 103:
                     case 104:
                     case 105:
-                    case 106:
+                    case 107:
                     case 112:
                         return SessionState.OPEN;
                     case 8:

@@ -43,7 +43,7 @@ public final class RobotService {
         this.log = log;
         SignalTable signals = new SignalTable(robot.signals);
         safety = new SafetyMonitor(robot.safety, events, clock);
-        tools = new ToolTable(robot.tools);
+        tools = new ToolTable(robot.tools, events);
         reader = new StateReader(robot.sensors, clock);
         MotionReporter reporter = new MotionReporter(events, reader, clock, log);
         executor = new MotionExecutor(robot.motion, robot.sensors, new ConditionWatcher(robot.sensors, robot.signals, clock, log), reporter,

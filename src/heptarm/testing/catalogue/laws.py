@@ -1,0 +1,152 @@
+"""Scenarios: the ready control laws in FRI sessions, each against what it promises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from heptarm import laws
+from heptarm.arm.arm import Arm
+from heptarm.arm.fri.session import Fri
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.loop.user_api import State as FriState
+from heptarm.laws.ready import ReadyLaw
+from heptarm.model.kinematics import forward
+from heptarm.testing.measure import NotShown, above, below, near
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.testing.stage import HOME
+from heptarm.values.arrays import Array
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode
+
+#: Time between two messages [ms].
+_PERIOD = 5
+#: Longest push [s].
+_LONG = 60.0
+#: What a torque law runs on: the cabinet compensates gravity and adds nothing.
+_COMPLIANT = JointImpedance(stiffness=0.0)
+
+
+def _session(arm: Arm, law: ReadyLaw, mode: Mode | None = None) -> Fri:
+    limits = Limits.of(arm.robot, fraction=min(1.0, max(arm.speed, 0.01)))
+    return arm.fri(law.kind, period_ms=_PERIOD, law=law, mode=mode, limits=limits)
+
+
+def _run(session: Fri, seconds: float) -> FriState:
+    """Wait in the cabinet's time; the state then.
+
+    Raises:
+        NotShown: the session has ended; leaving its block raises why.
+    """
+    end = session.state.t + seconds
+    while session.state.t < end:
+        if not session.wait(0.01):
+            raise NotShown("the session ended early")
+    return session.state
+
+
+def _place(arm: Arm, q: Array) -> Array:
+    """Position of the flange in the base, shape (3,) [m]."""
+    return np.asarray(forward(arm.robot, q)[:3, 3])
+
+
+@scenario(line=3, rows="E20", space=0.1, virtual=True, needs=("fri_torque",))
+def cartesian_impedance(arm: Arm) -> None:
+    """Torques hold the flange on a spring, and move it to a goal that changes while they do."""
+    law = laws.cartesian_impedance(posture=HOME, speed=0.1)
+    with _session(arm, law, _COMPLIANT) as session:
+        begin = _place(arm, _run(session, 0.2).q)
+        session.params.goal = session.memory.goal + [0.0, 0.04, 0.0, 0.0, 0.0, 0.0, 0.0]
+        moved = _place(arm, _run(session, 1.2).q) - begin
+        near(moved, (0.0, 0.04, 0.0), 3e-3, "the flange moved by", unit="m")
+        below(float(session.memory.saturated), 1.0, "cycles in which it was limited")
+
+
+@scenario(line=3, rows="E20", space=0.1, virtual=True, needs=("fri_torque",))
+def joint_impedance(arm: Arm) -> None:
+    """Torques hold the joints on springs, and move one of them to a goal."""
+    with _session(arm, laws.joint_impedance(), _COMPLIANT) as session:
+        _run(session, 0.2)
+        goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2]
+        session.params.goal = goal
+        near(_run(session, 1.2).q, goal, 0.01, "positions", unit="rad")
+
+
+@scenario(line=8, rows="E20", risk=Risk.CONTACT, operator=True, space=0.2, needs=("fri_torque",))
+def free_guiding(arm: Arm) -> None:
+    """Pushed by hand, the arm moves freely in a box and stops at its virtual wall."""
+    begin, force = _place(arm, HOME), 15.0
+    wall = 0.03
+    law = laws.free_guiding(box=(begin - [1.0, 1.0, 1.0], begin + [1.0, wall, 1.0]), wall_stiffness=1500.0)
+    with _session(arm, law, _COMPLIANT) as session:
+        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        _run(session, 2.0)
+        beyond = _place(arm, session.state.q)[1] - begin[1] - wall
+        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        near(beyond, force / 1500.0, 4e-3, "behind the wall it rests", unit="m")
+        near(session.memory.force, (0.0, -force, 0.0), 3.0, "force of the wall", unit="N")
+
+
+@scenario(line=8, rows="E20", risk=Risk.CONTACT, operator=True, space=0.3, needs=("fri_position",))
+def admittance(arm: Arm) -> None:
+    """A push moves the flange of a position-controlled arm like a mass in a damper; without it the arm stands."""
+    force, band, damping = 20.0, 3.0, 200.0
+    with _session(arm, laws.admittance(dead_band=band, damping=(damping,) * 3 + (8.0,) * 3)) as session:
+        _run(session, 0.1)
+        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        first = _run(session, 0.5)
+        last = _run(session, 0.5)
+        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        speed = (_place(arm, last.q) - _place(arm, first.q)) / (last.t - first.t)
+        near(speed[1], (force - band) / damping, 0.02, "speed along the push", unit="m/s")
+        _run(session, 0.5)
+        stands = session.state.q
+        below(float(np.abs(_run(session, 0.3).q - stands).max()), 1e-3, "then it moves by", unit="rad")
+
+
+@scenario(line=5, rows="E20", space=0.1, needs=("fri_position",))
+def minimum_jerk(arm: Arm) -> None:
+    """A goal that changes on the way is reached without a stop, and at the time that the law foretold."""
+    with _session(arm, laws.minimum_jerk(speed=0.4 * arm.speed * arm.robot.dq_max)) as session:
+        _run(session, 0.1)
+        session.params.goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.15]
+        _run(session, 0.2)
+        goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.1]
+        session.params.goal = goal
+        _run(session, 0.02)
+        above(float(np.abs(session.memory.dq).max()), 0.01, "on the way, fastest joint", unit="rad/s")
+        _run(session, float(session.memory.left) + 0.1)
+        near(session.state.q_sent, goal, 1e-6, "positions", unit="rad")
+
+
+@scenario(line=5, rows="E20", space=0.1, needs=("fri_position",))
+def low_pass(arm: Arm) -> None:
+    """A goal passes through a filter of second order: its response to a step, without overshoot."""
+    frequency, step = 0.5, 0.05
+    with _session(arm, laws.low_pass(frequency=frequency)) as session:
+        _run(session, 0.1)
+        session.params.goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, step]
+        _run(session, 1.5)
+        states = [one for one in session.history(400) if one.is_answered]
+    t = np.array([one.t for one in states])
+    q = np.array([one.q_sent[6] for one in states]) - HOME[6]
+    (moved,) = np.nonzero(q > 1e-9)
+    due = 2.0 * math.pi * frequency * (t[moved] - t[moved[0]] + _PERIOD * 1e-3)
+    near(q[moved], step * (1.0 - (1.0 + due) * np.exp(-due)), 0.03 * step, "response", unit="rad")
+
+
+@scenario(line=8, rows="E20", space=0.05, virtual=True, needs=("fri_wrench",))
+def search(arm: Arm) -> None:
+    """A force that draws a growing spiral moves the flange by the force over the stiffness."""
+    stiffness, amplitude = 1500.0, 9.0
+    compliant = CartesianImpedance((stiffness,) * 3 + (150.0,) * 3, frame="base")
+    law = laws.search(push=(0.0, 0.0, -5.0), amplitude=amplitude, frequency=1.0, rise=1.0)
+    with _session(arm, law, compliant) as session:
+        begin = _place(arm, session.start.q)
+        _run(session, 1.2)
+        near(float(session.memory.done), 1.0, 0.0, "the spiral has its full size")
+        _run(session, 1.0)
+        states = session.history(200)
+    across = np.linalg.norm([(_place(arm, one.q) - begin)[:2] for one in states], axis=1)
+    near(float(across.max()), amplitude / stiffness, 0.3 * amplitude / stiffness, "radius", unit="m")
