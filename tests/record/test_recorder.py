@@ -197,8 +197,8 @@ def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
                 controller.active()
                 begin = client.wait("COMMANDING_ACTIVE")
                 rec.note("commands are effective")
-                client.command(q=begin.q_ipo + 0.01)
                 for s in client:
+                    client.command(q=begin.q_ipo + 0.01)
                     if s.q_sent[0] > begin.q_ipo[0] + 0.005:
                         break
             last = client.state
@@ -216,5 +216,5 @@ def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
     assert any("COMMANDING_ACTIVE" in one.text for one in run.events if one.kind == "fri")
     assert len(run.between("commands are effective", "end")["fri.t"]) < len(run["fri.t"])
     assert "cycles" in str(run) and len(run.to_pandas(fri=True)) == len(run["fri.t"])
-    with pytest.raises(HeptarmError), ha.record_client(client, tmp_path / "none" / "\0.mcap"):
+    with pytest.raises(HeptarmError), ha.record_client(client, tmp_path / "fri.mcap" / "run.mcap"):
         pass

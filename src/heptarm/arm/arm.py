@@ -778,11 +778,11 @@ class Arm:
             settings["mode"] = None if word(kind, "kind", fri_settings.KINDS) == "monitor" else self._mode
         check_mode(settings["mode"])
         self._tooling.check_mode(settings["mode"])
-        on_collision = None
-        if settings.get("collision") is None and (rule := guarding.in_force(self)) is not None:
-            settings["collision"], on_collision = rule
+        rule = guarding.in_force(self) if settings.get("collision") is None else None
+        if rule is not None:
+            settings["collision"] = rule[0]
         request = fri_settings.request(self._connection, kind, **settings)
-        return Fri(self._connection, request, on_collision=on_collision)
+        return Fri(self._connection, request, on_collision=None if rule is None else rule[1])
 
     # -------------------------------------------------------------------------- stop and recover
 

@@ -35,7 +35,8 @@ class CollisionWatch:
         """
         if tau_ext is None:
             return Collision(0, math.nan, self.threshold[0])
-        worst, found = 0.0, None
+        worst = 0.0
+        found: Collision | None = None
         for joint, (torque, rest, threshold, margin, speed) in enumerate(
             zip(tau_ext, self.baseline, self.threshold, self.margin, dq, strict=True)
         ):
