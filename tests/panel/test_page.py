@@ -247,6 +247,7 @@ def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelAr
     file = tmp_path / "points.json"
     until(lambda: file.exists() and file.read_text(), "nothing was saved")
     model.points.rename("P1", "other")
+    page.shows("other")  # drawn again, with its new name
     browser.find_element("css selector", "input[type=file]").send_keys(str(file))
     until(lambda: model.points.names == ("P1",), "nothing was loaded")
 
