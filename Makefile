@@ -116,7 +116,7 @@ bench: setup  ## figures as JSON lines; GROUP=fri or ONLY=name selects, LIST=1 l
 
 MINUTES ?= 3
 
-soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grows, what is lost; in build/soak
+soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grows after the first third, what is lost; in build/soak
 	$(PY) -m bench.trust --minutes $(MINUTES)
 
 figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run

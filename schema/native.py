@@ -39,7 +39,7 @@ def header() -> str:
     lines += _enum("command modes", _members(messages.CommandMode))
     lines += _enum("fallbacks for missing commands", {one.name: i for i, one in enumerate(native.MISSING)})
     lines += _enum("what the guard limits", _members(joint_guard.Limited, "LIMITED_"))
-    flags = ("ANSWERED", "FILLED", "LIMITED", "BRAKING")
+    flags = ("ANSWERED", "FILLED", "LIMITED", "BRAKING", "ESTIMATED")
     lines += _enum("flags of a turn", _named(memory, *flags))
     words = (
         "STATES",
@@ -65,13 +65,13 @@ def header() -> str:
     command = _prefixed(layout, "C_") | _named(memory, "COMMAND_WORDS", "COMMAND_SLOTS")
     lines += _enum("words of a command", command)
     lines += _enum("parts that a command has", _prefixed(layout, "GIVEN_"))
-    sizes = {"AXES": joint_guard.AXES, "MAX_NAME": messages.MAX_NAME}
+    sizes = {"AXES": joint_guard.AXES} | _named(messages, "MAX_NAME", "MAX_IO", "MAX_TRANSFORMATIONS")
     slots = _named(memory, "PARAM_SLOTS", "MEMORY_SLOTS")
-    lines += _enum("sizes", sizes | _named(native, "BUFFER") | slots)
+    lines += _enum("sizes", sizes | _named(native, "BUFFER", "HEAD") | slots)
     for module, names in (
         (version, ("MONITORING_ID", "COMMAND_ID")),
         (joint_guard, ("PLANNED", "ON_TRACK")),
-        (cycle, ("GAP_PERIODS", "MIN_GAP", "GRACE")),
+        (cycle, ("GAP_PERIODS", "MIN_GAP", "GRACE", "REPEATS")),
         (statistics, ("LONGEST",)),
         (native, ("LAW_PATIENCE", "LAW_CUT")),
     ):

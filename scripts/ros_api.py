@@ -197,7 +197,10 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     "heptarm": {
         "arc": ("as CIRC or SPLINE, with points computed by the client", "~/run_program"),
         "circ": ("~/move_pose", "~/run_program"),
-        "connect": (LIFE, "parameters `target`, `key_file`, `watchdog`, `state_rate`"),
+        "circle_through": (
+            WORDS + "it needs no arm; a goal without a circle is refused with the same reason",
+        ),
+        "connect": (LIFE, "parameters `target`, `key_file`, `watchdog`, `state_rate`, `datagrams`"),
         "connect_all": ("a node for each arm, in a namespace of its own",),
         "deg": ("ROS uses radians",),
         "ellipse": ("as SPLINE, with points computed by the client", "~/run_program"),
@@ -207,6 +210,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "law_from": (WORDS + "a law is Python code",),
         "lin": ("~/move_pose", "~/command/lin", "~/run_program"),
         "lin_rel": ("~/move_pose", "~/run_program"),
+        "live": (WORDS + "rviz shows the arm; `heptarm live` runs beside the node",),
         "load": (WORDS + "it reads a file",),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),

@@ -1,7 +1,8 @@
 """Soak a virtual cabinet: everything at once, for as long as you like.
 
-    python -m bench.trust --minutes 60 --seed 1 --out build/soak
+    python -m bench.trust --minutes 90 --seed 1 --out build/soak
 
+The first third is the warm-up, whose growth of memory does not count: 90 minutes show an hour after it.
 Writes one JSON line for each round to OUT/soak.jsonl and a plot to OUT/soak.png, and prints the verdict. It ends with 0
 if nothing has grown and nothing was lost.
 """

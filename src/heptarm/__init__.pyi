@@ -1,6 +1,7 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
 from . import devices as devices
+from . import shapes as shapes
 from .arm.arm import (
     Arm as Arm,
 )
@@ -206,10 +207,16 @@ from .values.condition.trigger import (
     Trigger as Trigger,
 )
 from .values.motion.circle import (
+    Circle as Circle,
+)
+from .values.motion.circle import (
     arc as arc,
 )
 from .values.motion.circle import (
     circ as circ,
+)
+from .values.motion.circle import (
+    circle_through as circle_through,
 )
 from .values.motion.dynamics import (
     Dynamics as Dynamics,
@@ -288,6 +295,12 @@ from .values.tool import (
 )
 from .values.workspace import (
     Workspace as Workspace,
+)
+from .viewers.live import (
+    LiveView as LiveView,
+)
+from .viewers.live import (
+    live as live,
 )
 
 __version__: str

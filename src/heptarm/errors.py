@@ -292,6 +292,7 @@ EXTRAS = {
     "rl": ("torch", "gymnasium", "PIL"),
     "record": ("mcap", "pandas", "pyarrow"),
     "devices": ("evdev", "pyspacemouse"),
+    "rerun": ("rerun",),
 }
 
 

@@ -190,6 +190,25 @@ def test_bodies_are_kept_clear_of(arm: ha.Arm) -> None:
     assert 0.015 < gap < 0.06
 
 
+def test_the_attached_tool_is_kept_clear_as_well(arm: ha.Arm) -> None:
+    model = ha.CollisionModel("iiwa14", boxes=["0.55,0,0.1,0.4,0.4,0.2"], margin=0.02)
+    pen = ha.Tool("pen", shapes=[ha.shapes.capsule(0.02, 0.15, at=ha.Pose.at(0, 0, 0.075))])
+    with (
+        arm.tool(pen),
+        arm.servo("twist", frame="base", keep_clear_of=model, watchdog=2.0) as sv,
+    ):
+        seen = jog(
+            arm,
+            sv,
+            np.array([0, 0, -0.15, 0, 0, 0]),
+            until=lambda state: rests(state) and sv.stats.slowdown.factor < 0.1,
+        )
+        assert "pen near box" in sv.stats.slowdown.reason
+    gap = min(one.distance for one in model.carrying(pen).clearances(seen[-1].q))
+    assert 0.015 < gap < 0.06
+    assert min(one.distance for one in model.clearances(seen[-1].q, below=0.5)) > 0.1
+
+
 def test_a_model_that_fails_stops_the_arm_and_its_error_is_raised(arm: ha.Arm) -> None:
     class Fails:
         margin, allowed = 0.0, frozenset[frozenset[str]]()

@@ -45,6 +45,30 @@ def test_stop_gets_through_when_the_connection_is_lost(peer: Peer) -> None:
     arm.close()
 
 
+@pytest.mark.parametrize("other", [False, True], ids=["the previous session", "another client"])
+def test_reconnecting_waits_for_the_end_of_the_previous_session_and_for_no_other(
+    peer: Peer, other: bool
+) -> None:
+    """The cabinet still stops the arm for the session that has ended, which has this client's name."""
+    arm = peer.arm()
+    name = "somebody" if other else arm.connection.options.name
+    taken = wire.Rejected(
+        code=int(Code.CONTROL_TAKEN), parameter="controller", text=f"{name} controls", value=name, allowed=""
+    )
+    peer.changes["controller"] = name
+    if other:
+        peer.expect(wire.TakeControl, taken)
+        with pytest.raises(ha.NotInControl, match="somebody controls"):
+            arm.reconnect()
+        assert not arm.in_control
+    else:
+        freed = wire.ControlChanged(controller="", session=0, text=f"{name} was lost: it said goodbye")
+        peer.expect(wire.TakeControl, taken).expect(wire.TakeControl, taken, freed)
+        arm.reconnect()
+        assert arm.in_control
+    arm.close()
+
+
 def test_an_observer_reconnects_and_its_states_go_on(peer: Peer) -> None:
     with peer.arm(control=False) as arm:
         states = arm.states()

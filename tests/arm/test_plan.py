@@ -192,6 +192,25 @@ def test_collisions_are_found_where_they_happen(arm: ha.Arm) -> None:
         arm.plan(program, collision_check=3)  # type: ignore[arg-type]
 
 
+def test_the_attached_tool_and_workpiece_collide(arm: ha.Arm) -> None:
+    table = ha.CollisionModel("iiwa14", boxes=["0.6,0,0.1,0.6,0.8,0.2"])
+    down = ha.lin_rel(z=0.21 - START.z, frame="base", speed_mps=0.1)  # the tip ends 10 mm above the table
+    pen = ha.Tool("pen", tcp=TOOL.tcp, shapes=[ha.shapes.sphere(0.02, at=TOOL.tcp)])
+    part = ha.Workpiece("part", shapes=[ha.shapes.sphere(0.005, at=Pose.at(0, 0, 0.025))])
+    arm.collision_check = table
+    assert arm.plan(down).collisions == ()  # the tool of the module has no shapes
+    with arm.tool(pen):
+        (found,) = arm.plan(down).collisions
+        assert (found.clearance.first, found.clearance.second) == ("pen", "box 0")
+        with pytest.raises(ha.CollisionForeseen, match=r"pen is \d mm from box 0"):
+            arm.move(down)
+        with arm.attached(part):
+            (sooner,) = arm.plan(down).collisions
+            assert sooner.clearance.first == "part" and sooner.t < found.t
+        assert arm.plan(down).collisions == (found,)
+    assert arm.plan(down).collisions == ()
+
+
 def test_as_text_and_as_a_figure(arm: ha.Arm, tmp_path: Path) -> None:
     preview = arm.plan(PROGRAMS["blended"])
     lines = str(preview).splitlines()

@@ -159,6 +159,8 @@ def test_plan_reports_limits_and_collisions_and_moves_nothing(target: str, tmp_p
         ),
         (("move", "ptp", "0", "inf", "0", "-1", "0", "1", "0"), ("inf",)),
         (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
+        (("move", "lin", *"000000", "--frame", "/Table"), ("one of base, got '/Table'", "heptarm.frames")),
+        (("plan", "lin", *"000000", "--frame", "/Table"), ("one of base, got '/Table'",)),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
 )

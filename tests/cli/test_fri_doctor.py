@@ -58,6 +58,7 @@ def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
         )
     reported = json.loads(done.stdout)
     assert reported["messages"] > 10 and reported["period_s"] == 0.01 and reported["latency_s"]["p50"] > 0
+    assert 0 < reported["echo_s"]["p50"] <= reported["echo_s"]["p99"] <= reported["echo_s"]["max"] < 1.0
     assert done.returncode == (0 if reported["good"] else 1)
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
 

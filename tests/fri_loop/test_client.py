@@ -306,6 +306,30 @@ def test_another_sender_is_ignored_while_a_session_stands(client: Client) -> Non
             stranger.recv(100)
 
 
+def test_a_restarted_controller_with_a_new_port_is_answered_at_once(client: Client) -> None:
+    controller = Controller(client.port)
+    with controller.running():
+        controller.active()
+        client.wait(ACTIVE)
+        deadline = time.monotonic() + 20.0
+        while time.monotonic() < deadline and client.next().q_sent[0] < IPO[0] + 0.01:
+            client.command(q=np.add(IPO, 0.05))
+    # no farewell: it was killed, and starts again in another posture
+    elsewhere = tuple(value + 0.2 for value in IPO)
+    again = Controller(client.port, wire=Version.V2_5, ipo=elsewhere)
+    with again.running():
+        client.wait("MONITORING_WAIT")
+        again.settle()
+        first = again.answers[0].header.reflected
+        assert 1e-3 * again.period_ms * first < 0.5, (
+            "a silence of 0.1 s is enough, with room for a busy machine"
+        )
+        again.active()
+        state = client.wait(ACTIVE)
+        assert state.q_sent.tolist() == pytest.approx(elsewhere), "it starts where that interpolator is"
+    assert "listening to" in " ".join(one.text for one in client.events())
+
+
 def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:
     """The user's process is killed while the arm moves: the loop stops the arm and ends."""
     for _ in range(3):

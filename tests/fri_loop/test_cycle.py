@@ -16,6 +16,7 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import REPEATS, Cycle, Law
 from heptarm.fri.loop.user_api import Params, State
+from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, SessionState
@@ -56,6 +57,7 @@ class Bench:
             law=law,
             params=Params(np.zeros(values.size), schema),
             memory_values=None if memory is None else memory.copy(),
+            estimator=WrenchEstimator(chain_of(robot("iiwa14"))),
         )
         self.controller = Controller(9, wire=wire, period_ms=1)
         self.controller._sock.close()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +13,11 @@ from hypothesis import strategies as st
 
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import REPEATS
 from heptarm.fri.loop.native import HANDBACK, LAW, Native, library
 from heptarm.fri.loop.user_api import Output, State
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
@@ -20,7 +25,7 @@ from heptarm.io.compiled import Unavailable
 from tests.long import longer
 
 from .controller import IPO
-from .laws import offset, torque
+from .laws import lights, offset, torque
 from .test_cycle import MS, Bench
 
 try:
@@ -41,11 +46,15 @@ class Twins:
             if isinstance(policy, Policy):
                 bench.cycle.fallback.policy = policy
         self.native = Native(self.other.cycle)
-        self.out = Output.on(
-            self.native.memory.out_q, self.native.memory.out_tau, self.native.memory.out_wrench
-        )
+        self.out = self.output()
         self.plain = self.turns = 0
         self._last = b""
+        self.answer: bytes | None = None
+
+    def output(self) -> Output:
+        """What a law of the native part writes to."""
+        memory, outputs = self.native.memory, self.other.cycle.exchange.outputs
+        return Output.on(memory.out_q, memory.out_tau, memory.out_wrench, outputs)
 
     def message(self, datagram: bytes, gap: int = MS) -> None:
         """One message for both; their answers and what they publish must be equal."""
@@ -53,8 +62,8 @@ class Twins:
             bench.now += gap
         expected = self.pure.cycle.turn(datagram, self.pure.now)
         self.pure.cycle.finish(self.pure.now + 30_000)
-        answer = self._native(datagram)
-        assert answer == expected
+        self.answer = self._native(datagram)
+        assert self.answer == expected
         self.turns += 1
         first, second = self.pure.layout, self.other.layout
         assert first.states.count == second.states.count
@@ -82,8 +91,10 @@ class Twins:
         self.plain += 1
         if size == LAW:
             states, dq = bench.layout.states, np.frombuffer(native.memory.dq)
-            state = State(states.floats[states.count % len(states.ints)], dq=dq)
+            signals = bench.cycle.exchange.signals
+            state = State(states.floats[states.count % len(states.ints)], signals, dq)
             bench.cycle.call_law(state, self.out, bench.now)
+            native.write_outputs()
             native.memory.is_ending = bench.cycle.is_ending
             size = native.answer()
         native.finish(bench.now + 30_000)
@@ -115,6 +126,11 @@ class Twins:
         words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = self.pure.now, given
         for bench in (self.pure, self.other):
             bench.layout.commands.write(words[1:])
+
+    def write(self, io: dict[str, object] | None = None, frames: dict[str, object] | None = None) -> None:
+        """Outputs, each with the count of its write, and frames of the user's process for both."""
+        for bench in (self.pure, self.other):
+            bench.layout.outputs.write(json.dumps({"io": io or {}, "frames": frames or {}}))
 
     def activate(self) -> None:
         for state in (
@@ -177,9 +193,7 @@ def test_the_policies(missing: Missing) -> None:
 def test_laws(law: object) -> None:
     params = {"offset": [0.05] * 7} if law is offset else {"gain": 5.0}
     twins = Twins(law=law, **params)
-    twins.out = Output.on(
-        twins.native.memory.out_q, twins.native.memory.out_tau, twins.native.memory.out_wrench
-    )
+    twins.out = twins.output()
     twins.pure.controller.mode = CommandMode.POSITION if law is offset else CommandMode.TORQUE
     twins.activate()
     for _ in range(300):
@@ -188,10 +202,141 @@ def test_laws(law: object) -> None:
     assert twins.plain > 250
 
 
+def _signal(name: str, kind: m.IoType, value: float, *, is_output: bool = True) -> m.IoValue:
+    direction = m.IoDirection.OUTPUT if is_output else m.IoDirection.INPUT
+    return m.IoValue(name, kind, direction, value)
+
+
+class Cell:
+    """A cabinet with signals, which shows outputs as they are written, after some messages.
+
+    Attributes:
+        signals: as it shows them.
+        stuck: name of an output that it does not accept.
+    """
+
+    def __init__(self, twins: Twins) -> None:
+        self.twins = twins
+        self.signals = [
+            _signal("FRI.Button", m.IoType.BOOLEAN, 0, is_output=False),
+            _signal("FRI.Lamp", m.IoType.BOOLEAN, 0),
+            _signal("FRI.Code", m.IoType.DIGITAL, 7),
+            _signal("FRI.Level", m.IoType.ANALOG, 0.5),
+        ]
+        self.stuck = ""
+        self.show()
+
+    def show(self) -> None:
+        self.twins.pure.controller.io = tuple(self.signals)
+
+    def run(self, count: int) -> list[m.Command]:
+        """Messages; the cabinet shows what the answer to the last but one has written."""
+        answers: list[m.Command] = []
+        for _ in range(count):
+            self.twins.step()
+            if self.twins.answer:
+                answers.append(codec.decode_command(self.twins.answer, self.twins.pure.controller.wire))
+            for one in answers[-2].io if len(answers) > 1 else ():
+                place = next(i for i, known in enumerate(self.signals) if known.name == one.name)
+                if one.name != self.stuck:
+                    self.signals[place] = replace(self.signals[place], value=one.value)
+            self.show()
+        return answers
+
+
+@pytest.mark.parametrize("wire", [one for one in Version if one.traits.io])
+@pytest.mark.parametrize("mode", [CommandMode.POSITION, CommandMode.TORQUE, CommandMode.WRENCH])
+def test_signals_and_frames_without_python(wire: Version, mode: CommandMode) -> None:
+    twins = Twins(wire=wire)
+    cell, controller = Cell(twins), twins.pure.controller
+    controller.mode = mode
+    asked = (1.0, 0.0, 0.0, 0.0) * 3 if not wire.traits.quaternions else (0.0,) * 3 + (1.0, 0.0, 0.0, 0.0)
+    controller.requested = (
+        m.Transformation("Part", asked, m.TimeStamp(5, 6)),
+        m.Transformation("Other", ()),
+    )
+    controller.state = SessionState.MONITORING_READY
+    cell.run(5)
+    part = (0.5, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0)
+    written = {"FRI.Lamp": 1, "FRI.Code": 2**63, "FRI.Level": 0.25}
+    counted = {name: (count, value) for count, (name, value) in enumerate(written.items(), 1)}
+    twins.write(counted, {"Part": part})
+    answers = cell.run(20)
+    assert {one.name: one.value for answer in answers for one in answer.io} == written
+    assert not answers[-1].io and [one.name for one in answers[-1].transformations] == ["Part"]
+    twins.activate()
+    cell.signals[0] = replace(cell.signals[0], value=1)
+    cell.run(50)
+    twins.write({"FRI.Lamp": (4, 0)}, {"Part": (0.6, *part[1:])})
+    assert any(one.io for one in cell.run(20))
+    shown = {**written, "FRI.Button": True, "FRI.Lamp": False}
+    assert dict(twins.pure.states[-1].io) == shown
+    twins.check()
+    assert twins.plain > twins.turns - 30, "all but changes of the session and what the user writes"
+
+
+def test_an_output_that_the_cabinet_does_not_accept_is_reported_as_in_python() -> None:
+    twins = Twins()
+    cell = Cell(twins)
+    cell.stuck = "FRI.Lamp"
+    twins.activate()
+    twins.write({"FRI.Lamp": (1, 1)})
+    answers = cell.run(80)
+    assert sum(bool(one.io) for one in answers) == REPEATS
+    one, two = (bench.layout.events for bench in (twins.pure, twins.other))
+    assert one.count == two.count
+    for tick in range(one.count):
+        first, second = one.read(tick), two.read(tick)
+        assert first is not None and second is not None and (first[2:] == second[2:]).all()
+    assert b"does not accept FRI.Lamp = 1: it shows 0" in one.newest()[3:].tobytes()  # type: ignore[index]
+    twins.check()
+
+
+def test_a_law_reads_and_writes_signals_in_the_native_loop() -> None:
+    twins = Twins(law=lights)
+    cell = Cell(twins)
+    twins.activate()
+    cell.run(5)
+    for pressed in (1, 0, 1):
+        cell.signals[0] = replace(cell.signals[0], value=pressed)
+        answers = cell.run(10)
+        assert ("FRI.Lamp", pressed) in [(one.name, one.value) for answer in answers for one in answer.io]
+        assert cell.signals[1].value == pressed
+    twins.check()
+    assert twins.plain > twins.turns - 15
+
+
+def test_signals_that_change_between_messages_go_to_python_and_back() -> None:
+    """Other names, types and numbers of signals, a name twice, a very long name."""
+    twins = Twins()
+    cell = Cell(twins)
+    twins.activate()
+    first = list(cell.signals)
+    for count, signals in enumerate(
+        (
+            first[:2],
+            [replace(first[0], name="FRI.Other"), first[1]],
+            [replace(first[0], type=m.IoType.DIGITAL), first[1]],
+            [first[0], first[0], first[1]],
+            [replace(first[1], name=f"FRI.{'ä' * 59}"), first[0]],
+            [],
+            first,
+        ),
+        1,
+    ):
+        cell.signals = list(signals)
+        cell.show()
+        twins.write({"FRI.Lamp": (count, count % 2)})
+        cell.run(6)
+    twins.check()
+
+
 @pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5])
 def test_every_byte_of_a_message_damaged(wire: Version) -> None:
     """The native part refuses what Python refuses; a zero tag or an illegal pose ends the decoding."""
     twins = Twins(wire=wire)
+    twins.pure.controller.io = tuple(Cell(twins).signals[1:4:2])
+    twins.pure.controller.requested = (m.Transformation("Part", (), m.TimeStamp(5, 6)),)
     twins.step(state=SessionState.COMMANDING_WAIT)
     for byte in range(len(twins.pure.controller.datagram())):
         for bit in range(8) if EXAMPLES > 25 else (3, byte % 8):
@@ -231,7 +376,7 @@ def test_of_a_pose_nothing_is_left_when_joints_are_commanded() -> None:
 def test_whatever_happens(data: st.DataObject, wire: Version) -> None:
     """States, qualities, modes, losses, repeats, silence, damage and jumps of the interpolator, in any order."""
     twins = Twins(wire=wire)
-    kept = [b""]
+    kept, count = [b""], 0
     for _ in range(data.draw(st.integers(5, 40))):
         what = data.draw(
             st.sampled_from(
@@ -249,6 +394,8 @@ def test_whatever_happens(data: st.DataObject, wire: Version) -> None:
                     "command",
                     "restart",
                     "wild",
+                    "signals",
+                    "write",
                 ]
             )
         )
@@ -268,6 +415,15 @@ def test_whatever_happens(data: st.DataObject, wire: Version) -> None:
         elif what in ("command", "wild"):
             number = st.floats(-3, 3) if what == "command" else st.floats(allow_nan=True, allow_infinity=True)
             twins.command(q=[data.draw(number) for _ in range(7)])
+        elif what == "signals" and wire.traits.io:
+            known = Cell(twins).signals
+            controller.io = tuple(data.draw(st.permutations(known))[: data.draw(st.integers(0, 4))])
+            names = data.draw(st.lists(st.sampled_from(("Part", "Other")), max_size=3))
+            controller.requested = tuple(m.Transformation(name, ()) for name in names)
+        elif what == "write":
+            count += 1
+            values = {"FRI.Lamp": (count, count % 2), "FRI.Level": (count, 0.1 * count)}
+            twins.write(values, {"Part": (0.5, 0.01 * count, 0.1, 0.0, 0.0, 0.0, 1.0)})
         elif what == "repeat":
             twins.message(kept[-1])
         elif what in ("damage", "cut"):

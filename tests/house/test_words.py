@@ -106,7 +106,7 @@ RULES = (
         r"shares?",
         "fraction",
         but=r"shared|sharing|shares? (?:the|a|an|its|their|this|memory|one|it|them)\b|to share|share/|\"share\"|"
-        r"pkg[- ]share|package share|PACKAGE SHARE|share directory|/share\b|show.share.button",
+        r"pkg[- ]share|package share|PACKAGE SHARE|share directory|/share\b|show.share.button|(?:row|column).shares\b",
     ),
     Rule(r"\b(?:class|interface|enum|record) Warden\b", "SafetyMonitor", exact=True),
     Rule(r"\b(?:class|interface|enum|record) Rack\b", "ToolTable", exact=True),

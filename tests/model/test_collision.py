@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import model
+from heptarm import model, shapes
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
@@ -118,6 +118,74 @@ def test_what_the_arm_holds_moves_with_it_and_may_touch_its_gripper(table: ha.Co
         table.hold("table", in_hand)
 
 
+PEN = ha.Tool(
+    "pen",
+    tcp=Pose.at(0, 0, 0.2),
+    shapes=[
+        shapes.cylinder(0.03, 0.1, at=Pose.at(0, 0, 0.05)),
+        shapes.capsule(0.01, 0.08, at=Pose.at(0, 0, 0.15)),
+    ],
+)
+
+
+def above_the_table(height: float) -> Array:
+    """Joint positions with the flange upside down so high above the base [m]."""
+    return model.solve(IIWA, Pose.of((0.6, 0.0, height), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+
+
+def test_the_shapes_of_a_tool_are_where_its_flange_is(bare: ha.CollisionModel) -> None:
+    q, loaded = above_the_table(0.43), bare.carrying(PEN)
+    (found,) = loaded.clearances(q, below=0.05)  # the capsule ends 0.2 m before the flange
+    assert (found.first, found.second) == ("pen", "box 0")
+    assert found.distance == pytest.approx(0.03, abs=1e-6)
+    assert bare.clearances(q, below=0.05) == () and "pen" not in bare.bodies
+    assert bare.carrying(None).clearances(q, below=0.05) == ()
+    tilted = ha.Tool("wide", shapes=[shapes.box(0.02, 0.4, 0.02, at=Pose.xyz_abc(0, 0, 0.1, 0, 0, 0.5))])
+    (found,) = bare.carrying(tilted).clearances(above_the_table(0.43), below=0.1)
+    lowest = 0.1 + 0.2 * np.sin(0.5) + 0.01 * np.cos(0.5)
+    assert found.distance == pytest.approx(0.23 - lowest, abs=1e-6)
+
+
+def test_a_path_is_refused_because_of_the_tool_alone(bare: ha.CollisionModel) -> None:
+    down = vertical(above_the_table(0.5), -0.15)
+    assert bare.first_on(down) is None
+    found = bare.carrying(PEN).first_on(down)
+    assert found is not None and found.clearance.first == "pen"
+    assert model.forward(IIWA, found.q)[2, 3] == pytest.approx(0.4 + bare.margin, abs=0.01)
+
+
+def test_a_tool_touches_the_arm_that_carries_it() -> None:
+    alone, folded = ha.CollisionModel("iiwa14"), deg(0, 50, 0, -118, 0, 80, 0)
+    assert alone.touching(folded) == ()
+    assert pairs(alone.carrying(PEN).touching(folded)) == {frozenset(("link_0", "pen"))}
+
+
+def test_a_workpiece_is_held_by_the_tcp_or_where_it_is_said_to_be(bare: ha.CollisionModel) -> None:
+    part, q = ha.Workpiece("part", shapes=[shapes.box(0.04, 0.04, 0.04)]), above_the_table(0.45)
+    nearest = {one.first: one.distance for one in bare.carrying(PEN, part).clearances(q)}
+    assert nearest == pytest.approx({"part": 0.03, "pen": 0.05}, abs=1e-6)
+    at = Pose.at(0.1, 0, 0.15)
+    nearest = {one.first: one.distance for one in bare.carrying(PEN, part, at=at).clearances(q)}
+    assert nearest == pytest.approx({"part": 0.08, "pen": 0.05}, abs=1e-6)
+    assert bare.carrying(None, part).clearances(above_the_table(0.25))[0].first == "part"
+
+
+def test_a_model_that_carries_a_tool_has_the_scene_as_it_is_then() -> None:
+    table = ha.CollisionModel("iiwa14", scene="table")
+    table.place("cube", Pose.at(0.6, 0, 0.5))
+    part = ha.Workpiece("part", shapes=[shapes.sphere(0.03)])
+    loaded = table.carrying(PEN, part)  # the scene has a gripper, which is on the flange in place of the pen
+    assert "part" in loaded.bodies and "pen" not in loaded.bodies
+    q = above_the_table(0.71)
+    assert frozenset(("part", "cube")) in pairs(loaded.touching(q))
+    table.place("cube", Pose.at(0.6, 0.3, 0.3))
+    assert frozenset(("part", "cube")) in pairs(loaded.touching(q))
+    assert frozenset(("part", "cube")) not in pairs(table.carrying(PEN, part).touching(q))
+    table.hold("cube", Pose.at(0, 0, 0.16))
+    held = table.carrying(PEN)
+    assert held.touching(q) == () and held.touching(above_the_table(0.36))
+
+
 def test_refusals(bare: ha.CollisionModel) -> None:
     with pytest.raises(ha.CommandRejected, match="one of bins, peg-in-hole, table"):
         ha.CollisionModel("iiwa14", scene="nowhere")
@@ -129,6 +197,8 @@ def test_refusals(bare: ha.CollisionModel) -> None:
         bare.first_on(HOME)
     with pytest.raises(ha.LimitError, match="step"):
         bare.first_on([HOME], step=0.0)
+    with pytest.raises(ha.ShapeError, match="tool must be a Tool or KnownTool, got 'pen'"):
+        bare.carrying("pen")  # type: ignore[arg-type]
 
 
 def test_the_model_agrees_with_contacts_of_the_simulated_arm() -> None:

@@ -59,7 +59,7 @@ def to_ours(stamp: int) -> int:
 
 
 def fri_words(count: int) -> np.ndarray:
-    """Slots of the ring of FRI states, shape (n, 122)."""
+    """Slots of the ring of FRI states, shape (n, 123)."""
     from heptarm.fri.loop import shared_memory as at
 
     words = np.full((count, at.STATE_WORDS), np.nan)

@@ -216,6 +216,24 @@ def test_a_twist_moves_and_silence_ends_it(driver: Driver) -> None:
     assert np.abs(moved[[0, 2]]).max() < 5e-3
 
 
+def test_targets_and_states_go_by_datagram_if_the_parameter_is_set(cabinet: RunningCabinet) -> None:
+    values = {"target": cabinet.target, "datagrams": True, "servo.watchdog": 2.0, "speed": 0.5, **PATIENT}
+    recorder = Recorder()
+    driver = Driver(NodeConfiguration.of(values), recorder)
+    driver.activate()
+    try:
+        driver.start(ptp(HOME)).wait()
+        driver.accept(goal(driver))
+        recorder.until(lambda: bool(recorder.ends))
+        assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
+        report = driver.arm.connection.datagrams
+        assert report is not None and report.targets > 0 and report.states > 0
+        found = driver.diagnosis().values["datagrams"]
+        assert found.startswith("round trip") or "over TCP" in found  # a busy machine answers late
+    finally:
+        driver.close()
+
+
 def test_an_unknown_execution_is_refused_by_name() -> None:
     with pytest.raises(CommandRejected, match="teleport"):
         NodeConfiguration.of({"execution": "teleport"})

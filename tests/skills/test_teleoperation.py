@@ -86,7 +86,8 @@ def test_the_arm_moves_while_the_dead_man_button_is_held_and_ends_by_the_quit_bu
 
     stats = skills.teleoperate(arm, Person(decide), scale=0.1, watchdog=2.0, duration=60.0)
     moved = arm.wait_for_rest().pose
-    assert 0.03 < moved.y - y < 0.06 and abs(moved.z - arm.state.pose.z) < 2e-3
+    # a target that comes late is passed and come back to
+    assert 0.02 < moved.y - y < 0.06 and abs(moved.z - arm.state.pose.z) < 2e-3
     assert stats.sent > 0 and stats.refused == 0
 
 

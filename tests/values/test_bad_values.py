@@ -13,6 +13,7 @@ import heptarm.do
 import heptarm.fri
 import heptarm.model
 import heptarm.modes
+import heptarm.shapes
 import heptarm.testing
 import heptarm.when
 from heptarm import HeptarmError
@@ -23,10 +24,14 @@ from heptarm.when import force, io, path, torque
 from tests import bad_values
 from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_of, wrong
 
-MODULES = (heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model, heptarm.testing)
+MODULES = (
+    *(heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model, heptarm.shapes),
+    heptarm.testing,
+)
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
 CONNECTED = (
     *("connect", "connect_all", "target_from_env", "Client", "Recorder", "TwoSignalGripper"),
+    *("live", "LiveView"),
     *("start_together", "states_together", "stop_all", "run"),
 )
 #: Values whose methods are called, by the name in a report.

@@ -394,7 +394,7 @@ class Arm:
 
         `move` and `start` then refuse a path on which bodies would touch, and one that cannot be planned. Servo
         motions, FRI and hand guiding have no path that could be checked. It is no safety function: it knows only its
-        own model of the scene. It plans as `plan` does.
+        own model of the scene, and the shapes of the attached tool and workpiece. It plans as `plan` does.
         """
         return self._foresight.check
 
@@ -637,7 +637,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
-        motions = program.with_kept_joints(self._connection, motions)
+        motions = program.resolved(self._connection, self._tooling, motions)
         self._foresight.examine(motions, when, ceiling)
         return program.send(
             self._connection,
@@ -712,7 +712,8 @@ class Arm:
                 breaks=breaks,
             )
         speed, acceleration = request.joint_fractions(self._speed)
-        limits = JogLimits(speed, acceleration, request.silence, boundary, request.keep_clear_of)
+        clear = None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of)
+        limits = JogLimits(speed, acceleration, request.silence, boundary, clear)
         if kind == "velocity":
             return VelocityServo(
                 self._connection,

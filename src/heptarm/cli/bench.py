@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -28,12 +28,16 @@ from heptarm.cli.options import (
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, QualityLost, require
 from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.echo import floor
 from heptarm.fri.loop.user_api import State
 from heptarm.fri.protocol.messages import Quality
+from heptarm.io.compiled import Unavailable
 from heptarm.values.arrays import Array, within
 
 #: Messages kept for the picture.
 _KEPT = 120_000
+#: Longest measurement of the echo [s].
+_ECHO_TIME = 10.0
 #: How long quality may take to become good [s].
 _WARM_UP = 20.0
 #: A smaller fraction of failed cycles is accepted.
@@ -51,6 +55,7 @@ class Measurement:
         period: send period [s].
         why: the main disturbance with its remedy; empty without one.
         good: the session ended in good quality, and few cycles failed.
+        echo: receipt to reply of a bare echo in C on this machine [s]; empty if it was not measured.
     """
 
     messages: list[State]
@@ -59,6 +64,7 @@ class Measurement:
     period: float
     why: str
     good: bool
+    echo: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def latency(self) -> Array:
@@ -78,7 +84,12 @@ def bench(
     fri_period: FriPeriod = 1,
     fri_version: FriVersion = None,
     duration: Annotated[float, Parameter(help="How long to measure [s].")] = 10.0,
-    plot: Annotated[Path | None, Parameter(help="Save a histogram and the time series as a picture.")] = None,
+    plot: Annotated[
+        Path | None,
+        Parameter(
+            help="Save a histogram, beside that of a bare echo in C, and the time series as a picture."
+        ),
+    ] = None,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
@@ -106,6 +117,7 @@ def bench(
         after = client.stats
         measured = _measure(client, after.lost - before.lost, after.missed - before.missed, before.received)
     if plot is not None:
+        measured = _beside_echo(measured, seconds)
         draw(measured, plot)
     emit(_data(measured)) if as_json else print("\n".join(_lines(measured, plot)))
     return 0 if measured.good else 1
@@ -163,19 +175,27 @@ def _measure(client: Client, lost: int, missed: int, before: int) -> Measurement
     return Measurement(messages, lost, missed, period, why, good)
 
 
+def _beside_echo(measured: Measurement, seconds: float) -> Measurement:
+    """Measure the echo as well, with the period of the session and after it; without a C compiler there is none."""
+    with suppress(Unavailable):
+        return replace(measured, echo=floor(min(seconds, _ECHO_TIME), period=measured.period))
+    return measured
+
+
+def _times(latency: Array) -> dict[str, float]:
+    median, late, later = _percentiles(latency)
+    return {"p50": median, "p99": late, "p999": later, "max": float(latency.max(initial=0.0))}
+
+
 def _data(measured: Measurement) -> dict[str, Any]:
-    median, late, later = _percentiles(measured.latency)
+    echo = {"echo_s": _times(measured.echo)} if measured.echo.size else {}
     return {
         "messages": len(measured.messages),
         "period_s": measured.period,
         "lost": measured.lost,
         "missed": measured.missed,
-        "latency_s": {
-            "p50": median,
-            "p99": late,
-            "p999": later,
-            "max": float(measured.latency.max(initial=0.0)),
-        },
+        "latency_s": _times(measured.latency),
+        **echo,
         "quality": _fractions(measured),
         "cause": measured.why,
         "good": measured.good,
@@ -183,17 +203,21 @@ def _data(measured: Measurement) -> dict[str, Any]:
 
 
 def _lines(measured: Measurement, plot: Path | None) -> list[str]:
-    median, late, later = (1e6 * one for one in _percentiles(measured.latency))
-    longest = 1e6 * measured.latency.max(initial=0.0)
     lines = [
         f"messages  {len(measured.messages)} every {measured.period * 1e3:g} ms, {measured.lost} lost",
         f"answers   {len(measured.latency)} sent, {measured.missed} missed by the cabinet",
-        f"latency   {median:.0f} us median, {late:.0f} us 99 %, {later:.0f} us 99.9 %, {longest:.0f} us longest",
+        f"latency   {_micros(measured.latency)}",
+        *([f"echo      {_micros(measured.echo)}, of a bare echo in C"] if measured.echo.size else []),
         "quality   " + ", ".join(f"{100 * part:.1f} % {name}" for name, part in _fractions(measured).items()),
         f"verdict   {'good' if measured.good else 'not good'}"
         + (f": {measured.why}" if measured.why else ""),
     ]
     return lines + ([f"plotted in {plot}"] if plot is not None else [])
+
+
+def _micros(latency: Array) -> str:
+    median, late, later, longest = (1e6 * one for one in (*_percentiles(latency), latency.max(initial=0.0)))
+    return f"{median:.0f} us median, {late:.0f} us 99 %, {later:.0f} us 99.9 %, {longest:.0f} us longest"
 
 
 def _percentiles(latency: Array) -> tuple[float, float, float]:
@@ -209,14 +233,21 @@ def _fractions(measured: Measurement) -> dict[str, float]:
 
 
 def draw(measured: Measurement, path: Path) -> None:
-    """Save a histogram of the latency, and the latency over time with lost and late messages."""
+    """Save histograms of the latency and of the echo, and the latency over time with lost and late messages."""
     matplotlib = require("matplotlib", extra="viz")
     matplotlib.use("Agg")
     plt: Any = require("matplotlib.pyplot", extra="viz")
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
     micros = 1e6 * measured.latency
     top = max(50.0, 1.1 * float(np.percentile(micros, 99.9)) if micros.size else 0.0)
-    left.hist(np.minimum(micros, top), bins=np.linspace(0.0, top, 120), color="steelblue", log=True)
+    bins = np.linspace(0.0, top, 120)
+    left.hist(np.minimum(micros, top), bins=bins, color="steelblue", log=True, label="FRI answers")
+    if measured.echo.size:  # as many in sum as answers, so that heights compare
+        each = np.full(measured.echo.size, max(micros.size, 1) / measured.echo.size)
+        echoes = np.minimum(1e6 * measured.echo, top)
+        median = 1e6 * float(np.median(measured.echo))
+        label = f"bare echo in C, 50 %: {median:.0f} us"
+        left.hist(echoes, bins=bins, weights=each, label=label, histtype="step", color="darkorange")
     for percent, style in ((50, "-"), (99, "--"), (99.9, ":")):
         value = float(np.percentile(micros, percent)) if micros.size else 0.0
         left.axvline(

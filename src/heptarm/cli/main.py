@@ -29,6 +29,7 @@ COMMANDS = {
     "jog": "jog:jog",
     "teach": "motion:teach",
     "replay": "motion:replay",
+    "live": "live:live",
     "record": "record:record",
     "plot": "plot:plot",
     "convert": "record:convert",

@@ -49,5 +49,8 @@ from .protocol.messages import (
     Quality as Quality,
 )
 from .protocol.messages import (
+    RedundancyStrategy as RedundancyStrategy,
+)
+from .protocol.messages import (
     SessionState as SessionState,
 )

@@ -1,14 +1,15 @@
 /* Kinematics and dynamics of an LBR in C, as in heptarm.model: the tests compare them. Base axes, SI units.
 
-   Newton-Euler recursion in base axes (Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 5); Jacobian and
-   damped inverses as in Siciliano et al., "Robotics", 2009, chapter 3. */
+   Newton-Euler recursion in base axes (Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 5). */
 #ifndef HEPTARM_MODEL_H
 #define HEPTARM_MODEL_H
 
 #include <math.h>
 #include <string.h>
 
-enum { N = 7, BODIES = 8 };
+#include "../fri/loop/kinematics.h"
+
+enum { BODIES = 8 };
 
 /* Constants of a robot and of the load on its flange, in the order of `heptarm.laws.ready.constants`. */
 struct robot {
@@ -23,26 +24,6 @@ struct posture {
     double turn[9], place[3];                                 /* of the flange */
 };
 
-static void cross(const double *a, const double *b, double *c) {
-    double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2];
-    c[2] = a[0] * b[1] - a[1] * b[0];
-    c[0] = x;
-    c[1] = y;
-}
-
-static double dot(const double *a, const double *b, int size) {
-    double sum = 0.0;
-    for (int i = 0; i < size; i++) sum += a[i] * b[i];
-    return sum;
-}
-
-static void rotate(const double *turn, const double *v, double *into) {
-    double x = dot(turn, v, 3), y = dot(turn + 3, v, 3);
-    into[2] = dot(turn + 6, v, 3);
-    into[0] = x;
-    into[1] = y;
-}
-
 /* R S R' of a symmetric S = xx yy zz xy xz yz. */
 static void turned(const double *r, const double *s, double *into) {
     double full[9] = {s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]}, half[9];
@@ -53,21 +34,10 @@ static void turned(const double *r, const double *s, double *into) {
 }
 
 static void find_posture(const struct robot *robot, const double *q, struct posture *p) {
-    static const int direction[N] = {2, 1, 2, 1, 2, 1, 2};
-    static const double sign[N] = {1, 1, 1, -1, 1, 1, 1};
     double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3];
     for (int i = 0; i < N; i++) {
-        double c = cos(q[i]), s = sin(q[i]) * sign[i];
-        int d = direction[i], first = d == 2 ? 0 : 2, second = d == 2 ? 1 : 0; /* the columns that turn: x y, or z x */
-        rotate(turn, robot->origin[i], offset);
-        for (int k = 0; k < 3; k++) place[k] += offset[k];
-        for (int k = 0; k < 3; k++) {
-            double u = turn[3 * k + first], v = turn[3 * k + second];
-            turn[3 * k + first] = c * u + s * v;
-            turn[3 * k + second] = c * v - s * u;
-            p->axis[i][k] = sign[i] * turn[3 * k + d];
-            p->origin[i][k] = place[k];
-        }
+        advance(i, robot->origin[i], q[i], turn, place, p->axis[i]);
+        memcpy(p->origin[i], place, sizeof place);
         rotate(turn, robot->com[i], p->com[i]);
         for (int k = 0; k < 3; k++) p->com[i][k] += place[k];
         p->mass[i] = robot->mass[i];
@@ -160,42 +130,6 @@ static void coriolis(const struct posture *p, const double *dq, double *tau) {
 static void gravity(const struct posture *p, const double *fall, double *tau) {
     static const double none[N];
     inverse_dynamics(p, none, none, fall, tau);
-}
-
-/* Jacobian of a point that moves with the flange, base axes. */
-static void jacobian(const struct posture *p, const double *point, double j[6][N]) {
-    for (int i = 0; i < N; i++) {
-        double lever[3], part[3];
-        for (int k = 0; k < 3; k++) lever[k] = point[k] - p->origin[i][k];
-        cross(p->axis[i], lever, part);
-        for (int k = 0; k < 3; k++) {
-            j[k][i] = part[k];
-            j[3 + k][i] = p->axis[i][k];
-        }
-    }
-}
-
-/* Cholesky factor of a symmetric positive definite matrix, in place; 0 if it is not. */
-static int factorise(double *m, int size) {
-    for (int i = 0; i < size; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = m[size * i + j] - dot(m + size * i, m + size * j, j);
-            if (i != j) {
-                m[size * i + j] = sum / m[size * j + j];
-            } else {
-                if (!(sum > 0.0)) return 0;
-                m[size * i + i] = sqrt(sum);
-            }
-        }
-    return 1;
-}
-
-static void solve(const double *factor, int size, double *b) {
-    for (int i = 0; i < size; i++) b[i] = (b[i] - dot(factor + size * i, b, i)) / factor[size * i + i];
-    for (int i = size - 1; i >= 0; i--) {
-        for (int j = i + 1; j < size; j++) b[i] -= factor[size * j + i] * b[j];
-        b[i] /= factor[size * i + i];
-    }
 }
 
 /* Rotation vector from a rotation to that of a unit quaternion x y z w, base axes [rad]. */

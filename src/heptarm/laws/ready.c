@@ -85,7 +85,7 @@ static int cartesian(const struct heptarm_state *s, struct heptarm_command *out,
         m->started = 1.0;
     }
     follow_pose(p, s->dt, m);
-    jacobian(&posture, posture.place, j);
+    jacobian(posture.axis, posture.origin, posture.place, j);
     moved_mass(&p->robot, &posture, mass);
     memcpy(factor, mass, sizeof factor);
     if (!factorise(factor, N)) return 1;
@@ -191,7 +191,7 @@ static int guiding(const struct heptarm_state *s, struct heptarm_command *out, c
     smooth(s, p->filter, m->dq, m->started == 0.0);
     m->started = 1.0;
     find_posture(&p->robot, s->q, &posture);
-    jacobian(&posture, posture.place, j);
+    jacobian(posture.axis, posture.origin, posture.place, j);
     for (int k = 0; k < 3; k++) {
         double x = posture.place[k], v = dot(j[k], m->dq, N);
         m->force[k] = wall(p->low[k] - x, -v, p->wall_stiffness, p->wall_damping) - wall(x - p->high[k], v, p->wall_stiffness, p->wall_damping);
@@ -199,7 +199,7 @@ static int guiding(const struct heptarm_state *s, struct heptarm_command *out, c
     int limited = shorten(m->force, 3, p->force_max);
     rotate(posture.turn, p->extra_com, point);
     for (int k = 0; k < 3; k++) point[k] += posture.place[k];
-    jacobian(&posture, point, extra);
+    jacobian(posture.axis, posture.origin, point, extra);
     for (int i = 0; i < N; i++) {
         tau[i] = -p->damping[i] * m->dq[i];
         tau[i] += wall(p->q_low[i] + p->margin - s->q[i], -m->dq[i], p->joint_stiffness, 0.1 * p->joint_stiffness);
@@ -236,10 +236,8 @@ static int admittance(const struct heptarm_state *s, struct heptarm_command *out
     if (m->started == 0.0) memcpy(m->q, s->q_ipo, sizeof m->q);
     m->started = 1.0;
     find_posture(&p->robot, m->q, &posture);
-    jacobian(&posture, posture.place, j);
-    for (int r = 0; r < 6; r++)
-        for (int c = 0; c < 6; c++) square[6 * r + c] = dot(j[r], j[c], N) + (r == c ? 1e-4 : 0.0);
-    if (!factorise(square, 6)) return 1;
+    jacobian(posture.axis, posture.origin, posture.place, j);
+    if (!damped_square(j, square)) return 1;
     for (int r = 0; r < 6; r++) m->wrench[r] = dot(j[r], s->tau_ext, N);
     solve(square, 6, m->wrench);
     shrink(m->wrench, p->dead_band);
@@ -385,7 +383,7 @@ void heptarm_model(const struct robot *robot, const double *q, const double *dq,
     mass_matrix(&posture, (double(*)[N])mass);
     coriolis(&posture, dq, bias);
     gravity(&posture, fall, weight);
-    jacobian(&posture, posture.place, (double(*)[N])j);
+    jacobian(posture.axis, posture.origin, posture.place, (double(*)[N])j);
     memcpy(pose, posture.place, sizeof posture.place);
     quaternion(posture.turn, pose + 3);
 }

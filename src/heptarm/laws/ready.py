@@ -23,7 +23,11 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
 _SOURCE = Path(__file__).with_name("ready.c")
-_HEADERS = (_SOURCE.with_name("model.h"), include_dir() / "heptarm_law.h")
+_HEADERS = (
+    _SOURCE.with_name("model.h"),
+    include_dir().with_name("kinematics.h"),
+    include_dir() / "heptarm_law.h",
+)
 _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
 #: Time constant of the low pass of the velocities [s].

@@ -9,15 +9,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from heptarm.errors import require
-from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
+from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.shapes import drawn_shapes
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 
-_COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
 #: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
 _ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.01, 0.6, 2.0
@@ -55,50 +54,20 @@ class DrawnWorld:
         *,
         root: str = "",
     ) -> None:
-        self._root = root
         self._model = compiled(model, (), scene, meshes or ArmMeshes())
         self._data = mujoco.MjData(self._model)
         self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
         self._handles = [
-            (index, self._shape(server, index)) for index in range(self._model.ngeom) if self._is_drawn(index)
+            (
+                one.index,
+                server.scene.add_mesh_simple(
+                    f"{root}/world/{one.index}", one.vertices, one.faces, color=one.colour
+                ),
+            )
+            for one in drawn_shapes(self._model)
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
-
-    def _is_drawn(self, index: int) -> bool:
-        kind = int(self._model.geom_type[index])
-        endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-        return not endless and int(self._model.geom_group[index]) < HIDDEN_GROUP
-
-    def _shape(self, server: Any, index: int) -> Any:
-        vertices, faces = self._mesh(index)
-        model, red_green_blue = self._model, self._model.geom_rgba[index, :3]
-        material = model.geom_matid[index]
-        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MATERIAL, material) if material >= 0 else ""
-        colour = _COLOURS.get(name) or tuple(round(255 * float(part)) for part in red_green_blue)
-        return server.scene.add_mesh_simple(f"{self._root}/world/{index}", vertices, faces, color=colour)
-
-    def _mesh(self, index: int) -> tuple[Array, Array]:
-        """Vertices and faces of a shape in its own frame."""
-        creation = require("trimesh.creation", extra="viz")
-        model, kind = self._model, self._model.geom_type[index]
-        radius, half, depth = model.geom_size[index].tolist()
-        if kind == mujoco.mjtGeom.mjGEOM_MESH:
-            one = int(model.geom_dataid[index])
-            first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
-            vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
-            return np.array(vertices), np.array(model.mesh_face[face : face + int(model.mesh_facenum[one])])
-        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
-            mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
-        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            mesh = creation.cylinder(radius=radius, height=2 * half, sections=32)
-        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-            mesh = creation.box(extents=(2 * radius, 2 * half, 2 * depth))
-        else:  # a sphere has one radius, an ellipsoid three
-            mesh = creation.icosphere(subdivisions=3, radius=1.0)
-            mesh.apply_scale((radius, half or radius, depth or radius))
-        return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
     def show(self, q: Array) -> None:
         """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""

@@ -173,7 +173,7 @@ def cycle_rows(words: npt.NDArray[np.float64]) -> Rows:
     """Rows of FRI cycles.
 
     Args:
-        words: slots of the ring of states, shape (n, 122).
+        words: slots of the ring of states, shape (n, 123).
     """
     rows, ints = FRI_CYCLE.rows(len(words)), words.view(np.int64)
     for one, place in _CYCLE_WORDS:
@@ -190,7 +190,7 @@ def cycle_rows(words: npt.NDArray[np.float64]) -> Rows:
 _DOUBLE, _STRING, _MESSAGE, _ENUM, _FIXED32 = 1, 9, 11, 14, 7
 _INT64, _INT32 = 3, 5
 #: Levels of a log message.
-LEVELS = {"unknown": 0, "debug": 1, "info": 2, "warning": 3, "error": 4}
+LEVELS = {"unknown": 0, "debug": 1, "info": 2, "warning": 3, "error": 4, "fatal": 5}
 
 
 def _field(name: str, number: int, kind: int, type_name: str = "", *, is_repeated: bool = False) -> bytes:

@@ -42,7 +42,7 @@ _TURN = 4
 #: Shortest time between two poses for a 3D view [ns].
 _POSE_PERIOD = 33_000_000
 #: Requests that are text for people, too; the others are in the journal only.
-_SHOWN = (wire.Run, wire.Stop, wire.ServoOpen, wire.FriOpen, wire.Pause, wire.Resume, wire.AttachTool)
+SHOWN_REQUESTS = (wire.Run, wire.Stop, wire.ServoOpen, wire.FriOpen, wire.Pause, wire.Resume, wire.AttachTool)
 _JOURNAL_SCHEMA = {
     "type": "object",
     "properties": {
@@ -140,10 +140,7 @@ class RecordingFile:
         if not samples:
             return
         rows = state_rows([one.body for one in samples])
-        first, last = int(rows["stamp"][0]), int(rows["stamp"][-1])
-        begin, end = to_ours(first), to_ours(last)
-        rate = (end - begin) / (last - first) if last > first else 1.0
-        sampled = (begin + (rows["stamp"] - first) * rate).astype(np.int64) + self._epoch
+        sampled = sampling_times(rows["stamp"], to_ours) + self._epoch
         data, size, out, channel = rows.tobytes(), rows.itemsize, self._out, self._states
         for index, (one, at) in enumerate(zip(samples, sampled.tolist(), strict=True)):
             if not index % _TURN:
@@ -181,7 +178,7 @@ class RecordingFile:
             self._out.add_message(self._signals, one.received + self._epoch, data.encode(), sampled)
 
     def cycles(self, words: npt.NDArray[np.float64]) -> None:
-        """Write FRI cycles; `words` has shape (n, 122)."""
+        """Write FRI cycles; `words` has shape (n, 123)."""
         if self._cycles is None:
             self._cycles = self._add_rows("/fri", FRI_CYCLE)
         rows = cycle_rows(words)
@@ -194,7 +191,7 @@ class RecordingFile:
         """Write what happened."""
         at = entry.time + self._epoch
         self._out.add_message(self._journal, at, entry.data.encode(), at)
-        if entry.kind != REQUEST or isinstance(entry.content, _SHOWN):
+        if entry.kind != REQUEST or isinstance(entry.content, SHOWN_REQUESTS):
             name = "cabinet" if entry.kind in ("event", REFUSAL) else entry.kind
             self._out.add_message(self._log, at, encode_log(at, entry.level, entry.text, name), at)
 
@@ -214,6 +211,14 @@ class RecordingFile:
             self._file.close()
         except OSError:
             pass  # the disk is full: what was buffered is lost
+
+
+def sampling_times(stamps: npt.NDArray[np.int64], to_ours: Callable[[int], int]) -> npt.NDArray[np.int64]:
+    """Times of our clock of states sampled at times of the cabinet's, in order, shape (n,) [ns]."""
+    first, last = int(stamps[0]), int(stamps[-1])
+    begin, end = to_ours(first), to_ours(last)
+    rate = (end - begin) / (last - first) if last > first else 1.0
+    return (begin + (stamps - first) * rate).astype(np.int64)
 
 
 def _unwritable(path: Path, error: OSError) -> CommandRejected:

@@ -11,6 +11,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.record.journal import NOTE, Journal, JournalEntry
@@ -83,6 +86,36 @@ class RecordSource(Protocol):
         ...
 
 
+class RecordSink(Protocol):
+    """What is written to, one for each arm; a `RecordingFile` is one. Only the recorder's thread calls it."""
+
+    def states(
+        self, samples: Sequence[StateSample], *, to_ours: Callable[[int], int], signals: Sequence[str] = ()
+    ) -> None:
+        """Write pushed states; `to_ours` makes a time of our clock of one of the cabinet's [ns]."""
+        ...
+
+    def cycles(self, words: npt.NDArray[np.float64]) -> None:
+        """Write FRI cycles, shape (n, 122)."""
+        ...
+
+    def entry(self, entry: JournalEntry) -> None:
+        """Write what happened."""
+        ...
+
+    def flush(self) -> None:
+        """Hand on what was written; called on the first sink only, as are the next two."""
+        ...
+
+    def finish(self, facts: Mapping[str, str]) -> None:
+        """Write the end and close."""
+        ...
+
+    def abandon(self) -> None:
+        """Close without an end, after an error."""
+        ...
+
+
 def epoch_of(source: RecordSource) -> int:
     """Nanoseconds since 1970 at our clock's zero."""
     return time.time_ns() - source.nanos()
@@ -104,7 +137,7 @@ class CycleTap:
         self._next: dict[Reader, int] = {}
         self.lost = 0
 
-    def write(self, sessions: Iterable[Reader], file: RecordingFile, *, whole: bool = False) -> None:
+    def write(self, sessions: Iterable[Reader], file: RecordSink, *, whole: bool = False) -> None:
         """Write the new cycles of all sessions, and once more those of sessions that have ended.
 
         Args:
@@ -133,7 +166,7 @@ class _Tap:
         file: where to.
     """
 
-    def __init__(self, source: RecordSource, file: RecordingFile) -> None:
+    def __init__(self, source: RecordSource, file: RecordSink) -> None:
         self._source, self._file = source, file
         self._entries: deque[JournalEntry] = source.journal.open()
         self._samples = source.open_samples(_WAITING)
@@ -168,6 +201,8 @@ class Recorder:
         sources: what is recorded, by the name of the arm; a single one may have the name "".
         path: the file, MCAP.
         rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
+        sinks: makes what is written to, one for each arm in their order; None: the file.
+        period: time between two looks at what has arrived [s].
 
     Attributes:
         path: the file.
@@ -177,12 +212,22 @@ class Recorder:
         LimitError: a rate outside its range.
     """
 
-    def __init__(self, sources: Mapping[str, RecordSource], path: Path, *, rate: float | None = None) -> None:
+    def __init__(
+        self,
+        sources: Mapping[str, RecordSource],
+        path: Path,
+        *,
+        rate: float | None = None,
+        sinks: Callable[[Mapping[str, RecordSource]], Sequence[RecordSink]] | None = None,
+        period: float = _PERIOD,
+    ) -> None:
         self._sources = dict(sources)
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
         self.path = path
         self.states = 0
-        self._file: RecordingFile | None = None
+        self._open_sinks = self._open_files if sinks is None else sinks
+        self._period = period
+        self._file: RecordSink | None = None
         self._taps: list[_Tap] = []
         self._failure: OSError | None = None
         self._ended = threading.Event()
@@ -204,21 +249,22 @@ class Recorder:
             if self._rate is not None:
                 for source in self._sources.values():
                     self._restore.append(source.raise_rate(self._rate))
-            files = self._open_files()
+            sinks = self._open_sinks(self._sources)
         except BaseException:
             for restore in self._restore:
                 restore()
             raise
-        self._taps = [_Tap(source, file) for source, file in zip(self._sources.values(), files, strict=True)]
+        self._file = sinks[0]
+        self._taps = [_Tap(source, sink) for source, sink in zip(self._sources.values(), sinks, strict=True)]
         self._thread.start()
         return self
 
-    def _open_files(self) -> list[RecordingFile]:
+    def _open_files(self, sources: Mapping[str, RecordSource]) -> list[RecordingFile]:
         """The file, and its writer for each arm."""
-        (name, first), *others = self._sources.items()
-        size = chunk_size(sum(source.state_rate for source in self._sources.values()))
-        self._file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
-        return [self._file, *(self._file.beside(source.facts, name) for name, source in others)]
+        (name, first), *others = sources.items()
+        size = chunk_size(sum(source.state_rate for source in sources.values()))
+        file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
+        return [file, *(file.beside(source.facts, name) for name, source in others)]
 
     def note(self, text: str) -> None:
         """Put a mark on the time line; `Recording.between` finds it by its text.
@@ -295,7 +341,7 @@ class Recorder:
         assert file is not None
         try:
             while True:
-                is_last = self._ended.wait(_PERIOD)
+                is_last = self._ended.wait(self._period)
                 for tap in self._taps:
                     self.states += tap.write()
                 file.flush()
@@ -305,11 +351,11 @@ class Recorder:
         except OSError as error:
             self._failure = error
             file.abandon()
-            _log.error("the recording %s ends early: %s", file.path, error)
+            _log.error("the recording %s ends early: %s", self.path, error)
         except Exception as error:  # a defect here must not pass unnoticed, nor end the program
             self._failure = OSError(f"{type(error).__name__}: {error}")
             file.abandon()
-            _log.exception("the recording %s ends early", file.path)
+            _log.exception("the recording %s ends early", self.path)
         finally:
             for tap in self._taps:
                 tap.close()

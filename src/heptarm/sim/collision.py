@@ -7,6 +7,7 @@ safety function: it knows only what its scene contains.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,8 +17,11 @@ from heptarm.errors import CommandRejected, ShapeError, require
 from heptarm.values.arrays import Array, array, finite_entries, instance, numbers, shown, within
 from heptarm.values.clearance import Clearance, TouchOnPath
 from heptarm.values.pose import Pose, check_pose
+from heptarm.values.tool import KnownTool, Tool, Workpiece
 
 if TYPE_CHECKING:
+    from heptarm.sim.plant.carried import CarriedShapes
+    from heptarm.sim.plant.scene import Scene
     from heptarm.sim.plant.world import Box
 
 #: Default of the distance below which two bodies count as touching [m].
@@ -26,6 +30,8 @@ MARGIN = 0.005
 NEAR = 0.1
 #: Default of the largest movement of a joint between two checks on a path [rad].
 STEP = 0.02
+#: Compiled models that are kept, one for each tool and workpiece that was carried lately.
+_MOST_KEPT = 8
 
 
 class CollisionModel:
@@ -70,36 +76,43 @@ class CollisionModel:
                 hint='for example [("tool", "table")]',
             )
         self._mujoco: Any = require("mujoco", extra="sim")
-        from heptarm.sim.plant.gripper import driven_joints, has_gripper
-        from heptarm.sim.plant.scene import PREFIX, Scene, plain
-        from heptarm.sim.plant.world import Box, compiled
+        from heptarm.sim.plant.scene import Scene
+        from heptarm.sim.plant.world import Box
         from heptarm.values.robot import robot as known
 
-        self._robot = known(robot)
-        self._plain, self._prefix = plain, PREFIX
+        known(robot)
         try:
-            made: list[Box] = [Box.of(text) for text in texts]
-            self._model = compiled(robot, made, Scene.of(scene) if scene else None)
+            made = [Box.of(text) for text in texts]
+            self._models = _Models(robot, made, Scene.of(scene) if scene else None)
+            self._load(self._models.carrying(()))
         except ValueError as error:
             if isinstance(error, CommandRejected):
                 raise
             raise CommandRejected(str(error), parameter="scene" if scene else "boxes") from None
-        self._data = self._mujoco.MjData(self._model)
-        if has_gripper(self._model):  # open, which is where it needs most room
-            for joint in driven_joints(self._model):
-                self._data.qpos[self._model.jnt_qposadr[joint]] = self._model.jnt_range[joint, 1]
         self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
         self._allowed = {frozenset(pair) for pair in pairs}
-        self._held: dict[
-            int, tuple[Pose, int]
-        ] = {}  # by body: its pose in the flange frame, its place in qpos
-        self._flange = int(self._mujoco.mj_name2id(self._model, self._mujoco.mjtObj.mjOBJ_SITE, "flange"))
-        self._is_own = self._moving()
+        self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
 
-    def _moving(self) -> list[bool]:
-        """Whether each body is of the arm or its tool: of the tree of the base."""
-        root = self._model.body("link_0").id
-        return [int(self._model.body_rootid[body]) == root for body in range(self._model.nbody)]
+    def _load(self, model: Any) -> None:
+        """Take a model; its positions are the initial ones."""
+        from heptarm.sim.plant.gripper import driven_joints, has_gripper
+
+        mujoco = self._mujoco
+        self._model, self._data = model, mujoco.MjData(model)
+        if has_gripper(model):  # open, which is where it needs most room
+            for joint in driven_joints(model):
+                self._data.qpos[model.jnt_qposadr[joint]] = model.jnt_range[joint, 1]
+        self._flange = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange"))
+        root = model.body("link_0").id  # the arm and what is mounted on it are of the tree of the base
+        self._is_own = [int(model.body_rootid[body]) == root for body in range(model.nbody)]
+        names = [str(model.body(body).name) for body in range(model.nbody)]
+        self._names = [_plain(name) for name in names]
+        self._is_tool = [name != plain for name, plain in zip(names, self._names, strict=True)]
+        self._free_at = {
+            self._names[int(model.jnt_bodyid[joint])]: int(model.jnt_qposadr[joint])
+            for joint in range(model.njnt)
+            if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        }
 
     @property
     def margin(self) -> float:
@@ -114,7 +127,7 @@ class CollisionModel:
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies: of the arm, its tool and the scene."""
-        return tuple(self._plain(self._model.body(index).name) for index in range(1, self._model.nbody))
+        return tuple(self._names[1:])
 
     # --------------------------------------------------------------------------------- the world
 
@@ -124,9 +137,9 @@ class CollisionModel:
         Raises:
             CommandRejected: the scene has no free body of that name.
         """
-        index, address = self._free(body)
-        self._held.pop(index, None)
+        address = self._free(body)
         check_pose(pose)
+        self._held.pop(body, None)
         self._put(address, pose)
 
     def hold(self, body: str, pose: Pose) -> None:
@@ -139,9 +152,9 @@ class CollisionModel:
         Raises:
             CommandRejected: the scene has no free body of that name.
         """
-        index, address = self._free(body)
+        self._free(body)
         check_pose(pose)
-        self._held[index] = pose, address
+        self._held[body] = pose
 
     def release(self, body: str) -> None:
         """Let the arm hold a body no more; it stays where it was in the last check. See `place`.
@@ -149,26 +162,56 @@ class CollisionModel:
         Raises:
             CommandRejected: the scene has no free body of that name.
         """
-        self._held.pop(self._free(body)[0], None)
+        self._free(body)
+        self._held.pop(body, None)
 
-    def _free(self, name: str) -> tuple[int, int]:
-        """Index of a free body, and where its pose is in qpos."""
+    def carrying(
+        self,
+        tool: Tool | KnownTool | None,
+        workpiece: Workpiece | None = None,
+        *,
+        at: Pose | None = None,
+    ) -> CollisionModel:
+        """The same model, with the scene as it is now, of an arm that carries a tool and a workpiece.
+
+        Their shapes are bodies with their names, mounted on the flange. They, the flange and the link before it count
+        as neighbours. Where the scene has a tool of its own, that one is on the flange, and the shapes of `tool` are
+        not used. An arm does this by itself with what is attached to it.
+
+        Args:
+            tool: the tool; None: none.
+            workpiece: what it holds; None: nothing.
+            at: pose in the flange frame of the frame that holds the workpiece; None: the tool's tcp.
+
+        Raises:
+            ShapeError: wrong types.
+        """
+        if tool is not None:
+            instance(tool, (Tool, KnownTool), "tool")
+        if workpiece is not None:
+            instance(workpiece, Workpiece, "workpiece")
+        if at is not None:
+            check_pose(at, "at")
+        view = copy(self)
+        view._held = dict(self._held)
+        view._load(self._models.carrying(_carried(tool, workpiece, at)))
+        for name, address in self._free_at.items():
+            pose = self._data.qpos[address : address + 7]
+            view._data.qpos[view._free_at[name] : view._free_at[name] + 7] = pose
+        return view
+
+    def _free(self, name: str) -> int:
+        """Where the pose of a free body is in qpos."""
         instance(name, str, "body")
-        model, mujoco = self._model, self._mujoco
-        free = {
-            self._plain(model.body(int(model.jnt_bodyid[joint])).name): joint
-            for joint in range(model.njnt)
-            if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-        }
-        if name not in free:
-            listed = ", ".join(free) or "none"
+        if name not in self._free_at:
+            listed = ", ".join(self._free_at) or "none"
             raise CommandRejected(
                 f"body must be a free body of the scene, one of {listed}; got {shown(name)}",
                 parameter="body",
                 value=name,
                 allowed=listed,
             )
-        return int(model.jnt_bodyid[free[name]]), int(model.jnt_qposadr[free[name]])
+        return self._free_at[name]
 
     def _put(self, address: int, pose: Pose) -> None:
         self._data.qpos[address : address + 3] = pose.xyz
@@ -256,8 +299,8 @@ class CollisionModel:
         mujoco.mj_kinematics(model, data)
         if self._held:
             at = Pose.of(data.site_xpos[self._flange], _quaternion(mujoco, data.site_xmat[self._flange]))
-            for pose, address in self._held.values():
-                self._put(address, at @ pose)
+            for name, pose in self._held.items():
+                self._put(self._free_at[name], at @ pose)
             mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_collision(model, data)
@@ -273,10 +316,10 @@ class CollisionModel:
         """Names of two shapes' bodies, that of the arm first; None if none is of the arm, its tool or what it holds."""
         bodies = int(self._model.geom_bodyid[first]), int(self._model.geom_bodyid[second])
         arm = [self._is_own[body] for body in bodies]
-        held = [body in self._held for body in bodies]
+        held = [self._names[body] in self._held and not own for own, body in zip(arm, bodies)]
         if not any(arm) and not any(held):
             return None
-        if any(held) and any(own and self._is_tool(body) for own, body in zip(arm, bodies)):
+        if any(held) and any(own and self._is_tool[body] for own, body in zip(arm, bodies)):
             return None  # the gripper touches what it holds
         names = self._name(first), self._name(second)
         if all(arm):
@@ -284,14 +327,56 @@ class CollisionModel:
         is_first = arm[0] or (held[0] and not arm[1])
         return names if is_first else (names[1], names[0])
 
-    def _is_tool(self, body: int) -> bool:
-        return str(self._model.body(body).name).startswith(self._prefix)
-
     def _name(self, geom: int) -> str:
         """Name of the body of a shape; of a shape without a body its own."""
         body = int(self._model.geom_bodyid[geom])
-        name = self._model.body(body).name if body else self._model.geom(geom).name
-        return self._plain(name) or "world"
+        return (self._names[body] if body else _plain(self._model.geom(geom).name)) or "world"
+
+
+class _Models:
+    """MuJoCo's models of one arm in one scene, by what the arm carries.
+
+    Args:
+        robot: its name.
+        boxes: fixed boxes around it.
+        scene: what else is around it; None: nothing.
+    """
+
+    def __init__(self, robot: str, boxes: list[Box], scene: Scene | None) -> None:
+        self._robot, self._boxes, self._scene = robot, boxes, scene
+        self._made: dict[tuple[CarriedShapes, ...], Any] = {}
+
+    def carrying(self, carried: tuple[CarriedShapes, ...]) -> Any:
+        """The model of an arm that carries shapes; the last ones are kept."""
+        from heptarm.sim.plant.world import compiled
+
+        model = self._made.pop(carried, None)
+        if model is None:
+            model = compiled(self._robot, self._boxes, self._scene, carried=carried)
+        self._made[carried] = model
+        for oldest in list(self._made)[:-_MOST_KEPT]:
+            del self._made[oldest]
+        return model
+
+
+def _carried(
+    tool: Tool | KnownTool | None, workpiece: Workpiece | None, at: Pose | None
+) -> tuple[CarriedShapes, ...]:
+    """The shapes of a tool and of what it holds, as they are on the flange."""
+    from heptarm.sim.plant.carried import CarriedShapes
+
+    origin = Pose.of((0.0, 0.0, 0.0))
+    found = [] if tool is None else [CarriedShapes(tool.name, tool.shapes, origin, is_tool=True)]
+    if workpiece is not None:
+        tip = tool.frames[0][1] if tool is not None and tool.frames else origin
+        found.append(CarriedShapes(workpiece.name, workpiece.shapes, tip if at is None else at))
+    return tuple(one for one in found if one.shapes)
+
+
+def _plain(name: str) -> str:
+    from heptarm.sim.plant.carried import plain
+
+    return plain(name)
 
 
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].

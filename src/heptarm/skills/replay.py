@@ -124,11 +124,9 @@ class _Run:
         )
         seen: list[Array] = []
         try:
-            for state in self.arm.states():
+            for state in handle.states():
                 seen.append(state.q)
                 self._report(handle.progress)
-                if handle.done:
-                    break
         finally:
             handle.cancel()
         deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -70,7 +71,7 @@ def teach(
         timeout: longest duration [s]; then it ends with what was recorded.
 
     Returns:
-        Positions of every pushed state, from start to end. See `Trajectory.trimmed` and `thinned`.
+        Positions of every state that was pushed, from start to end. See `Trajectory.trimmed` and `thinned`.
 
     Raises:
         CommandRejected: as `start` does; or it ended before two states were received.
@@ -82,13 +83,13 @@ def teach(
             'teaching needs the state group "joints"', hint='arm.subscribe(rate=100, groups=(..., "joints"))'
         )
     handle = arm.start(hand_guide() if motion is None else motion, mode=mode, until=until, when="reject")
-    recorded: list[State] = []
+    latest = threading.Timer(seconds, handle.cancel)
+    latest.daemon = True
+    latest.start()
     try:
-        for state in arm.states(duration=seconds):
-            if handle.done:
-                break
-            recorded.append(state)
+        recorded = list(handle.states())  # to the end, also those that are read late
     finally:
+        latest.cancel()
         handle.cancel()
     handle.wait(timeout=_END_TIMEOUT)
     return trajectory_of(recorded, arm.robot.name)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar, runtime_checkable
 
 from heptarm.values.arrays import Array, Value
+from heptarm.values.pose import Pose
+from heptarm.values.tool import KnownTool, Workpiece
+
+_Model_co = TypeVar("_Model_co", covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,16 @@ class TouchOnPath(Value):
     clearance: Clearance
     at: float
     q: Array
+
+
+@runtime_checkable
+class CarriesTools(Protocol[_Model_co]):
+    """What a model of collisions may offer: then an arm gives it what is attached; `heptarm.CollisionModel` does."""
+
+    def carrying(
+        self, tool: KnownTool | None, workpiece: Workpiece | None = None, *, at: Pose | None = None
+    ) -> _Model_co:
+        """The same model, of an arm that carries a tool, and a workpiece at a frame in the flange frame."""
 
 
 class CollisionCheck(Protocol):

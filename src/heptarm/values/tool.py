@@ -13,7 +13,7 @@ attached to.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +24,7 @@ from heptarm.values.arrays import Array, Value, array, frozen, shown, within
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
+from heptarm.values.shape import Shape, checked_shapes
 from heptarm.values.text import lines
 
 #: Heaviest tool [kg], and how far its centre of mass may be from the flange along each axis [m].
@@ -44,6 +45,7 @@ class _Carried(Value):
     com: Array
     inertia: Array
     frames: tuple[tuple[str, Pose], ...]
+    shapes: tuple[Shape, ...]
 
     def __init__(
         self,
@@ -54,6 +56,7 @@ class _Carried(Value):
         inertia: npt.ArrayLike = _NO_INERTIA,
         tcp: Pose | None = None,
         frames: Mapping[str, Pose] | None = None,
+        shapes: Sequence[Shape] = (),
     ) -> None:
         _set(self, "name", _checked(name, "name", _LONGEST_NAME))
         _set(self, "mass", within(mass, "mass", 0.0, HEAVIEST, unit="kg"))
@@ -62,16 +65,18 @@ class _Carried(Value):
             within(value, f"com[{index}]", -FARTHEST, FARTHEST, unit="m")
         _set(self, "inertia", Body(self.mass, self.com, inertia=array(inertia, 6, "inertia")).inertia)
         _set(self, "frames", _frames(tcp, {} if frames is None else frames))
+        _set(self, "shapes", checked_shapes(shapes, "shapes"))
 
     def __str__(self) -> str:
-        """Name, load data and frames, a line each."""
+        """Name, load data, frames and shapes, a line each."""
         rows = {
             "mass": f"{self.mass:g} kg",
             "com": " ".join(f"{v * 1e3:.1f}" for v in self.com) + " mm from the flange",
             "inertia": " ".join(f"{v:.4g}" for v in self.inertia) + " kg m² (xx yy zz xy xz yz)",
         }
         frames = {name: str(pose) for name, pose in self.frames}
-        return lines(f"{type(self).__name__} {self.name}", rows | frames)
+        shapes = {"shapes": "\n".join(map(str, self.shapes))}
+        return lines(f"{type(self).__name__} {self.name}", rows | frames | shapes)
 
     @property
     def body(self) -> Body:
@@ -111,9 +116,11 @@ class Tool(_Carried):
         inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
         tcp: flange to tip; the frame "tcp", the motion frame unless a motion names another.
         frames: more frames, flange to frame, by name; without `tcp` the first is the motion frame.
+        shapes: what of it collides and is drawn, in the flange frame, at most 16; see `heptarm.shapes`. A robot does
+            not know them.
 
     Raises:
-        ShapeError: wrong shapes, or an empty or too long name.
+        ShapeError: wrong types, or an empty or too long name.
         LimitError: a number outside its range, an inertia that no body has, or a reserved name.
         CommandRejected: two frames of one name.
     """
@@ -130,9 +137,10 @@ class Workpiece(_Carried):
         inertia: xx yy zz xy xz yz about the centre of mass, axes of that frame, shape (6,) [kg m²].
         tcp: that frame to a point of the workpiece; its frame "tcp".
         frames: more frames, by name.
+        shapes: what of it collides and is drawn, in that frame, at most 16; see `heptarm.shapes`.
 
     Raises:
-        ShapeError: wrong shapes, or an empty or too long name.
+        ShapeError: wrong types, or an empty or too long name.
         LimitError: a number outside its range, an inertia that no body has, or a reserved name.
         CommandRejected: two frames of one name.
     """
@@ -148,6 +156,7 @@ class KnownTool(Value):
         frames: its frames, flange to frame; the default one first.
         com: centre of mass in the flange frame, shape (3,) [m].
         inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
+        shapes: what of it collides and is drawn, in the flange frame; a template of the project has none.
     """
 
     name: str
@@ -155,6 +164,7 @@ class KnownTool(Value):
     frames: tuple[tuple[str, Pose], ...] = ()
     com: Array = field(default_factory=lambda: frozen(np.zeros(3)))
     inertia: Array = field(default_factory=lambda: frozen(np.zeros(6)))
+    shapes: tuple[Shape, ...] = ()
 
     @property
     def body(self) -> Body:

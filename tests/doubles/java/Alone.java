@@ -89,8 +89,8 @@ public class Alone extends RoboticsAPIApplication {
         say("a batch is blended", arm.move(line.blending(0.0, 0.02, 0.0), Move.lin(start)).cause == Cause.FINISHED);
         Move slow = HOME.speed(1, 1, 1, 1, 1, 1, 0.05);
         double[] turned = {0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.1};
-        double fast = arm.move(Move.ptp(turned)).duration;
-        say("an axis has a speed of its own", arm.move(slow).duration > 2 * fast);
+        arm.move(Move.ptp(turned));
+        say("an axis has a speed of its own", arm.move(slow).duration > 0.8); // A7: 0.1 rad with 5 % of 2.36 rad/s
         say("a joint spline", arm.move(Move.splineJoints(Move.ptp(turned), Move.ptp(0.05, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0), HOME)).cause
                 == Cause.FINISHED);
         say("a value that is none is refused", code(() -> arm.move(HOME.speed(1.5))) == Code.OUT_OF_RANGE);

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import instance
+from heptarm.values.clearance import CarriesTools
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.mode.impedance import CartesianImpedance
@@ -23,6 +27,7 @@ from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
 
 _ORIGIN = Pose.of((0.0, 0.0, 0.0))
+_Model = TypeVar("_Model")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +96,19 @@ class Tooling:
         held = self._workpiece.body.placed(self.on_flange(attached.frame))
         return held if tool is None else tool.body.joined(held)
 
+    def loaded(self, model: _Model) -> _Model:
+        """A model of collisions with the shapes of what is attached, if it has a place for them."""
+        if not isinstance(model, CarriesTools):
+            return model
+        attached = self.attached
+        tool = None if attached is None else self.known.get(attached.tool)
+        held = self._workpiece
+        if held is not None and (attached is None or attached.workpiece != held.name):
+            held = None
+        at = self.on_flange(FLANGE if attached is None else attached.frame)
+        loaded: _Model = model.carrying(tool, held, at=at)
+        return loaded
+
     # ------------------------------------------------------------------------------- attaching
 
     def attach(self, tool: Tool | str, frame: str | None) -> None:
@@ -102,7 +120,9 @@ class Tooling:
             if frame is not None:
                 tool.frame(frame)
             self._connection.request(wire.DefineTool(tool=tool_message(tool)))
-            self._defined[tool.name] = KnownTool(tool.name, tool.mass, tool.frames, tool.com, tool.inertia)
+            self._defined[tool.name] = KnownTool(
+                tool.name, tool.mass, tool.frames, tool.com, tool.inertia, tool.shapes
+            )
             name = tool.name
         elif isinstance(tool, str):
             name, main = tool, frame or ""
@@ -225,13 +245,23 @@ class Tooling:
             raise unknown(name, "frame", (*frames, BASE, *taught))
         return Pose.from_matrix(forward(self._connection.robot, state.q)) @ frames[name]
 
+    def reached(self, q: npt.ArrayLike, moving: str) -> Pose | None:
+        """Pose of a motion frame in the base at joint positions, shape (7,) [rad]; None: the frame is not known."""
+        tip = (self._flange_frames() or {FLANGE: _ORIGIN}).get(moving)
+        return None if tip is None else Pose.from_matrix(forward(self._connection.robot, q)) @ tip
+
+    @property
+    def fixed(self) -> dict[str, Pose]:
+        """The fixed frames by name, in the base frame: the base itself, and the taught ones."""
+        return {BASE: _ORIGIN} | self.taught
+
     def on_flange(self, name: str) -> Pose:
         """Pose of a frame on the flange in the flange frame; of an unknown one the flange itself."""
         return (self._flange_frames() or {}).get(name, _ORIGIN)
 
     def in_base(self, name: str) -> Pose | None:
         """Pose of a fixed frame in the base: the base itself, or a taught frame; None: it is no fixed one."""
-        return _ORIGIN if name == BASE else self.taught.get(name)
+        return self.fixed.get(name)
 
     def axes(self, frame: str | Pose) -> Callable[[Pose], Pose]:
         """A function that returns a frame's pose in the base, by the pose of the flange.

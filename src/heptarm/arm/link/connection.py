@@ -29,6 +29,7 @@ from heptarm.errors import (
     HeptarmError,
     LocalProtocolError,
     ModeConflict,
+    NotInControl,
     SafetyStop,
     StaleState,
     Timeout,
@@ -394,7 +395,19 @@ class Connection:
                 self._link.close()
             self.open()
             if had_control:
-                self.take_control()
+                self._regain_control()
+
+    def _regain_control(self) -> None:
+        """Take control as soon as the cabinet has stopped the arm and ended this client's previous session."""
+        deadline = self.clock.nanos() + round(self.options.timeout * 1e9)
+        while True:
+            try:
+                return self.take_control()
+            except NotInControl:
+                is_ours = self.controller in ("", self.options.name)  # "": it has just ended
+                if not is_ours or self.clock.nanos() > deadline:
+                    raise
+            self.clock.sleep(PAUSE)
 
     def close(self) -> None:
         """End the link, everything that waits for it, and a private cabinet."""
@@ -788,7 +801,7 @@ class Connection:
 
     def _on_control(self, message: wire.ControlChanged) -> None:
         self.controller = message.controller
-        if self.in_control and message.session != self.welcome.session:
+        if self.in_control and self.is_connected and message.session != self.welcome.session:
             self.in_control = False
             _log.warning("control is lost: %s", message.text)
 

@@ -15,7 +15,7 @@ import numpy as np
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
-from heptarm.arm.motion.program import with_kept_joints
+from heptarm.arm.motion.program import resolved
 from heptarm.arm.translate.motions import items
 from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
 from heptarm.model.batch import forward_batch
@@ -108,11 +108,12 @@ class Foresight:
             _BRIEF if isinstance(one, Hold) and isinf(one.duration) else one for one in motions[:guided]
         ]
         program = self._planned(finite, np.asarray(start), ceiling, _STEP)
+        check = None if self.check is None else self._tooling.loaded(self.check)
         for index, path in enumerate(_paths(program)):
             name = f"motions[{index}]" if len(motions) > 1 else "motion"
             if boundary is not None:
                 _check_inside(path, boundary, name)
-            touch = None if self.check is None else self.check.first_on(path)
+            touch = None if check is None else check.first_on(path)
             if touch is not None:
                 of = f"motions[{index}]: " if len(motions) > 1 else ""
                 raise CollisionForeseen(
@@ -140,7 +141,7 @@ class Foresight:
             start = self._rest()
         else:
             robot.check(start, "start")
-        motions = with_kept_joints(self._connection, tuple(motions), start)
+        motions = resolved(self._connection, tooling, tuple(motions), start)
         items(motions, robot, ceiling)
         tooling.check(motions, None)
         program = self._planned(motions, start, ceiling, step)
@@ -155,6 +156,7 @@ class Foresight:
         torques = np.array([inverse_dynamics(robot, *row, load=load) for row in rows])
         tau = np.array([np.interp(program.t, program.t[kept], column) for column in torques.T]).T
         used = self.check if check is None else check
+        used = None if used is None else tooling.loaded(used)
         return ProgramPreview(
             robot,
             program.t,

@@ -120,8 +120,9 @@ class ServoRequest:
             is the velocity of its origin.
         frame: of "twist": its axes: "tool", "flange", "base", a name, or a pose in the base; None: "tool".
         timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
-        keep_clear_of: of velocities: bodies to brake before, such as a `heptarm.CollisionModel`; None: none. It is
-            no safety function: it knows only its own model of the scene.
+        keep_clear_of: of velocities: bodies to brake before, such as a `heptarm.CollisionModel`, which has the shapes
+            of the attached tool and workpiece as well; None: none. It is no safety function: it knows only its own
+            model of the scene.
         until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
             robot answers. See `move`.
 

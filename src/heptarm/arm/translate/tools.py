@@ -19,7 +19,7 @@ def known_tool(message: wire.ToolInfo) -> KnownTool:
     """A tool or workpiece that the cabinet knows."""
     frames = tuple((one.name, read_pose(one.pose)) for one in message.frames)
     return value_of(
-        KnownTool, message, frames=frames, com=frozen(message.com), inertia=frozen(message.inertia)
+        KnownTool, message, frames=frames, com=frozen(message.com), inertia=frozen(message.inertia), shapes=()
     )
 
 

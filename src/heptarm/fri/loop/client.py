@@ -30,6 +30,7 @@ from heptarm.fri.loop.cycle import Law
 from heptarm.fri.loop.law_interface import LiveMemory, flat
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
+from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
@@ -193,6 +194,7 @@ class Client(Reader):
                     "version": wire,
                     "limits": asdict(self._limits),
                     "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
+                    "chain": chain_of(arm),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "law": name,

@@ -23,6 +23,7 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
+from heptarm.fri.loop.wrench import WrenchEstimator
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.version import Version
@@ -224,6 +225,7 @@ class SignalExchange:
         numbers: their values in the last message.
         outputs: outputs that a law writes.
         outputs_seen: tick of the last outputs and frames read from the user's process.
+        pending: outputs that are not shown yet, by full name: value, number of answers that may still repeat it.
     """
 
     def __init__(self, layout: at.Layout) -> None:
@@ -234,7 +236,7 @@ class SignalExchange:
         self.outputs_seen = layout.outputs.tick
         self._known: dict[str, m.IoValue] = {}
         self._asked: tuple[m.Transformation, ...] = ()
-        self._pending: dict[str, tuple[int | float, int]] = {}  # value, remaining repetitions
+        self.pending: dict[str, tuple[int | float, int]] = {}
         self._taken: dict[str, int] = {}  # by output, count of the last write
         self._frames: dict[str, tuple[tuple[float, ...], m.TimeStamp | None]] = {}
         self._published: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
@@ -243,7 +245,7 @@ class SignalExchange:
     @property
     def is_idle(self) -> bool:
         """Whether the session has no signals, requests no frames, and no output is pending."""
-        return not self._known and not self._asked and not self._pending
+        return not self._known and not self._asked and not self.pending
 
     def update(self, sample: Sample) -> None:
         """Read signals and requested frames of a message."""
@@ -259,6 +261,16 @@ class SignalExchange:
         self.numbers = [float(one.value) for one in io]
         self._publish(io)
 
+    @property
+    def known(self) -> tuple[m.IoValue, ...]:
+        """Signals in the last message, each name once."""
+        return tuple(self._known.values())
+
+    def show(self, values: Sequence[int | float]) -> None:
+        """Note the values in a message that only the native part has read, in the order of `known`."""
+        signals = zip(self.known, values, strict=True)
+        self._known = {one.name: replace(one, value=value) for one, value in signals}
+
     def _publish(self, io: tuple[m.IoValue, ...]) -> None:
         """Publish the names of signals and frames for the user's process when they change."""
         names = tuple(self._known), tuple(one.name for one in self._asked)
@@ -266,7 +278,7 @@ class SignalExchange:
             return
         self._published = names
         self.signals = self.outputs.signals = Signals.of(io)
-        self._pending = {name: one for name, one in self._pending.items() if name in self._known}
+        self.pending = {name: one for name, one in self.pending.items() if name in self._known}
         self._layout.offered.write(json.dumps({"signals": self.signals.text, "frames": names[1]}))
 
     def take(self) -> None:
@@ -291,7 +303,7 @@ class SignalExchange:
     def write(self) -> None:
         """Request the outputs that the law has written and the cabinet does not show yet."""
         for name, value in self.outputs.written.items():
-            known, pending = self._known.get(name), self._pending.get(name)
+            known, pending = self._known.get(name), self.pending.get(name)
             if (pending is None or pending[0] != value) and (known is None or known.value != value):
                 self._request(name, value)
         self.outputs.written.clear()
@@ -299,7 +311,7 @@ class SignalExchange:
     def _request(self, name: str, value: int | float) -> None:
         known = self._known.get(name)
         is_analog = known is not None and known.type is m.IoType.ANALOG
-        self._pending[name] = (value, REPEATS_ANALOG if is_analog else REPEATS)
+        self.pending[name] = (value, REPEATS_ANALOG if is_analog else REPEATS)
 
     def add(self, setpoint: Setpoint, version: Version, report: Callable[[str], None]) -> Setpoint:
         """Add pending outputs and frames to a setpoint.
@@ -309,34 +321,37 @@ class SignalExchange:
             version: wire format.
             report: called with a text for an output that the cabinet does not accept.
         """
-        if not self._pending and not (self._frames and self._asked):
+        if not self.pending and not (self._frames and self._asked):
             return setpoint
         io = []
-        for name, (value, left) in list(self._pending.items()):
+        for name, (value, left) in list(self.pending.items()):
             known = self._known.get(name)
             if known is None:  # the session has changed since the output was checked
-                del self._pending[name]
+                del self.pending[name]
                 report(f"this FRI session no longer has an output {name!r}")
                 continue
             shown = known.value == value and left < REPEATS
             if shown or not left:
-                del self._pending[name]
+                del self.pending[name]
                 if not shown and known.type is not m.IoType.ANALOG:
                     report(f"the cabinet does not accept {name} = {value}: it shows {known.value}")
                 continue
-            self._pending[name] = (value, left - 1)
+            self.pending[name] = (value, left - 1)
             io.append(m.IoValue(name, known.type, m.IoDirection.OUTPUT, value))
+        return replace(setpoint, io=tuple(io), transformations=self.frames(version))
+
+    def frames(self, version: Version) -> tuple[m.Transformation, ...]:
+        """Frames for the next answer: those that are requested and given."""
         names = [one.name for one in self._asked]
-        frames = tuple(
+        return tuple(
             m.Transformation(name, frame_to_wire(numbers, version), stamp)
             for name, (numbers, stamp) in self._frames.items()
             if name in names
         )
-        return replace(setpoint, io=tuple(io), transformations=frames)
 
     def forget(self) -> None:
         """Drop all pending outputs."""
-        self._pending.clear()
+        self.pending.clear()
 
 
 def frame_to_wire(pose: Sequence[float], version: Version) -> tuple[float, ...]:
@@ -370,12 +385,13 @@ class Cycle:
         memory: its memory, on `memory_values`; None: the law takes none.
         memory_values: words of its memory, initially those of its first call.
         positions: position limits of the robot [rad], see `Session`.
+        estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
 
     Attributes:
         memory_values: words of the law's memory.
         is_compiled: whether the native part calls the law.
         q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, pose_commander, fallback, exchange, record, law: its parts.
+        layout, session, guard, pose_commander, fallback, exchange, record, law, estimator: its parts.
         failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
         mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
@@ -397,6 +413,7 @@ class Cycle:
         memory: Memory | None = None,
         memory_values: Floats | None = None,
         positions: Positions | None = None,
+        estimator: WrenchEstimator | None = None,
     ) -> None:
         self.layout = layout
         self.failure = ""
@@ -421,6 +438,7 @@ class Cycle:
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)
         self.record = Record(layout, self.session)
+        self.estimator = estimator
         self._out = Output(self.exchange.outputs)
         self.commands_seen = layout.commands.count
         self._restarts = 0
@@ -453,6 +471,14 @@ class Cycle:
         except Exception:  # the controller stops the arm itself when no answer arrives
             return None
 
+    def forget_controller(self) -> None:
+        """Reset for another controller: its counter, version and interpolator are not those of the last one."""
+        self.session.restart()
+        self.guard.stop()
+        self.pose_commander.guard.stop()
+        self.pose_commander.forget()
+        self.mirrored = self.q_before = None
+
     def _fail(self, error: Exception, now: int) -> None:
         """Report an error of the loop, and end the loop once the arm is at rest."""
         if not self.failure:
@@ -482,6 +508,7 @@ class Cycle:
         if sample is None:
             return None
         self._differentiate(sample, sample.sequence - previous)
+        self._find_wrench(sample)
         exchange.update(sample)
         record.signals, record.state.signals = exchange.numbers, exchange.signals
         self._follow(sample, received, before, sample.sequence - previous)
@@ -523,6 +550,18 @@ class Cycle:
             self.record.dq[:] = 0.0
         else:
             self.record.dq[:] = [(new - old) / gap for new, old in zip(sample.q, before, strict=True)]
+
+    def _find_wrench(self, sample: Sample) -> None:
+        """Take the external wrench of a message, or estimate it from the torques."""
+        monitor = sample.message.monitor if sample.is_full else None
+        sent = monitor.wrench if monitor is not None else None
+        if sent is not None and not math.isnan(sent[0]):
+            self.record.wrench = sent
+        elif self.estimator is None or sample.q is None or sample.tau_ext is None:
+            self.record.wrench = NAN6
+        else:
+            self.record.wrench = self.estimator.wrench(sample.q, sample.tau_ext)
+            self.record.flags |= at.ESTIMATED
 
     def _count(self, *, limited: bool) -> None:
         """Count limited and filled setpoints."""

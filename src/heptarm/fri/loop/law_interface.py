@@ -36,7 +36,7 @@ STATE: tuple[tuple[str, tuple[int, ...], str, str], ...] = (
     ("real", (JOINTS,), "tau_ext", "external torques [Nm]"),
     ("real", (JOINTS,), "q_cmd", "positions commanded by the controller [rad]; FRI 1.x"),
     ("real", (JOINTS,), "q_ipo", "interpolator's positions [rad]"),
-    ("real", (6,), "wrench", "external wrench [N, Nm]; FRI 2.7"),
+    ("real", (6,), "wrench", "external wrench on the flange [N, Nm]; estimated before FRI 2.7"),
     ("word", (), "sequence", "controller's counter"),
     ("word", (), "stamp", "controller's clock [ns since 1970]; 0 if it sends no time"),
     ("word", (), "received", "time of receipt, this machine's monotonic clock [ns]"),

@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "include/heptarm_law.h"
+#include "kinematics.h"
 #include "native_layout.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
@@ -73,11 +74,12 @@ static int stamp(struct part p, word *nanos) {
 }
 
 /* Read strategy and value of a redundancy; 0 if there is anything else. */
-static int redundancy(struct part p, double *value) {
-    uint64_t key, strategy;
+static int redundancy(struct part p, word *strategy, double *value) {
+    uint64_t key, number;
     struct part bytes;
-    if (!field(&p, &key, &strategy, &bytes) || key != 8 || (strategy != 0 && strategy != 4)) return 0;
-    if (!field(&p, &key, &strategy, &bytes) || key != 17 || p.at < p.end) return 0;
+    if (!field(&p, &key, &number, &bytes) || key != 8 || (number != 0 && number != 4)) return 0;
+    *strategy = (word)number;
+    if (!field(&p, &key, &number, &bytes) || key != 17 || p.at < p.end) return 0;
     memcpy(value, bytes.at, 8);
     return 1;
 }
@@ -112,6 +114,13 @@ static int same(struct part p, const char *known, word size) {
     return p.end - p.at == size && !memcmp(p.at, known, size);
 }
 
+/* Whether a part begins with some bytes; moves behind them. */
+static int starts_with(struct part *p, const uint8_t *known, word size) {
+    if (p->end - p->at < size || memcmp(p->at, known, size)) return 0;
+    p->at += size;
+    return 1;
+}
+
 static uint32_t crc_table[256];
 
 __attribute__((constructor)) static void make_table(void) {
@@ -133,7 +142,43 @@ static const int monitored[16] = MONITORED;
 
 struct seen {
     uint64_t sequence, reflected;
+    word signals, requests;
 };
+
+/* Read the value of the signal that comes next; 0 if anything else than its value differs from the previous message. */
+static int read_signal(struct loop *l, struct part p, word place) {
+    if (place >= l->io_count || !starts_with(&p, l->io_head + HEAD * place, l->io_size[place]) || p.at >= p.end) return 0;
+    uint64_t number;
+    if (l->io_is_analog[place]) {
+        if (p.end - p.at != 9 || *p.at != (5 << 3 | 1)) return 0;
+        memcpy(l->t_io + place, p.at + 1, 8);
+        return 1;
+    }
+    if (*p.at++ != 4 << 3 || !varint(&p, &number) || p.at < p.end) return 0;
+    l->t_io[place] = (word)number;
+    return 1;
+}
+
+/* Check a requested frame: its name; its stamp and its numbers may change. */
+static int check_request(struct loop *l, struct part p, word place) {
+    if (place >= l->request_count) return 0;
+    int names = 0, found = 0, most = l->echoes ? 12 : 7;
+    word none;
+    while (p.at < p.end) {
+        uint64_t key, number;
+        struct part one;
+        if (!field(&p, &key, &number, &one) || (key & 7) == 0) return 0;
+        if (key == (1 << 3 | 2)) {
+            if (names++ || !same(one, (char *)l->request_name + HEAD * place, l->request_size[place])) return 0;
+        } else if (key >> 3 == 2) {
+            if ((one.end - one.at) % 8) return 0;
+            found += (int)(one.end - one.at) / 8;
+        } else if (key != (3 << 3 | 2) || !stamp(one, &none)) {
+            return 0;
+        }
+    }
+    return names && found <= most;
+}
 
 /* Whether an array that may be sent back has positions that the robot can have, if the message has the array. */
 static int is_plausible(struct loop *l, int array) {
@@ -160,10 +205,15 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
     if (p.at >= p.end || *p.at != 0x0a) return 0;
     l->t_known = 0;
     l->t_tracking = l->t_e1 = l->t_wrench[0] = l->t_pose[0] = NAN;
-    l->t_stamp = -1;
+    l->t_stamp = l->t_strategy = -1;
+    seen->signals = seen->requests = 0;
     while (p.at < p.end) {
-        if (!field(&p, &key, &number, &one) || (key & 7) != 2 || key > (5 << 3 | 2)) return 0;
+        if (!field(&p, &key, &number, &one) || (key & 7) != 2 || key > (6 << 3 | 2)) return 0;
         int tag = key >> 3;
+        if (tag == 6) {
+            if (!check_request(l, one, seen->requests++)) return 0;
+            continue;
+        }
         if (tags & 1 << tag) return 0;
         tags |= 1 << tag;
         if (tag == 2 && !same(one, l->robot, l->robot_size)) return 0;
@@ -172,7 +222,12 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
         int inner = 0;
         while (one.at < one.end) {
             struct part leaf;
-            if (!field(&one, &key, &number, &leaf) || key >> 3 > 15 || inner & 1 << (key >> 3)) return 0;
+            if (!field(&one, &key, &number, &leaf) || key >> 3 > 15) return 0;
+            if (tag == 3 && key == (8 << 3 | 2)) {
+                if (!read_signal(l, leaf, seen->signals++)) return 0;
+                continue;
+            }
+            if (inner & 1 << (key >> 3)) return 0;
             inner |= 1 << (key >> 3);
             if (tag == 1) {
                 if (key == 8) id = number;
@@ -190,7 +245,7 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
                 } else if (at == 9) {
                     if (!doubles(leaf, 2, AXES, 1, l->t_pose)) return 0;
                 } else if (at == 10) {
-                    if (!redundancy(leaf, &l->t_e1)) return 0;
+                    if (!redundancy(leaf, &l->t_strategy, &l->t_e1)) return 0;
                 } else if (at == 15) {
                     if (!stamp(leaf, &l->t_stamp)) return 0;
                 } else {
@@ -211,7 +266,8 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
                     if (!doubles(leaf, 2, AXES, 1, unused)) return 0;
                 } else if (key == 26) {
                     double unused;
-                    if (!redundancy(leaf, &unused)) return 0;
+                    word none;
+                    if (!redundancy(leaf, &none, &unused)) return 0;
                 } else {
                     return 0;
                 }
@@ -220,6 +276,7 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
         if (tag == 1 && inner != 14) return 0;
         if (tag == 5 && ((l->mode && !(inner & 1 << 10)) || (l->overlay >= 0 && !(inner & 1 << 11)))) return 0;
     }
+    if (seen->signals != l->io_count || seen->requests != l->request_count) return 0;
     if (id != MONITORING_ID || seen->sequence >> 32 || seen->reflected >> 32) return 0;
     if (!(tags & 1 << 4) || (!(tags & 1 << 2)) != (l->robot_size < 0)) return 0;
     if (!(tags & 1 << 5) && (l->mode || l->overlay >= 0)) return 0;
@@ -439,6 +496,52 @@ static uint8_t *put_joints(uint8_t *at, uint8_t key, const double *values) {
     return at;
 }
 
+/* Whether the cabinet shows an output as it was written; its first answer is sent in any case. */
+static int is_shown(struct loop *l, int index) {
+    word place = l->pending_signal[index], shown = l->t_io[place], value = l->pending_value[index];
+    double analog, wanted;
+    if (l->pending_left[index] >= REPEATS) return 0;
+    if (!l->io_is_analog[place]) return shown == value;
+    memcpy(&analog, &shown, 8);
+    memcpy(&wanted, &value, 8);
+    return analog == wanted;
+}
+
+/* Whether Python has to report an output that the cabinet does not accept. */
+static int is_refused(struct loop *l) {
+    for (int i = 0; i < l->pending_count; i++)
+        if (!l->pending_left[i] && !is_shown(l, i) && !l->io_is_analog[l->pending_signal[i]]) return 1;
+    return 0;
+}
+
+/* Write the frames, and the outputs that the cabinet does not show yet. */
+static uint8_t *put_exchange(struct loop *l, uint8_t *at) {
+    int kept = 0;
+    memcpy(at, l->frames, (size_t)l->frames_size);
+    at += l->frames_size;
+    for (int i = 0; i < l->pending_count; i++) {
+        if (is_shown(l, i) || !l->pending_left[i]) continue;
+        word place = l->pending_signal[i], value = l->pending_value[i], size = l->put_size[place];
+        uint8_t number[10], *end = number + 8;
+        if (l->io_is_analog[place])
+            memcpy(number, &value, 8);
+        else
+            end = put_varint(number, (uint64_t)value);
+        *at++ = 5 << 3 | 2;
+        *at++ = (uint8_t)(size + 1 + (end - number));
+        memcpy(at, l->put_head + HEAD * place, (size_t)size);
+        at += size;
+        *at++ = l->io_is_analog[place] ? 5 << 3 | 1 : 4 << 3;
+        memcpy(at, number, (size_t)(end - number));
+        at += end - number;
+        l->pending_signal[kept] = place;
+        l->pending_value[kept] = value;
+        l->pending_left[kept++] = l->pending_left[i] - 1;
+    }
+    l->pending_count = kept;
+    return at;
+}
+
 static int write_command(struct loop *l, const double *q, const double *tau, const double *wrench) {
     uint8_t *begin = l->t_reply + (l->framed ? 4 : 0), *at = begin + 2;
     at = put_varint((*at = 8, at + 1), COMMAND_ID);
@@ -446,9 +549,13 @@ static int write_command(struct loop *l, const double *q, const double *tau, con
     at = put_varint((*at = 24, at + 1), (uint64_t)l->sequence);
     begin[0] = 10;
     begin[1] = (uint8_t)(at - begin - 2);
-    if (q) {
+    uint8_t exchange[BUFFER];
+    word size = put_exchange(l, exchange) - exchange;
+    if (q || size) {
         *at++ = 18;
-        at = put_varint(at, 65 + (wrench ? 52 : 0) + (tau ? 65 : 0));
+        at = put_varint(at, (uint64_t)((q ? 65 : 0) + (q && wrench ? 52 : 0) + (q && tau ? 65 : 0) + size));
+    }
+    if (q) {
         at = put_joints(at, 10, q);
         if (wrench) {
             memcpy(at, "\x12\x32\x0a\x30", 4);
@@ -457,6 +564,8 @@ static int write_command(struct loop *l, const double *q, const double *tau, con
         }
         if (tau) at = put_joints(at, 26, tau);
     }
+    memcpy(at, exchange, (size_t)size);
+    at += size;
     if (l->framed) {
         uint32_t length = (uint32_t)(at - begin), sum = crc(begin, (int)length);
         memcpy(l->t_reply, &length, 4);
@@ -513,6 +622,7 @@ static void fill_state(struct loop *l, word *slot) {
     slot[S_REFLECTED] = l->reflected;
     slot[S_SENT] = l->sent;
     slot[S_TICKS] = active && l->ticks > 0 ? l->ticks : 0;
+    slot[S_STRATEGY] = l->t_strategy;
     numbers[S_TRACKING] = l->t_tracking;
     for (int array = 0; array < STATE_ARRAYS; array++)
         for (int i = 0; i < AXES; i++) numbers[S_ARRAYS + AXES * array + i] = l->t_known >> array & 1 ? l->t_arrays[AXES * array + i] : NAN;
@@ -524,7 +634,11 @@ static void fill_state(struct loop *l, word *slot) {
         numbers[S_TAU_SENT + i] = active && l->t_answer && l->mode == TORQUE ? l->tau[i] : NAN;
         if (i < 6) numbers[S_WRENCH_SENT + i] = active && l->t_answer && l->mode == WRENCH ? l->wrench[i] : NAN;
     }
-    for (int i = S_POSE_IPO; i < STATE_WORDS; i++) numbers[i] = NAN; /* Python handles sessions that command poses */
+    for (int i = S_POSE_IPO; i < S_IO; i++) numbers[i] = NAN; /* Python handles sessions that command poses */
+    for (int i = 0; i < MAX_IO; i++) {
+        numbers[S_IO + i] = i < l->io_count ? (double)(uint64_t)l->t_io[i] : NAN;
+        if (i < l->io_count && l->io_is_analog[i]) memcpy(numbers + S_IO + i, l->t_io + i, 8);
+    }
 }
 
 static word clock_now(clockid_t clock) {
@@ -699,6 +813,13 @@ static void differentiate(struct loop *l) {
     l->q_known = known;
 }
 
+/* Estimate the external wrench from the torques where the controller sends none. */
+static void find_wrench(struct loop *l) {
+    word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
+    if (!isnan(l->t_wrench[0]) || !l->has_chain || (l->t_known & needed) != needed) return;
+    if (explain_torques((const struct chain *)l->chain, ARRAY(S_Q), ARRAY(S_TAU_EXT), l->t_wrench)) l->t_flags |= ESTIMATED;
+}
+
 /* Process a datagram: HANDBACK, LAW (call hf_answer next), or the size of the answer in t_reply, 0 for none. */
 int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     struct seen seen;
@@ -706,9 +827,10 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     if (!l->hot || !read_message(l, data, size, &seen)) return HANDBACK;
     if (seen.sequence != (((uint64_t)l->sequence + 1) & 0xffffffff)) return HANDBACK;
     if ((commanding || waiting) && !(l->t_known & KNOWN(S_Q_IPO))) return HANDBACK;
+    if (*l->outputs != l->outputs_seen || is_refused(l)) return HANDBACK;
     if (commanding) {
         word gap = received - l->received;
-        if (!l->is_started || *l->outputs != l->outputs_seen) return HANDBACK;
+        if (!l->is_started) return HANDBACK;
         if ((double)gap > most(GAP_PERIODS * (double)l->period * (double)l->multiplier, MIN_GAP)) return HANDBACK;
     }
     /* from here on the message is not handed back */
@@ -727,6 +849,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     l->t_flags = l->t_answer = 0;
     l->waiting++;
     differentiate(l);
+    find_wrench(l);
     if (commanding) {
         l->ticks++;
     } else if (waiting) {
@@ -798,28 +921,51 @@ void hf_send(struct loop *l) {
     hf_finish(l, clock_now(CLOCK_MONOTONIC));
 }
 
+/* Receive a datagram of at most BUFFER bytes, its sender and the time of receipt by the kernel; its size, or -1. */
+static ssize_t receive(int sock, uint8_t *into, struct sockaddr_in *from, word *received) {
+    char control[128];
+    struct iovec part = {into, BUFFER};
+    struct msghdr message = {.msg_name = from, .msg_namelen = sizeof *from, .msg_iov = &part, .msg_iovlen = 1,
+                             .msg_control = control, .msg_controllen = sizeof control};
+    ssize_t size = recvmsg(sock, &message, 0);
+    if (size < 0) return size;
+    *received = clock_now(CLOCK_MONOTONIC);
+    for (struct cmsghdr *head = CMSG_FIRSTHDR(&message); head; head = CMSG_NXTHDR(&message, head)) {
+        struct timespec stamp;
+        if (head->cmsg_level != SOL_SOCKET || head->cmsg_type != SCM_TIMESTAMPNS) continue;
+        memcpy(&stamp, CMSG_DATA(head), sizeof stamp);
+        word age = clock_now(CLOCK_REALTIME) - stamp.tv_sec * 1000000000LL - stamp.tv_nsec;
+        if (age >= 0 && age < 10000000000LL) *received -= age;
+    }
+    return size;
+}
+
+/* The floor of a reply on this machine: send `turns` datagrams back, with the time from receipt to reply of each [ns]; how
+   many came. */
+word hf_echo(int sock, word turns, word *took) {
+    uint8_t datagram[BUFFER];
+    for (word turn = 0; turn < turns; turn++) {
+        struct sockaddr_in from;
+        word received;
+        ssize_t size = receive(sock, datagram, &from, &received);
+        if (size < 0) return turn;
+        sendto(sock, datagram, (size_t)size, 0, (struct sockaddr *)&from, sizeof from);
+        took[turn] = clock_now(CLOCK_MONOTONIC) - received;
+    }
+    return turns;
+}
+
 /* Receive and answer at most `turns` datagrams. A datagram that is handed back is in t_datagram, with its size, time and
    sender. */
 int hf_run(struct loop *l, word turns, word *sender) {
     while (turns-- > 0) {
         struct sockaddr_in from;
-        char control[128];
-        struct iovec part = {l->t_datagram, BUFFER};
-        struct msghdr message = {.msg_name = &from, .msg_namelen = sizeof from, .msg_iov = &part, .msg_iovlen = 1,
-                                 .msg_control = control, .msg_controllen = sizeof control};
-        ssize_t size = recvmsg((int)l->sock, &message, 0);
+        word received;
+        ssize_t size = receive((int)l->sock, l->t_datagram, &from, &received);
         if (size < 0) {
             if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNREFUSED) return TIMEOUT;
             l->t_size = errno;
             return SOCKET_ERROR;
-        }
-        word received = clock_now(CLOCK_MONOTONIC);
-        for (struct cmsghdr *head = CMSG_FIRSTHDR(&message); head; head = CMSG_NXTHDR(&message, head)) {
-            struct timespec stamp;
-            if (head->cmsg_level != SOL_SOCKET || head->cmsg_type != SCM_TIMESTAMPNS) continue;
-            memcpy(&stamp, CMSG_DATA(head), sizeof stamp);
-            word age = clock_now(CLOCK_REALTIME) - stamp.tv_sec * 1000000000LL - stamp.tv_nsec;
-            if (age >= 0 && age < 10000000000LL) received -= age;
         }
         int known = from.sin_addr.s_addr == (uint32_t)l->address && ntohs(from.sin_port) == l->port;
         int answer = known ? hf_turn(l, l->t_datagram, (int)size, received) : HANDBACK;

@@ -11,6 +11,7 @@ import enum
 import functools
 import signal
 import socket
+import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,15 +24,19 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import LAW_FRACTION, Cycle, LawFailure
 from heptarm.fri.loop.telemetry import NAN7
 from heptarm.fri.loop.user_api import Output, State
-from heptarm.fri.protocol.messages import CommandMode, SessionState
-from heptarm.fri.protocol.protobuf import fields
-from heptarm.fri.protocol.version import unwrap
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import encode_command
+from heptarm.fri.protocol.messages import MAX_IO, MAX_TRANSFORMATIONS, CommandMode, SessionState
+from heptarm.fri.protocol.protobuf import Raw, fields, put_double, put_varint
+from heptarm.fri.protocol.version import MAX_DATAGRAM, Version, unwrap
 from heptarm.fri.session.statistics import BINS
 from heptarm.io.compiled import Unavailable, compiled_library, with_headers
 
 HANDBACK, LAW = -1, -2
 TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW, LAW_FAILED = range(6)
 BUFFER = 2048
+#: Largest size of a signal without its value, and of the name of a frame, for the native part.
+HEAD = 80
 #: A compiled law has failed after this many calls in a row that were too slow, or gave numbers that are not finite.
 LAW_PATIENCE = 10
 #: A call of a compiled law that has used this much of the processor's time is ended [ns].
@@ -40,7 +45,11 @@ LAW_CUT = 20_000_000
 MAX_PLAIN = 64
 
 _SOURCE = Path(__file__).with_name("native.c")
-_HEADERS = (_SOURCE.with_name("native_layout.h"), _SOURCE.parent / "include" / "heptarm_law.h")
+#: Headers that native.c includes, each behind those that include it.
+_HEADERS = (
+    *(_SOURCE.with_name(name) for name in ("kinematics.h", "native_layout.h")),
+    _SOURCE.parent / "include" / "heptarm_law.h",
+)
 _WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p
 #: Fallbacks for missing commands, in the numbering of the native part.
 MISSING = tuple(Missing)
@@ -68,6 +77,15 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("word", 1, "overlay safety operation control drive receive_multiplier"),
     ("word", 1, "robot_size connection_size"),
     ("char", MAX_PLAIN, "robot connection"),
+    # signals: of the message without their values, of the answer likewise; those that are to be written, in their order
+    ("word", 1, "io_count pending_count"),
+    ("word", MAX_IO, "io_size io_is_analog put_size pending_signal pending_left pending_value"),
+    ("byte", MAX_IO * HEAD, "io_head put_head"),
+    # frames: names of the requested ones; encoded frames of the answer
+    ("word", 1, "request_count frames_size"),
+    ("word", MAX_TRANSFORMATIONS, "request_size"),
+    ("byte", MAX_TRANSFORMATIONS * HEAD, "request_name"),
+    ("byte", BUFFER, "frames"),
     # commanding
     ("word", 1, "is_started is_ending has_law ticks commands_seen outputs_seen started"),
     ("word", 1, "ipo_known ipo_sequence"),
@@ -78,6 +96,9 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
     ("real", 6, "wrench_max wrench_step"),
     ("real", 1, "reach step"),
+    # kinematics for the estimate of the wrench: `struct chain`
+    ("word", 1, "has_chain"),
+    ("real", 24, "chain"),
     # plausible positions
     ("real", AXES, "plausible_low plausible_high"),
     # fallback for missing commands
@@ -100,12 +121,13 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("word", 1, "q_known"),
     ("real", AXES, "q_before dq"),
     # this cycle; t_known has one bit for each array of t_arrays, which are those of a state from S_ARRAYS on
-    ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known"),
+    ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known t_strategy"),
     ("real", 1, "t_tracking"),
     ("real", at.S_WRENCH - at.S_ARRAYS, "t_arrays"),
     ("real", 6, "t_wrench"),
     ("real", AXES, "t_pose"),
     ("real", 1, "t_e1"),
+    ("word", MAX_IO, "t_io"),
     ("byte", BUFFER, "t_datagram t_reply"),
 )
 _INFO = ("overlay", "safety", "operation", "control", "drive", "receive_multiplier")
@@ -143,6 +165,7 @@ def library() -> ctypes.CDLL:
     made.hf_send.argtypes = (_POINTER,)
     made.hf_run.argtypes = (_POINTER, _WORD, _POINTER)
     made.hf_law.argtypes = (_POINTER, _POINTER)
+    made.hf_echo.argtypes, made.hf_echo.restype = (ctypes.c_int, _WORD, _POINTER), _WORD
     if made.hf_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")
     return made
@@ -182,6 +205,8 @@ class Native:
         memory.reach = limits.reach
         memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
         memory.law_fraction = LAW_FRACTION
+        if cycle.estimator is not None:
+            memory.chain[:], memory.has_chain = cycle.estimator.chain, 1
         memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
 
@@ -278,7 +303,7 @@ class Native:
     def sync_from_python(self, datagram: bytes) -> None:
         """Copy the state of the Python cycle to the native part, which continues from it.
 
-        The native part stays inactive in sessions with signals, frames or poses.
+        The native part stays inactive in sessions that command poses.
 
         Args:
             datagram: the last message, with which it compares the next one.
@@ -294,15 +319,16 @@ class Native:
             return
         if commanding and (mode not in _JOINT_MODES or sample.q_ipo is None):
             return
-        if not cycle.exchange.is_idle:  # Python handles signals and frames
-            return
         if state is SessionState.COMMANDING_ACTIVE and not guard.is_started:
             return
-        parts = {
-            tag: value for tag, _, value in fields(unwrap(datagram, version)) if isinstance(value, bytes)
-        }
+        whole = [
+            (tag, value) for tag, _, value in fields(unwrap(datagram, version)) if isinstance(value, bytes)
+        ]
+        parts = dict(whole)
         robot, connection = parts.get(2), parts.get(4, b"")
-        if max(len(robot or b""), len(connection)) > MAX_PLAIN or set(parts) - {1, 2, 3, 4, 5}:
+        if max(len(robot or b""), len(connection)) > MAX_PLAIN or set(parts) - {1, 2, 3, 4, 5, 6}:
+            return
+        if not self._load_signals(parts.get(3, b""), [value for tag, value in whole if tag == 6], version):
             return
         memory.robot_size = -1 if robot is None else len(robot)
         memory.connection_size = len(connection)
@@ -339,6 +365,88 @@ class Native:
         memory.hot = 1
         self._is_newer = True
 
+    def _load_signals(self, monitor: bytes, requests: Sequence[bytes], version: Version) -> bool:
+        """Copy signals, requested frames and what is to be sent of them; whether the native part can exchange them.
+
+        Args:
+            monitor: monitor data of the last message, encoded.
+            requests: requested frames of the last message, encoded.
+            version: wire format.
+        """
+        exchange, memory = self._cycle.exchange, self.memory
+        signals = exchange.known
+        values = [value for tag, _, value in fields(monitor) if tag == 8 and isinstance(value, bytes)]
+        names = [next((value for tag, _, value in fields(one) if tag == 1), None) for one in requests]
+        if len(values) != len(signals):  # a name occurs twice
+            return False
+        frames = _body(m.Command(_NO_HEADER, transformations=exchange.frames(version)), version)
+        largest = _LARGEST_ANSWER + len(frames)
+        for place, (one, encoded) in enumerate(zip(signals, values, strict=True)):
+            is_analog = one.type is m.IoType.ANALOG
+            value = put_double(5, one.value) if is_analog else put_varint(4, int(one.value))
+            output = m.IoValue(one.name, one.type, m.IoDirection.OUTPUT, 0)
+            ((_, _, written),) = fields(_body(m.Command(_NO_HEADER, io=(output,)), version))
+            assert isinstance(written, bytes)
+            head, put = encoded.removesuffix(value), written[: -9 if is_analog else -2]
+            if head == encoded or max(len(head), len(put)) > HEAD:
+                return False
+            memory.io_is_analog[place] = is_analog
+            memory.io_size[place], memory.put_size[place] = len(head), len(put)
+            ctypes.memmove(_address(memory, "io_head") + HEAD * place, head, len(head))
+            ctypes.memmove(_address(memory, "put_head") + HEAD * place, put, len(put))
+            largest += len(put) + _LARGEST_VALUE
+        for place, name in enumerate(names):
+            if not isinstance(name, bytes) or len(name) > HEAD:
+                return False
+            memory.request_size[place] = len(name)
+            ctypes.memmove(_address(memory, "request_name") + HEAD * place, name, len(name))
+        unknown = set(exchange.pending) - {one.name for one in signals}
+        if largest > MAX_DATAGRAM or unknown:  # Python reports it
+            return False
+        memory.io_count, memory.request_count, memory.frames_size = len(signals), len(requests), len(frames)
+        ctypes.memmove(_address(memory, "frames"), frames, len(frames))
+        self._load_pending()
+        return True
+
+    def _load_pending(self) -> None:
+        """Copy the outputs that are to be written to the native part."""
+        exchange, memory = self._cycle.exchange, self.memory
+        places = {one.name: place for place, one in enumerate(exchange.known)}
+        memory.pending_count = len(exchange.pending)
+        for at_, (name, (value, left)) in enumerate(exchange.pending.items()):
+            place = places[name]
+            memory.pending_signal[at_], memory.pending_left[at_] = place, left
+            memory.pending_value[at_] = _bits(value, is_analog=bool(memory.io_is_analog[place]))
+
+    def _take_pending(self) -> None:
+        """Copy the outputs that are to be written to Python."""
+        exchange, memory = self._cycle.exchange, self.memory
+        names = [one.name for one in exchange.known]
+        pending: dict[str, tuple[int | float, int]] = {}
+        for place, left, bits in zip(
+            memory.pending_signal[: memory.pending_count],
+            memory.pending_left[: memory.pending_count],
+            memory.pending_value[: memory.pending_count],
+            strict=True,
+        ):
+            pending[names[place]] = (_number(bits, is_analog=bool(memory.io_is_analog[place])), left)
+        exchange.pending = pending
+
+    def write_outputs(self) -> None:
+        """Take over the outputs that a law in Python has written in this cycle."""
+        exchange, memory = self._cycle.exchange, self.memory
+        if not exchange.outputs.written:
+            return
+        self._take_pending()
+        exchange.show(
+            [
+                _number(bits, is_analog=bool(is_analog))
+                for bits, is_analog in zip(memory.t_io, memory.io_is_analog[: memory.io_count], strict=False)
+            ]
+        )
+        exchange.write()
+        self._load_pending()
+
     def sync_to_python(self) -> None:
         """Copy the state of the native part to the Python cycle, which continues from it."""
         cycle, memory = self._cycle, self.memory
@@ -351,6 +459,7 @@ class Native:
         session.counters.load(header, at.COUNTS)
         session.sample.sequence, session.received = memory.sequence, memory.received
         session.waiting, session.sent, session.reflected = memory.waiting, memory.sent, memory.reflected
+        self._take_pending()
         cycle.record.ticks, cycle.commands_seen = memory.ticks, memory.commands_seen
         cycle.q_before = tuple(memory.q_before) if memory.q_known else None
         if cycle.mirrored is not None:
@@ -389,6 +498,34 @@ class Native:
     def reply(self, size: int) -> bytes:
         """Bytes of the answer."""
         return bytes(memoryview(self.memory.t_reply)[:size])
+
+
+#: Size of an answer with everything but signals and frames, and of the value of a signal with its key and length.
+_LARGEST_ANSWER, _LARGEST_VALUE = 240, 14
+_NO_HEADER = m.Header(0, 0)
+_BITS = struct.Struct("<d"), struct.Struct("<q"), struct.Struct("<Q")
+
+
+def _body(command: m.Command, version: Version) -> bytes:
+    """Encoded content of a command, without its header; empty: it has none."""
+    found: list[Raw] = [
+        value for tag, _, value in fields(unwrap(encode_command(command, version), version)) if tag == 2
+    ]
+    return found[0] if found and isinstance(found[0], bytes) else b""
+
+
+def _bits(value: float, *, is_analog: bool) -> int:
+    """A value of a signal as a word."""
+    real, word, unsigned = _BITS
+    found: int = word.unpack(real.pack(value) if is_analog else unsigned.pack(int(value)))[0]
+    return found
+
+
+def _number(bits: int, *, is_analog: bool) -> int | float:
+    """The value of a signal in a word."""
+    real, word, unsigned = _BITS
+    found: int | float = (real if is_analog else unsigned).unpack(word.pack(bits))[0]
+    return found
 
 
 def _address(memory: ctypes.Structure, name: str) -> int:

@@ -74,6 +74,7 @@ enum {
     FILLED = 2,
     LIMITED = 4,
     BRAKING = 8,
+    ESTIMATED = 16,
 };
 
 /* words of the shared header */
@@ -132,26 +133,27 @@ enum {
     S_REFLECTED = 16,
     S_SENT = 17,
     S_TICKS = 18,
-    S_TRACKING = 19,
-    S_ARRAYS = 20,
-    S_WRENCH = 62,
-    S_POSE = 68,
-    S_E1 = 75,
-    S_Q_SENT = 76,
-    S_TAU_SENT = 83,
-    S_WRENCH_SENT = 90,
-    S_POSE_IPO = 96,
-    S_POSE_SENT = 103,
-    S_E1_IPO = 110,
-    S_E1_SENT = 111,
-    S_IO = 112,
-    S_Q = 20,
-    S_TAU = 27,
-    S_Q_CMD = 34,
-    S_TAU_CMD = 41,
-    S_TAU_EXT = 48,
-    S_Q_IPO = 55,
-    STATE_WORDS = 122,
+    S_STRATEGY = 19,
+    S_TRACKING = 20,
+    S_ARRAYS = 21,
+    S_WRENCH = 63,
+    S_POSE = 69,
+    S_E1 = 76,
+    S_Q_SENT = 77,
+    S_TAU_SENT = 84,
+    S_WRENCH_SENT = 91,
+    S_POSE_IPO = 97,
+    S_POSE_SENT = 104,
+    S_E1_IPO = 111,
+    S_E1_SENT = 112,
+    S_IO = 113,
+    S_Q = 21,
+    S_TAU = 28,
+    S_Q_CMD = 35,
+    S_TAU_CMD = 42,
+    S_TAU_EXT = 49,
+    S_Q_IPO = 56,
+    STATE_WORDS = 123,
 };
 
 #define MONITORED {[1] = S_Q, [2] = S_TAU, [3] = S_Q_CMD, [4] = S_TAU_CMD, [5] = S_TAU_EXT} /* by number of the field in a message */
@@ -182,7 +184,10 @@ enum {
 enum {
     AXES = 7,
     MAX_NAME = 63,
+    MAX_IO = 10,
+    MAX_TRANSFORMATIONS = 5,
     BUFFER = 2048,
+    HEAD = 80,
     PARAM_SLOTS = 8,
     MEMORY_SLOTS = 8,
 };
@@ -194,6 +199,7 @@ enum {
 #define GAP_PERIODS 5LL
 #define MIN_GAP 25000000LL
 #define GRACE 50000000LL
+#define REPEATS 50LL
 #define LONGEST 1000000000000000LL
 #define LAW_PATIENCE 10LL
 #define LAW_CUT 20000000LL
@@ -206,6 +212,13 @@ struct loop {
     word overlay, safety, operation, control, drive, receive_multiplier;
     word robot_size, connection_size;
     char robot[64], connection[64];
+    word io_count, pending_count;
+    word io_size[10], io_is_analog[10], put_size[10], pending_signal[10], pending_left[10], pending_value[10];
+    uint8_t io_head[800], put_head[800];
+    word request_count, frames_size;
+    word request_size[5];
+    uint8_t request_name[400];
+    uint8_t frames[2048];
     word is_started, is_ending, has_law, ticks, commands_seen, outputs_seen, started;
     word ipo_known, ipo_sequence;
     double ipo[7], slope[7];
@@ -214,6 +227,8 @@ struct loop {
     double low[7], high[7], top_v[7], top_a[7], top_j[7], near[7], dq_max[7], ddq_max[7], dddq_max[7], tau_max[7], tau_step[7];
     double wrench_max[6], wrench_step[6];
     double reach, step;
+    word has_chain;
+    double chain[24];
     double plausible_low[7], plausible_high[7];
     word f_at, f_has_q, f_has_slope, f_has_tau, f_has_wrench, f_missing;
     double f_q[7], f_slope[7], f_tau[7];
@@ -230,12 +245,13 @@ struct loop {
     double law_fraction;
     word q_known;
     double q_before[7], dq[7];
-    word t_flags, t_received, t_answer, t_size, t_stamp, t_known;
+    word t_flags, t_received, t_answer, t_size, t_stamp, t_known, t_strategy;
     double t_tracking;
     double t_arrays[42];
     double t_wrench[6];
     double t_pose[7];
     double t_e1;
+    word t_io[10];
     uint8_t t_datagram[2048], t_reply[2048];
 };
 

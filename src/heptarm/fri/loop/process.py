@@ -45,8 +45,9 @@ from heptarm.fri.loop.native import (
     library,
 )
 from heptarm.fri.loop.user_api import Output, Params, State
+from heptarm.fri.loop.wrench import WrenchEstimator
 from heptarm.fri.protocol.messages import SessionState
-from heptarm.fri.protocol.version import Version
+from heptarm.fri.protocol.version import Version, spoken_version
 from heptarm.io.compiled import Unavailable
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import Address, UdpSocket
@@ -54,8 +55,11 @@ from heptarm.io.udp import Address, UdpSocket
 PRIORITY = 60
 #: Longest wait for a datagram before the loop checks whether it has to end [s].
 PATIENCE = 0.05
-#: The loop accepts another sender after this long without a message of the previous one [ns].
+#: The loop accepts a sender with another address after this long without a message of the previous one [ns].
 SILENT = 1_000_000_000
+#: It accepts another port of the same address, that of a restarted controller, after so many periods without a message,
+#: and after at least this long [ns]: not at once, so that another program there cannot interrupt a running session.
+SILENT_PERIODS, SILENT_PORT = 3, 100_000_000
 #: Longest wait for the arm to come to rest before the loop ends [s].
 BRAKING = 3.0
 #: The loop checks every so many datagrams whether the user's process is alive.
@@ -274,6 +278,7 @@ class Loop:
             memory=Memory(values, memory) if in_python and arity(in_python) >= WITH_MEMORY else None,
             memory_values=values,
             positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
+            estimator=WrenchEstimator(config["chain"]),
         )
         self._native = None if self._why_python else Native(self.cycle)
         if compiled is not None and self._native is not None:
@@ -304,7 +309,7 @@ class Loop:
         header, cycle, states = self.layout.header, self.cycle, self.layout.states
         run, send, now_ns = native.library.hf_run, native.library.hf_send, time.monotonic_ns
         memory, reference = native.memory, native.reference
-        out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench)
+        out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench, cycle.exchange.outputs)
         dq = np.frombuffer(memory.dq, dtype=np.float64)
         sys.unraisablehook = native.note_error
         native.listen(self.socket.sock, None)
@@ -312,8 +317,9 @@ class Loop:
         while True:
             code = run(reference, _CHECK_EVERY, native.sender)
             if code == CALL_LAW:
-                state = State(states.floats[header[at.STATES] % history], dq=dq)
+                state = State(states.floats[header[at.STATES] % history], cycle.exchange.signals, dq)
                 cycle.call_law(state, out, memory.received)
+                native.write_outputs()
                 memory.is_ending = cycle.is_ending
                 send(reference)
                 code = CHECK if header[at.STOP] else CALL_LAW
@@ -327,7 +333,7 @@ class Loop:
                 native.sync_to_python()
                 datagram, sender = native.datagram, native.sender_address
                 received = memory.t_received
-                if sender != self._peer and not self._accept(sender, received):
+                if sender != self._peer and not self._accept(sender, datagram, received):
                     native.sync_from_python(self._last)
                     continue
                 native.listen(self.socket.sock, sender)
@@ -369,7 +375,7 @@ class Loop:
                     return
                 continue
             datagram, received, sender = got
-            if sender != self._peer and not self._accept(sender, received):
+            if sender != self._peer and not self._accept(sender, datagram, received):
                 continue
             answer = cycle.turn(datagram, received)
             if answer is not None:
@@ -380,16 +386,25 @@ class Loop:
             if (header[at.STOP] or turns % _CHECK_EVERY == 0) and self._is_over(now):
                 return
 
-    def _accept(self, sender: Address, now: int) -> bool:
-        """Whether to accept another sender: only if the session of the previous one has ended or it is silent."""
+    def _accept(self, sender: Address, datagram: bytes, now: int) -> bool:
+        """Whether to accept another sender: only if the session of the previous one has ended or it is silent.
+
+        Args:
+            sender: address and port.
+            datagram: its datagram.
+            now: time of receipt [ns].
+        """
         remote = self.config["remote"]
         if remote is not None and sender[0] != remote:
             return False
         session = self.cycle.session
         if self._peer is not None:
-            if session.state is not SessionState.IDLE and now - session.received < SILENT:
+            patience = SILENT
+            if sender[0] == self._peer[0] and spoken_version(datagram) is not None:
+                patience = max(SILENT_PERIODS * session.period, SILENT_PORT)
+            if session.state is not SessionState.IDLE and now - session.received < patience:
                 return False
-            session.restart()
+            self.cycle.forget_controller()
         self._peer = sender
         self.cycle.record.report(now, f"listening to {sender[0]}:{sender[1]}")
         return True

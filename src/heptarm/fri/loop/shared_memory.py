@@ -48,10 +48,11 @@ assert COUNTS + len(COUNTERS) <= LIMITED_COUNTS
     S_REFLECTED,
     S_SENT,
     S_TICKS,
-) = range(19)
-S_TRACKING = 19
+    S_STRATEGY,
+) = range(20)
+S_TRACKING = 20
 #: The joint arrays: those that FRI monitors, then the interpolator's position.
-S_ARRAYS = 20
+S_ARRAYS = S_TRACKING + 1
 ARRAYS = {
     name: slice(S_ARRAYS + JOINTS * i, S_ARRAYS + JOINTS * (i + 1))
     for i, name in enumerate((*MONITORED, "q_ipo"))
@@ -71,8 +72,8 @@ STATE_WORDS = S_IO + MAX_IO
 #: Value of an enumeration that the controller did not send.
 ABSENT = -1
 
-# bits of the flags
-ANSWERED, FILLED, LIMITED, BRAKING = 1, 2, 4, 8
+# bits of the flags; ESTIMATED: of the wrench
+ANSWERED, FILLED, LIMITED, BRAKING, ESTIMATED = 1, 2, 4, 8, 16
 
 # words of a command: sequence, time [ns], bits of the parts that it has, then the numbers
 C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1 = 1, 2, 3, 10, 17, 23, 30

@@ -27,7 +27,7 @@ from heptarm.values.arrays import instance, integer, within, word
 from heptarm.values.io import SignalValue
 
 NAN7, NAN6 = (math.nan,) * 7, (math.nan,) * 6
-_ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
+_ROW = struct.Struct(f"={at.S_TRACKING - 1}q{at.STATE_WORDS - at.S_TRACKING}d")
 _ARRAYS = attrgetter(*at.ARRAYS)
 _KINDS = list(Kind)
 _NO_SIGNALS = (math.nan,) * m.MAX_IO
@@ -72,6 +72,7 @@ class Record:
         ipo: interpolator's pose in FRI's numbers, in sessions that command poses.
         ipo_e1: its redundancy angle [rad].
         signals: values of the session's signals.
+        wrench: external wrench of the message, sent or estimated [N, Nm].
     """
 
     def __init__(self, layout: at.Layout, session: Session) -> None:
@@ -86,6 +87,7 @@ class Record:
         self.ipo: Sequence[float] = NAN7
         self.ipo_e1 = math.nan
         self.signals: Sequence[float] = ()
+        self.wrench: Sequence[float] = NAN6
         self._trouble = session.trouble
         layout.trouble.write(self._trouble)
 
@@ -101,14 +103,13 @@ class Record:
         if self.info[0] is not robot or self.info[1] is not link:
             self.info = (robot, link, information(sample.message))
         seconds, nanos = sample.stamp
-        wrench: Sequence[float] = NAN6
         pose: Sequence[float] = NAN7
-        e1 = math.nan
+        e1, strategy = math.nan, at.ABSENT
         if session.version is not None and session.version.traits.quaternions:
             monitor = sample.message.monitor or m.MonitorData()
-            wrench = monitor.wrench or NAN6
             pose = monitor.pose.values if monitor.pose is not None else NAN7
-            e1 = monitor.redundancy.value if monitor.redundancy is not None else math.nan
+            if monitor.redundancy is not None:
+                e1, strategy = monitor.redundancy.value, monitor.redundancy.strategy
         overlay, safety, operation, control, drive, multiplier = self.info[2]
         sent, is_commanding = self.sent, session.is_commanding
         _ROW.pack_into(
@@ -132,9 +133,10 @@ class Record:
             session.reflected,
             session.sent,
             max(0, self.ticks) if is_commanding else 0,
+            strategy,
             sample.tracking,
             *(number for array in _ARRAYS(sample) for number in array or NAN7),
-            *wrench,
+            *self.wrench,
             *pose,
             e1,
             *sent.q,
@@ -247,7 +249,7 @@ class Reader:
         """Get the words of all states from a count on, for those who process many at once; see shared_memory.
 
         Returns:
-            The words, shape (n, 122); the count for the next call; how many states were overwritten before.
+            The words, shape (n, 123); the count for the next call; how many states were overwritten before.
         """
         return self._layout.states.since(integer(count, "count", 0, _LARGEST_COUNT))
 

@@ -25,6 +25,7 @@ from heptarm.fri.protocol.messages import (
     OperationMode,
     Overlay,
     Quality,
+    RedundancyStrategy,
     RobotInfo,
     Safety,
     SessionState,
@@ -242,9 +243,9 @@ class Output:
         self._e1 = value if isinstance(value, float) else scalar(value, "out.e1")
 
     @classmethod
-    def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
+    def on(cls, q: Any, tau: Any, wrench: Any, outputs: Outputs | None = None) -> Output:
         """Make an output on existing memory."""
-        made = cls()
+        made = cls(outputs)
         made._q, made._tau, made._wrench = (
             np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench)
         )
@@ -308,7 +309,7 @@ class State:
     """One monitoring message and its answer. Arrays are NaN if the controller does not send them.
 
     Args:
-        words: slot of the ring of states, shape (122,); it is not copied.
+        words: slot of the ring of states, shape (123,); it is not copied.
         signals: signals of the session.
         dq: velocities, shape (7,) [rad/s], of a state that a law sees.
 
@@ -366,8 +367,17 @@ class State:
 
     @property
     def wrench(self) -> Floats:
-        """External wrench, shape (6,) [N, Nm]; FRI 2.7 only."""
+        """External wrench on the flange, shape (6,) [N, Nm].
+
+        FRI 2.7 sends it. Else it is estimated from `tau_ext` and `q`, in base axes, see `is_wrench_estimated`; NaN if
+        the controller sends no external torques.
+        """
         return self._floats[at.S_WRENCH : at.S_WRENCH + 6]
+
+    @property
+    def is_wrench_estimated(self) -> bool:
+        """Whether `wrench` is an estimate from the torques of the joints."""
+        return bool(self._ints[at.S_FLAGS] & at.ESTIMATED)
 
     @property
     def pose(self) -> Pose:
@@ -396,6 +406,12 @@ class State:
     def e1(self) -> float:
         """Redundancy angle of the pose [rad]; NaN if there is none."""
         return float(self._floats[at.S_E1])
+
+    @property
+    def redundancy_strategy(self) -> RedundancyStrategy | None:
+        """Meaning of `e1`: E1 is the angle of A3; None if the controller sends none, as FRI 1.x."""
+        value = int(self._ints[at.S_STRATEGY])
+        return None if value == at.ABSENT else RedundancyStrategy(value)
 
     @property
     def e1_ipo(self) -> float:
@@ -518,9 +534,14 @@ class State:
         return float(self._ints[at.S_PERIOD]) * 1e-9
 
     @property
+    def multiplier(self) -> int:
+        """Receive multiplier: number of messages that one answer is for; 1 if the controller sends none."""
+        return max(1, int(self._ints[at.S_MULTIPLIER]))
+
+    @property
     def dt(self) -> float:
         """Command period [s]: the send period times the number of messages that one answer is for."""
-        return float(self._ints[at.S_PERIOD] * max(1, int(self._ints[at.S_MULTIPLIER]))) * 1e-9
+        return float(self._ints[at.S_PERIOD] * self.multiplier) * 1e-9
 
     @property
     def t(self) -> float:

@@ -136,3 +136,11 @@ def recognise(datagram: bytes) -> Version:
             tags = {inner for inner, _, _ in fields(value)}
             return Version.V1_15 if 3 in tags else Version.V2_5
     raise MalformedMessage("the monitoring message has no monitor data: its version cannot be recognised")
+
+
+def spoken_version(datagram: bytes) -> Version | None:
+    """Version of a legal monitoring message; None for any other datagram."""
+    try:
+        return recognise(datagram)
+    except MalformedMessage:
+        return None

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import MonitoringReader, Sample
 from heptarm.fri.protocol.protobuf import MalformedMessage, read_varint
-from heptarm.fri.protocol.version import Version, recognise
+from heptarm.fri.protocol.version import Version, recognise, spoken_version
 from heptarm.fri.session.answers import NOTHING, Answers, Setpoint
 from heptarm.fri.session.statistics import Counters, Histogram
 from heptarm.values.robot import ROBOTS
@@ -231,7 +231,7 @@ class Session:
 
     def _diagnose(self, error: MalformedMessage, datagram: bytes, now: int) -> None:
         """Report a datagram that is no message; keep the likely cause as `trouble` until the next message."""
-        spoken = None if isinstance(error, ImplausibleMessage) else _spoken(datagram)
+        spoken = None if isinstance(error, ImplausibleMessage) else spoken_version(datagram)
         if spoken is None:
             self._report(Kind.MALFORMED, str(error), now)
             if isinstance(error, ImplausibleMessage):
@@ -404,11 +404,3 @@ def reflected_in(datagram: bytes, *, framed: bool) -> int:
         if key == 0x18:
             reflected = value
     return reflected if reflected < _WRAP else -1
-
-
-def _spoken(datagram: bytes) -> Version | None:
-    """Version of a legal message; None for any other datagram."""
-    try:
-        return recognise(datagram)
-    except MalformedMessage:
-        return None

@@ -76,13 +76,13 @@ def move_pose(context: NodeContext, goal: Any) -> GoalWork:
         how["speed_mps"] = goal.speed_mps
     if goal.path == motions.LIN_REL:
         return _move(context, goal, motions.offset(goal.pose, how))
-    pose = motions.stamped_pose(goal.pose, context.base)
+    pose = motions.stamped_pose(goal.pose, context.driver)
     if goal.path == motions.PTP:
         return _move(context, goal, ptp(pose, moving=moving))
     if goal.path == motions.LIN:
         return _move(context, goal, lin(pose, **how))
     if goal.path == motions.CIRC:
-        return _move(context, goal, circ(motions.stamped_pose(goal.via, context.base), pose, **how))
+        return _move(context, goal, circ(motions.stamped_pose(goal.via, context.driver), pose, **how))
     raise CommandRejected(
         f"path must be 0 (PTP), 1 (LIN), 2 (CIRC) or 3 (LIN_REL), got {goal.path}",
         parameter="path",
@@ -302,9 +302,7 @@ class _GuidingGoal:
         """Record states until the motion has ended; returns why this goal ended it, empty: something else did."""
         published = 0
         why = ""
-        for state in self._arm.states():
-            if self._handle.done:
-                break
+        for state in self._handle.states():  # to its end, also those that are read late
             self.recorded.append(state)
             if state.stamp - published >= FEEDBACK_PERIOD * 1e9:
                 published = state.stamp

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from heptarm.arm.link.datagrams import DatagramReport
 from heptarm.values.state import State
 
 
@@ -33,7 +34,12 @@ class Diagnosis:
 
 
 def diagnose(
-    state: State | None, *, link_error: str = "", active: bool = True, age: float = 0.0
+    state: State | None,
+    *,
+    link_error: str = "",
+    active: bool = True,
+    age: float = 0.0,
+    datagrams: DatagramReport | None = None,
 ) -> Diagnosis:
     """Derive level and text from the newest state.
 
@@ -42,6 +48,7 @@ def diagnose(
         link_error: why there is no connection; empty: connected.
         active: whether the node accepts goals.
         age: of the state [s].
+        datagrams: how they fare; None: there are none.
     """
     values = {"connected": _yes_no(not link_error), "active": _yes_no(active)}
     if link_error:
@@ -49,6 +56,12 @@ def diagnose(
     if state is None:
         return Diagnosis(DiagnosticLevel.STALE, "no robot state received yet", values)
     values["state age"] = f"{age:.3f} s"
+    if datagrams is not None:
+        values["datagrams"] = (
+            f"round trip {1e3 * datagrams.round_trip:.1f} ms"
+            if datagrams.gets_through
+            else "do not get through, everything goes over TCP"
+        )
     if age > 1.0:
         return Diagnosis(DiagnosticLevel.STALE, f"the newest state is {age:.1f} s old", values)
     if state.motion is not None:

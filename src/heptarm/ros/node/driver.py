@@ -119,6 +119,7 @@ class Driver:
             name=_name(),
             groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
             watchdog=values["watchdog"],
+            datagrams=values["datagrams"],
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = NodeFriSession(self._arm)
@@ -215,10 +216,12 @@ class Driver:
     def diagnosis(self) -> Diagnosis:
         """Diagnose the arm."""
         try:
-            state = self._arm.state
+            state, datagrams = self._arm.state, self._arm.connection.datagrams
         except HeptarmError as error:
             return diagnose(None, link_error=self.link_error or str(error), active=self._active)
-        return diagnose(state, link_error=self.link_error, active=self._active, age=state.age)
+        return diagnose(
+            state, link_error=self.link_error, active=self._active, age=state.age, datagrams=datagrams
+        )
 
     def _on_state(self, state: State) -> None:
         safety = state.groups.safety

@@ -91,6 +91,12 @@ PARAMETERS = (
         ROS_NODE.low,
         ROS_NODE.high,
     ),
+    Parameter(
+        "datagrams",
+        False,
+        "send servo targets and receive states by UDP beside the TCP connection, for networks that lose packets; what "
+        "does not get through goes over TCP",
+    ),
     Parameter("autostart", True, "configure and activate automatically, retrying until it works"),
     Parameter("prefix", "", "prefix of the names of joints and frames, for several arms in one scene"),
     Parameter(

@@ -10,7 +10,8 @@ from pathlib import Path
 import mujoco
 
 from heptarm.sim.plant.appearance import ArmMeshes, undress
-from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.carried import CarriedShapes
+from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
 from heptarm.values.robot import robot
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -76,9 +77,15 @@ def specification(model: str, meshes: ArmMeshes | None = None) -> mujoco.MjSpec:
 
 
 def compiled(
-    model: str, boxes: Sequence[Box] = (), scene: Scene | None = None, meshes: ArmMeshes | None = None
+    model: str,
+    boxes: Sequence[Box] = (),
+    scene: Scene | None = None,
+    meshes: ArmMeshes | None = None,
+    carried: Sequence[CarriedShapes] = (),
 ) -> mujoco.MjModel:
     """MuJoCo's model of a robot among boxes and in a scene, see `specification`; its first seven joints are the arm's.
+
+    Where a scene has a tool, that one is on the flange: the shapes of another tool are left out.
 
     Raises:
         ValueError: the file of the scene is not in MuJoCo's format.
@@ -86,6 +93,10 @@ def compiled(
     spec = specification(model, meshes)
     if scene is not None:
         scene.attach_to(spec)
+    has_tool = spec.body(PREFIX + TOOL) is not None
+    for one in carried:
+        if not (one.is_tool and has_tool):
+            one.add_to(spec)
     for number, box in enumerate(boxes):
         spec.worldbody.add_geom(
             name=f"box {number}",

@@ -9,7 +9,7 @@ import numpy as np
 from heptarm.arm.arm import Arm
 from heptarm.arm.motion.servo import JointServo, PoseServo, Servo
 from heptarm.errors import HeptarmError, MotionAborted, Starved
-from heptarm.testing.measure import above, below, fresh, holds, near, note
+from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -19,6 +19,8 @@ from heptarm.values.state import State
 _A7 = np.array([0.0, 0, 0, 0, 0, 0, 1.0])
 #: Targets per second [Hz], and the watchdog: long, since a busy machine is none of the robot's business [s].
 _RATE, _PATIENT = 50.0, 2.0
+#: Longest wait for answers, and for datagrams that get through [s].
+_ANSWER = 20.0
 #: States on a line that tell its speed.
 _ENOUGH = 12
 #: Least time between two states whose difference is a speed [ns].
@@ -70,6 +72,31 @@ def joints(arm: Arm) -> None:
     holds(stats.refused == 0 and stats.received == stats.sent, f"{stats.sent} targets sent, all received")
     below(stats.set_median, 2e-3, "median cost of a target here", unit="s")
     holds(servo.result is not None and servo.result.cause is Cause.CANCELLED, "it ended when the block did")
+
+
+@scenario(line=5, rows="O12", space=0.1, needs=("servo",))
+def datagrams(arm: Arm) -> None:
+    """Servo targets and states by UDP: none waits for a lost one, and what does not get through goes over TCP."""
+    link = arm.connection.link
+    if reason := link.open_datagrams(timeout=_ANSWER):
+        raise Unfit(reason)
+    try:
+        arm.wait_until(lambda _: link.datagrams is not None and link.datagrams.gets_through, timeout=_ANSWER)
+        with arm.servo("joint", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
+            start = servo.start.q
+            far = _swing(arm, servo, start)
+        near(far, 0.15, 0.01, "A7 swung by", unit="rad")
+        near(arm.wait_for_rest().q, start, 5e-3, "and came back", unit="rad")
+        report, counts = link.datagrams, link.datagram_counts(timeout=_ANSWER)
+        assert report is not None
+        above(report.states, 0, "states by datagram")
+        holds(report.targets == servo.stats.sent, f"each of {servo.stats.sent} targets was sent by datagram")
+        above(counts.accepted, report.targets / 2, "datagrams that counted in the cabinet")
+        note(
+            f"{report.targets_over_tcp} targets over TCP as well, round trip {1e3 * report.round_trip:.2f} ms"
+        )
+    finally:
+        arm.reconnect()  # without datagrams
 
 
 @scenario(line=5, rows="E5", space=0.1, needs=("servo_direct",))

@@ -34,7 +34,7 @@ struct heptarm_state {
     double tau_ext[7]; /* external torques [Nm] */
     double q_cmd[7]; /* positions commanded by the controller [rad]; FRI 1.x */
     double q_ipo[7]; /* interpolator's positions [rad] */
-    double wrench[6]; /* external wrench [N, Nm]; FRI 2.7 */
+    double wrench[6]; /* external wrench on the flange [N, Nm]; estimated before FRI 2.7 */
     int64_t sequence; /* controller's counter */
     int64_t stamp; /* controller's clock [ns since 1970]; 0 if it sends no time */
     int64_t received; /* time of receipt, this machine's monotonic clock [ns] */

@@ -1,0 +1,113 @@
+"""The external wrench: sent by the controller, or estimated from the torques of the joints."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from heptarm import model
+from heptarm.fri import RedundancyStrategy
+from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import SessionState
+from heptarm.fri.protocol.version import Version
+from heptarm.values.robot import ROBOTS, robot
+
+from .controller import Controller
+from .test_cycle import Bench
+from .test_native import Twins
+
+WRENCH = (3.0, -5.0, 12.0, 0.4, -0.3, 0.2)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_wrench_of_its_torques_is_found_again(name: str) -> None:
+    arm, rng = robot(name), np.random.default_rng(5)
+    estimator = WrenchEstimator(chain_of(arm))
+    for _ in range(20):
+        q = rng.uniform(0.9 * arm.q_min, 0.9 * arm.q_max)
+        jacobian = model.jacobian(arm, q)
+        if np.linalg.svd(jacobian, compute_uv=False)[-1] < 0.1:
+            continue  # near a singular posture the damping makes it smaller
+        found = estimator.wrench(tuple(q), tuple(jacobian.T @ WRENCH))
+        assert found == pytest.approx(WRENCH, rel=0.02, abs=0.1)
+
+
+def test_in_a_singular_posture_it_stays_bounded() -> None:
+    """Stretched upwards, no torque shows a force along the arm; noise must not appear as one."""
+    arm = robot("iiwa14")
+    noise = tuple(random.Random(1).uniform(-0.5, 0.5) for _ in range(7))
+    found = WrenchEstimator(chain_of(arm)).wrench((0.0,) * 7, noise)
+    assert np.abs(found[:3]).max() < 30.0
+
+
+class Pushed(Controller):
+    """A controller whose arm is pushed: it sends the torques of a wrench."""
+
+    sent: tuple[float, ...] | None = None
+
+    def datagram(self) -> bytes:
+        plain = super().datagram()
+        jacobian = model.jacobian(robot("iiwa14"), self.position())
+        return _with(plain, self.wire, tau_ext=tuple(jacobian.T @ WRENCH), wrench=self.sent)
+
+
+def _with(datagram: bytes, wire: Version, **values: object) -> bytes:
+    """A message with other values of its monitor data."""
+    from dataclasses import replace
+
+    from heptarm.fri.protocol import codec
+
+    message = codec.decode_monitoring(datagram, wire)
+    assert message.monitor is not None
+    return codec.encode_monitoring(replace(message, monitor=replace(message.monitor, **values)), wire)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("wire", Version)
+def test_native_and_python_loop_estimate_the_same_where_none_is_sent(wire: Version) -> None:
+    twins = Twins(wire=wire)
+    twins.pure.controller.__class__ = Pushed
+    twins.activate()
+    for _ in range(20):
+        twins.step()
+    state = twins.pure.states[-1]
+    assert state.is_wrench_estimated
+    assert state.wrench.tolist() == pytest.approx(WRENCH, rel=0.02, abs=0.1)
+    if wire is Version.V2_7:
+        twins.pure.controller.sent = tuple(reversed(WRENCH))  # type: ignore[attr-defined]
+        twins.step()
+        twins.step()
+        state = twins.pure.states[-1]
+        assert state.wrench.tolist() == list(reversed(WRENCH)) and not state.is_wrench_estimated
+    twins.check()
+
+
+def test_without_external_torques_there_is_no_wrench() -> None:
+    bench = Bench()
+    plain = bench.controller.datagram
+    bench.controller.datagram = lambda: _with(plain(), Version.V1_15, tau_ext=None)  # type: ignore[method-assign]
+    bench.run(3, SessionState.MONITORING_READY)
+    state = bench.states[-1]
+    assert np.isnan(state.wrench).all() and not state.is_wrench_estimated
+
+
+def test_redundancy_strategy_and_receive_multiplier_are_read() -> None:
+    twins = Twins(wire=Version.V2_5)
+    twins.activate()
+    assert twins.pure.states[-1].redundancy_strategy is None and twins.pure.states[-1].multiplier == 1
+    plain = twins.pure.controller.datagram
+    for strategy in (m.RedundancyStrategy.E1, m.RedundancyStrategy.NONE):
+        redundancy = m.Redundancy(strategy, 0.3)
+        twins.pure.controller.datagram = lambda one=redundancy: _with(plain(), Version.V2_5, redundancy=one)  # type: ignore[method-assign]
+        twins.step()
+        twins.step()
+        state = twins.pure.states[-1]
+        assert state.redundancy_strategy is RedundancyStrategy[strategy.name] and state.e1 == 0.3
+    assert twins.plain > 4
+    twins.check()
+    with_old = Bench(wire=Version.V1_15)
+    with_old.run(2, SessionState.MONITORING_READY)
+    assert with_old.states[-1].redundancy_strategy is None and math.isnan(with_old.states[-1].e1)

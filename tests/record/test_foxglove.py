@@ -1,0 +1,94 @@
+"""A recording against what Foxglove publishes: its schemas, and how MCAP names encodings."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from typing import Any
+
+import pytest
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from mcap.reader import make_reader
+
+from heptarm.record.mcap_file import RecordingFile
+from tests.record.bodies import EPOCH, body, fri_words, samples, to_ours
+from tests.record.test_file import FACTS, written
+
+pytest.importorskip("foxglove_schemas_protobuf")
+
+#: Pairs of the encoding of a schema and that of its messages, of the registry in MCAP's specification.
+ENCODINGS = {("protobuf", "protobuf"), ("jsonschema", "json")}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, Any, Any]]:
+    """Schema, channel and message of everything in a recording."""
+    path = written(tmp_path_factory.mktemp("foxglove") / "run.mcap", 200, motion=5)
+    with_fri = RecordingFile(path.with_name("fri.mcap"), FACTS, epoch=EPOCH, chunk=50_000)
+    (pressed,) = samples(1)
+    with_fri.states([pressed._replace(body=body(0, button=1.0))], to_ours=to_ours, signals=("A.One", "A.Two"))
+    with_fri.cycles(fri_words(20))
+    with_fri.finish({})
+    found: list[tuple[Any, Any, Any]] = []
+    for one in (path, with_fri.path):
+        with one.open("rb") as stream:
+            found += make_reader(stream, validate_crcs=True).iter_messages()
+    return found
+
+
+def published(name: str) -> Any:
+    """The class that Foxglove publishes for a message such as "foxglove.Log"."""
+    package, _, message = name.rpartition(".")
+    assert package == "foxglove"
+    return getattr(importlib.import_module(f"foxglove_schemas_protobuf.{message}_pb2"), message)
+
+
+def ours(schema: Any) -> Any:
+    """The message of a schema in a file; everything that it needs is there, in order."""
+    pool = descriptor_pool.DescriptorPool()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+        pool.Add(file)
+    return pool.FindMessageTypeByName(schema.name)
+
+
+def shape(message: Any) -> dict[str, Any]:
+    """What a message is on the wire: numbers and types of its fields, those of what it contains, values of enums."""
+    found: dict[str, Any] = {}
+    for field in message.fields:
+        inner: Any = None
+        if field.message_type is not None:
+            inner = field.message_type.full_name, shape(field.message_type)
+        elif field.enum_type is not None:
+            inner = field.enum_type.full_name, {one.name: one.number for one in field.enum_type.values}
+        found[field.name] = (field.number, field.type, field.is_repeated, inner)
+    return found
+
+
+def test_every_channel_has_a_schema_in_an_encoding_that_foxglove_reads(recorded: list[Any]) -> None:
+    topics = {channel.topic for _, channel, _ in recorded}
+    assert topics >= {"/state", "/fri", "/tcp", "/log", "/journal", "/signals"}
+    for schema, channel, message in recorded:
+        assert (schema.encoding, channel.message_encoding) in ENCODINGS, channel.topic
+        if schema.encoding == "protobuf":
+            kind = message_factory.GetMessageClass(ours(schema))
+            assert kind.FromString(message.data).ListFields(), channel.topic
+        else:
+            assert json.loads(schema.data)["type"] == "object"
+            content = json.loads(message.data)
+            assert set(content) <= set(json.loads(schema.data)["properties"]), channel.topic
+
+
+def test_foxgloves_messages_are_those_that_it_publishes(recorded: list[Any]) -> None:
+    names = set()
+    for schema, channel, message in recorded:
+        if not schema.name.startswith("foxglove."):
+            continue
+        kind = published(schema.name)
+        if schema.name not in names:
+            assert shape(ours(schema)) == shape(kind.DESCRIPTOR), schema.name
+            names.add(schema.name)
+        parsed = kind.FromString(message.data)
+        same = message_factory.GetMessageClass(ours(schema)).FromString(message.data)
+        assert str(parsed) == str(same) and parsed.ByteSize() == same.ByteSize() > 0, channel.topic
+        assert parsed.timestamp.ToNanoseconds() == message.publish_time
+    assert names == {"foxglove.Log", "foxglove.PoseInFrame"}
