@@ -17,7 +17,7 @@ from heptarm.values.arrays import Array
 _MEMORY = 0.2
 #: Time constant with which the clock follows the earliest arrivals [s].
 _LOCK = 0.4
-#: Deviation at which the clock begins anew [s], and gaps between messages from which it takes its period then.
+#: Deviation at which the clock begins again [s], and gaps between messages from which it takes its period then.
 _LOST_LOCK, _GAPS = 0.06, 5
 #: Least speed of the stream by which lost points are found [rad/s].
 _MOVING = 0.01
@@ -33,7 +33,7 @@ class SendTimes:
         self._arrivals: deque[float] = deque(maxlen=_GAPS + 1)
 
     def forget(self) -> None:
-        """Begin anew: the next point belongs to another stream."""
+        """Begin again: the next point belongs to another stream."""
         self._newest = None
         self._late.clear()
         self._arrivals.clear()
