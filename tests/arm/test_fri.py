@@ -74,9 +74,18 @@ def fail(s, out, p):
         raise ZeroDivisionError("nothing to divide by")
 
 
+@pytest.fixture(scope="module")
+def pushed() -> Iterator[ha.Arm]:
+    """An arm that its operator may push: a simulator of its own."""
+    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
+        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=1.0)
+        yield arm
+
+
 @patient
 @pytest.mark.parametrize("margin", [0.0, 5.0])
-def test_a_collision_guard_watches_the_session_of_its_block(arm: ha.Arm, margin: float) -> None:
+def test_a_collision_guard_watches_the_session_of_its_block(pushed: ha.Arm, margin: float) -> None:
+    arm = pushed
     met: list[ha.Collision] = []
     guard = arm.collision_guard(10.0, margin=margin)
     try:
