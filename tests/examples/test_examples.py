@@ -19,6 +19,8 @@ REAL_TIME = (
     *("03_async_cancel.py", "06_servo.py", "07_fri.py", "10_recovery.py", "12_straight_servo.py"),
     *("13_hand_guiding.py", "18_teleoperation.py", "21_laws.py"),
 )
+#: These bring a simulator with what they touch.
+OWN_SIMULATOR = ("24_tool_shapes.py",)
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself
@@ -34,9 +36,11 @@ EXAMPLES = sorted(
 def test_example(example: Path, request: pytest.FixtureRequest) -> None:
     if example.name in REAL_TIME:
         target, before = "sim://iiwa14", PATIENT
+    elif example.name in OWN_SIMULATOR:
+        target, before = "", PATIENT_AND_FASTER
     else:
         target, before = request.getfixturevalue("cabinet").target, PATIENT_AND_FASTER
-    environment = os.environ | {"HEPTARM_TARGET": target}
+    environment = os.environ | ({"HEPTARM_TARGET": target} if target else {})
 
     def run() -> subprocess.CompletedProcess[str]:
         return subprocess.run(

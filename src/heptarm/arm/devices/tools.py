@@ -94,9 +94,10 @@ class Tooling:
         """Mass, centre of mass and inertia of what is attached, in the flange frame; None: nothing that is known."""
         attached = self.attached
         tool = None if attached is None else self.known.get(attached.tool)
-        if self._workpiece is None or attached is None or attached.workpiece != self._workpiece.name:
+        workpiece = None if attached is None else self._held(attached)
+        if attached is None or workpiece is None:
             return None if tool is None else tool.body
-        held = self._workpiece.body.placed(self.on_flange(attached.frame))
+        held = workpiece.body.placed(self.on_flange(attached.frame))
         return held if tool is None else tool.body.joined(held)
 
     def _carried(self) -> tuple[KnownTool | None, Workpiece | KnownTool | None, Pose]:
@@ -104,13 +105,15 @@ class Tooling:
         attached = self.attached
         if attached is None:
             return None, None, _ORIGIN
+        return self.known.get(attached.tool), self._held(attached), self.on_flange(attached.frame)
+
+    def _held(self, attached: Attachment) -> Workpiece | KnownTool | None:
+        """The attached workpiece as far as it is known: this client's, or the one that the cabinet reported."""
         event = self._connection.events.attached
         held: Workpiece | KnownTool | None = self._workpiece
         if held is None and event is not None and event.workpiece is not None:
             held = known_tool(event.workpiece)
-        if held is not None and attached.workpiece != held.name:
-            held = None
-        return self.known.get(attached.tool), held, self.on_flange(attached.frame)
+        return held if held is not None and held.name == attached.workpiece else None
 
     def loaded(self, model: _Model) -> _Model:
         """A model of collisions with the shapes of what is attached, if it has a place for them."""
@@ -198,8 +201,8 @@ class Tooling:
                 frames[name] = frames[f"{tool.name}{SEPARATOR}{name}"] = pose
         tip = frames.get(attached.frame, _ORIGIN)
         if attached.workpiece:
-            workpiece = self._workpiece
-            if workpiece is None or workpiece.name != attached.workpiece:
+            workpiece = self._held(attached)
+            if workpiece is None:
                 return None
             for name, pose in workpiece.frames:
                 frames.setdefault(name, tip @ pose)
