@@ -112,7 +112,7 @@ def test_a_disk_that_is_full_under_way_ends_the_recording_and_nothing_else(
         assert "free some space" in raised.value.hint
         rec.close()
     run = ha.load(tmp_path / "run.mcap")
-    assert not run.complete and 0 < len(run) <= rec.states
+    assert not run.complete and len(run) > 0
 
 
 def test_a_slow_disk_holds_up_no_state_and_what_is_lost_is_counted(

@@ -138,7 +138,7 @@ def _spatial(plant: Plant) -> Array:
     """Inertia of the last link about its centre of mass, its own axes."""
     import mujoco
 
-    index = plant.model.nbody - 1
+    index = int(plant.model.site("flange").bodyid[0])
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, plant.model.body_iquat[index])
     axes = turn.reshape(3, 3)

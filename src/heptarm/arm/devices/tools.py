@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -10,7 +11,7 @@ import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
-from heptarm.errors import ShapeError
+from heptarm.errors import ShapeError, Timeout
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import instance
 from heptarm.values.clearance import CarriesTools
@@ -28,6 +29,8 @@ from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
 
 _ORIGIN = Pose.of((0.0, 0.0, 0.0))
+#: Longest wait for a state of the robot with what has just been attached [s].
+_SHOWN = 1.0
 _Model = TypeVar("_Model")
 
 
@@ -156,11 +159,35 @@ class Tooling:
             main = (self.known[name].frame_names or (FLANGE,))[0]
         self._workpiece = None
         self._commanded = Attachment(name, "", main) if main else None
+        self._wait_until_shown(name, "")
 
     def detach(self) -> None:
         """Detach the tool and its workpiece; has no effect if nothing is attached."""
         self._connection.request(wire.AttachTool(name="", frame=""))
         self._commanded, self._workpiece = Attachment(), None
+        self._wait_until_shown("", "")
+
+    def _wait_until_shown(self, tool: str, workpiece: str) -> None:
+        """Wait until the newest state is of the robot with what is attached now: its pose is that of the motion frame.
+
+        A state without the tool in it, or a cabinet that reports none for a while, is no error.
+        """
+        newest = self._connection.newest()
+        if newest is None or newest.groups.mode is None or newest.groups.pose is None:
+            return
+        before, since = newest.groups.mode.stamp, list[int]()
+
+        def is_shown(state: State) -> bool:
+            mode, pose = state.groups.mode, state.groups.pose
+            if mode is None or pose is None or mode.stamp <= before:
+                return False
+            if (mode.tool, mode.workpiece) != (tool, workpiece):
+                return False
+            since.append(mode.stamp)
+            return pose.stamp > since[0]
+
+        with contextlib.suppress(Timeout):
+            self._connection.wait_for(is_shown, _SHOWN)
 
     def attach_workpiece(self, workpiece: Workpiece) -> None:
         """Attach a workpiece; see `Arm.attach_workpiece`."""
@@ -169,6 +196,8 @@ class Tooling:
         self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=True))
         self._workpiece = workpiece
         self._commanded = None if before is None else Attachment(before.tool, workpiece.name, before.frame)
+        if before is not None:
+            self._wait_until_shown(before.tool, workpiece.name)
 
     def detach_workpiece(self, workpiece: Workpiece) -> None:
         """Detach a workpiece; see `Arm.detach_workpiece`."""
@@ -177,6 +206,8 @@ class Tooling:
         self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=False))
         self._workpiece = None
         self._commanded = None if before is None else Attachment(before.tool, "", before.frame)
+        if before is not None:
+            self._wait_until_shown(before.tool, "")
 
     def restore(self, before: Attachment | None) -> None:
         """Attach an earlier tool again, or none."""
