@@ -35,11 +35,13 @@ def _mac(key: bytes, data: bytes) -> bytes:
     return hmac.new(key, data, hashlib.sha256).digest()
 
 
-def _sealed(spec: Spec, key: bytes, number: int, content: bytes, seq: int, request: int) -> bytes:
+def _sealed(
+    spec: Spec, key: bytes, number: int, content: bytes, seq: int, request: int, *, wraps: int = 0
+) -> bytes:
     p = spec.protocol
     header = struct.pack(">HBBHIIIq", p["magic"], p["major"], 1, number, len(content), seq, request, TIME)
     frame = header + content
-    return frame + _mac(key, struct.pack(">I", 0) + frame)[: p["tag"]]
+    return frame + _mac(key, struct.pack(">I", wraps) + frame)[: p["tag"]]
 
 
 def _datagram(
@@ -79,6 +81,7 @@ def vectors(spec: Spec) -> dict[str, Any]:
             "client_key": client_key,
             "cabinet_key": cabinet_key,
             "stop_frame": _sealed(spec, client_key, ids["Stop"], stop, 2, 1),
+            "stop_frame_after_wrap": _sealed(spec, client_key, ids["Stop"], stop, 2, 1, wraps=1),
             "accepted_frame": _sealed(spec, cabinet_key, ids["Accepted"], accepted, 2, 1),
             "token": TOKEN,
             "target_datagram": _datagram(spec, secret, _UP, ids["ServoJoints"], target, 3, 17),

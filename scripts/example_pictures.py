@@ -55,8 +55,11 @@ PLOTS = {
     "17": ("front", "force"),
     "18": ("front", "height"),
     "19": ("front", "speeds"),
+    "20": ("front", "speed"),
+    "21": ("joints", "speeds"),
     "22": ("front", "speed"),
     "23": ("front", "height"),
+    "24": ("height", "force"),
 }
 DEFAULT = ("joints", "height")
 #: Runs an example with the first connection recorded.
@@ -66,10 +69,9 @@ import heptarm as ha
 
 file, rate = sys.argv[1], float(sys.argv[2])
 del sys.argv[:3]
-connect, recorders = ha.connect, []
+connect, connect_all, recorders = ha.connect, ha.connect_all, []
 
-def connected(*arguments, **keywords):
-    arm = connect(*arguments, **keywords)
+def watched(arm):
     if not recorders:
         recorder = arm.record(file, rate=rate)
         recorder.__enter__()
@@ -79,9 +81,18 @@ def connected(*arguments, **keywords):
             recorder.__exit__(None, None, None)
             close()
         arm.close = closed
+
+def connected(*arguments, **keywords):
+    arm = connect(*arguments, **keywords)
+    watched(arm)
     return arm
 
-ha.connect = connected
+def connected_all(*arguments, **keywords):
+    arms = connect_all(*arguments, **keywords)
+    watched(next(iter(arms)))
+    return arms
+
+ha.connect, ha.connect_all = connected, connected_all
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
 

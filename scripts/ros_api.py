@@ -75,6 +75,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "robot": ("~/info",),
         "servo": (*SERVOS, "~/follow_joint_trajectory"),
         "set_override": ("~/set_override", "~/speed_scaling"),
+        "shapes": (WORDS + "the robot description of a planner such as MoveIt has the tool",),
         "software": ("~/info",),
         "speed": ("parameter `speed`", "~/set_speed"),
         "start": (*MOTIONS, *COMMANDS),
@@ -107,6 +108,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "wait": (CLIENT, "~/signals"),
     },
     "arm.pad": {
+        "ask": ("~/ask",),
         "on_key": ("~/keys",),
         "process_data": ("~/process_data",),
         "set_key": ("~/set_key",),
@@ -115,6 +117,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "wait_for_key": (CLIENT, "~/keys"),
     },
     "arm.operator": {
+        "answer": OPERATOR,
         "choose": OPERATOR,
         "clear": OPERATOR,
         "do": OPERATOR,
@@ -197,6 +200,9 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     "heptarm": {
         "arc": ("as CIRC or SPLINE, with points computed by the client", "~/run_program"),
         "circ": ("~/move_pose", "~/run_program"),
+        "circle_through": (
+            WORDS + "it needs no arm; a goal without a circle is refused with the same reason",
+        ),
         "connect": (LIFE, "parameters `target`, `key_file`, `watchdog`, `state_rate`, `datagrams`"),
         "connect_all": ("a node for each arm, in a namespace of its own",),
         "deg": ("ROS uses radians",),

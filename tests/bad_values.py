@@ -106,6 +106,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Limits": {"q_max": np.full(7, 1.0)},
     "Tool.frame": {"name": "tip"},
     "circ": {"via": OTHER},
+    "circle_through": {"via": OTHER, "end": POSE.shifted(0.1)},
     "SineImpedance.lissajous": {"plane": "xy"},
     "SineImpedance.spiral": {"plane": "xy"},
     "Arm.set_override": {"value": 1.0},
@@ -188,6 +189,7 @@ REPORTS = (
     *(
         "Arm",
         "Arms",
+        "Circle",
         "Clearance",
         "Collision",
         "CompiledLaw",

@@ -210,10 +210,16 @@ from .values.condition.trigger import (
     Trigger as Trigger,
 )
 from .values.motion.circle import (
+    Circle as Circle,
+)
+from .values.motion.circle import (
     arc as arc,
 )
 from .values.motion.circle import (
     circ as circ,
+)
+from .values.motion.circle import (
+    circle_through as circle_through,
 )
 from .values.motion.dynamics import (
     Dynamics as Dynamics,

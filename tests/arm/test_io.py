@@ -135,6 +135,72 @@ def test_keys_of_the_smartpad(arm: ha.Arm) -> None:
         arm.pad.show("x" * 600)
 
 
+def answered(arm: ha.Arm, button: int) -> None:
+    """Press a button as soon as a dialog is shown."""
+
+    def press(_: object) -> bool:
+        try:
+            arm.operator.answer(button)
+        except ha.CommandRejected:
+            return False
+        return True
+
+    arm.wait_until(press, timeout=20.0)
+
+
+def test_the_operator_answers_a_dialog(arm: ha.Arm) -> None:
+    for number, kind in enumerate(("question", "info", "warning", "error")):
+        person = threading.Thread(target=answered, args=(arm, number))
+        person.start()
+        labels = ("Yes", "No", "Perhaps", "Ask Jürgen")
+        assert arm.pad.ask("Is the part clamped?", *labels, kind=kind, timeout=20.0) == labels[number]  # type: ignore[arg-type]
+        person.join()
+    with pytest.raises(ha.CommandRejected, match="no open dialog"):
+        arm.operator.answer(0)
+
+
+def test_a_dialog_stays_until_somebody_answers_it(arm: ha.Arm) -> None:
+    with pytest.raises(ha.Timeout, match=r"nobody pressed a button within 0.3 s .*stays on the smartPAD"):
+        arm.pad.ask("Still there?", "Yes", timeout=0.3)
+    with pytest.raises(
+        ha.ModeConflict, match='still shows the dialog "Still there\\?"; press one of its buttons'
+    ):
+        arm.pad.ask("And now?", "Ok")
+    arm.move(ha.lin_rel(z=-0.01))  # the arm moves beneath it
+    with pytest.raises(ha.CommandRejected, match="no open dialog has a button 1"):
+        arm.operator.answer(1)
+    arm.operator.answer(0)
+    person = threading.Thread(target=answered, args=(arm, 0))
+    person.start()
+    arm.wait_until(lambda _: asked(arm), timeout=20.0)
+    person.join()
+
+
+def asked(arm: ha.Arm) -> bool:
+    try:
+        return arm.pad.ask("Again?", "Ok", timeout=20.0) == "Ok"
+    except ha.ModeConflict:  # the smartPAD closes the dialog before
+        return False
+
+
+@pytest.mark.parametrize(
+    ("text", "buttons", "words"),
+    [
+        ("", ("Ok",), "text must have 1 to 512 bytes, got 0"),
+        ("x" * 513, ("Ok",), "text must have 1 to 512 bytes, got 513"),
+        ("x", (), "buttons must be 1 to 12 different labels"),
+        ("x", ("Ok", "Ok"), "buttons must be 1 to 12 different labels"),
+        ("x", tuple(map(str, range(13))), "buttons must be 1 to 12 different labels"),
+        ("x", ("Ok", ""), r"buttons\[1\] must have 1 to 64 bytes, got 0"),
+    ],
+)
+def test_what_no_dialog_shows_is_refused(
+    arm: ha.Arm, text: str, buttons: tuple[str, ...], words: str
+) -> None:
+    with pytest.raises(ha.ShapeError, match=words):
+        arm.pad.ask(text, *buttons)
+
+
 def test_process_data_keep_their_types(arm: ha.Arm) -> None:
     assert arm.pad.process_data("cell.count") == "3"
     arm.pad.set_process_data("cell.count", 5)

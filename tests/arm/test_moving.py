@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import signal
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,6 +71,30 @@ def test_nan_keeps_the_set_point_of_a_joint(peer: Peer) -> None:
         )
         with pytest.raises(ha.CommandRejected, match=r"motions\[1\] keeps joints .* not known yet"):
             arm.move([ha.lin_rel(z=0.01), only_a7])
+
+
+def test_arcs_whose_start_is_known_are_checked_before_they_are_sent(peer: Peer) -> None:
+    sent: list[wire.Run] = []
+    for number in range(1, 3):
+        peer.runs(
+            number, wire.ItemReached(id=number, item=0), peer.finished(number, item=1), check=sent.append
+        )
+    with peer.arm() as arm:
+        here = arm.pose("flange")
+        end, behind = here.shifted(0.2), ha.ptp(arm.state.q)
+        beside, line = ha.circ(here.shifted(0.1, 0.01), end), ha.circ(here.shifted(0.1), end)
+        wave = ha.spline([here, line], moving="flange")
+        for motions, parameter in (
+            ([replace(line, moving="flange")], "via"),
+            ([ha.lin(here), line], r"motions\[1\].via"),
+            ([behind, ha.hold(0.1), wave], r"motions\[2\].segments\[1\].via"),
+        ):
+            with pytest.raises(ha.CommandRejected, match="start, via and end lie on a line") as refused:
+                arm.move(motions)
+            assert re.fullmatch(parameter, str(refused.value.parameter))
+        arm.move([ha.lin(here), beside])
+        arm.move([ha.lin_rel(z=0.1), line])  # nobody knows where it starts: the cabinet decides
+    assert len(sent) == 2
 
 
 def test_a_batch_is_one_program(peer: Peer) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model
+from heptarm.io.plan_box import PlanBox
 from heptarm.values.arrays import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
@@ -227,3 +228,21 @@ def test_as_text_and_as_a_figure(arm: ha.Arm, tmp_path: Path) -> None:
     figure = preview.plot()
     assert len(figure.axes) == 4
     figure.savefig(tmp_path / "plan.png", dpi=40)
+
+
+def test_it_is_shown_in_an_open_panel_or_in_the_browser(
+    arm: ha.Arm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    preview = arm.plan(PROGRAMS["blended"])
+    page = preview.show()
+    assert page is not None and "svg" in page.read_text() and opened == [page.as_uri()]
+    box = PlanBox(["iiwa14"])
+    box.take()
+    assert preview.show() is None and len(opened) == 1
+    found = box.take()
+    assert found is not None and found == preview.outline()
+    np.testing.assert_array_equal(found.path, preview.tcp[:, :3])
+    box.close()

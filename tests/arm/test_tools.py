@@ -237,6 +237,18 @@ def test_tools_and_places_of_the_project(tmp_path: Path) -> None:
             arm.move(lin_rel(x=-0.02, frame="/Table/Corner"))
             fresh(arm)
             assert arm.pose(reference="/Table/Corner").x - before.x == pytest.approx(-0.02, abs=2e-4)
+            corner = arm.frames["/Table/Corner"]
+            there = Pose.of(before.xyz + (0.01, 0.0, 0.02), before.quat)
+            arm.move([lin(before, frame="/Table/Corner"), ha.spline([there], frame="/Table/Corner")])
+            assert fresh(arm).pose.distance_to(corner @ there) < 2e-4
+            arm.move(ptp(before, frame="/Table/Corner", near=HOME))
+            assert fresh(arm).pose.angle_to(corner @ before) < 1e-3
+            for wrong in ("tool", "Tip", "/Table/Gone"):
+                with pytest.raises(
+                    CommandRejected, match=f"must be one of base, /Table/Corner, got '{wrong}'"
+                ):
+                    arm.move(lin(there, frame=wrong))
+            assert arm.plan(lin(there, frame="/Table/Corner")).end.distance_to(corner @ there) < 1e-6
             arm.move(hold(0.2), mode=CartesianImpedance(frame="/Table/Corner"))
             arm.move(hold(0.2), mode=CartesianImpedance(frame="Tip"))  # that of the motion frame
             with pytest.raises(CommandRejected, match="got flange"):

@@ -146,6 +146,15 @@ def test_a_wrong_proof_is_refused(keyed: FakeCabinet, case: str) -> None:
         assert peer.is_closed()
 
 
+def test_no_two_challenges_are_the_same(keyed: FakeCabinet) -> None:
+    """A proof that was overheard opens nothing later."""
+    nonces = set()
+    for _ in range(3):
+        with Peer(keyed.port, key=KEY) as peer:
+            nonces.add(peer.wait_for(wire.Challenge).nonce)
+    assert len(nonces) == 3
+
+
 def test_what_may_not_come_before_the_proof(keyed: FakeCabinet) -> None:
     hello = wire.Hello(major=wire.MAJOR, minor=0, name="x", version="0", nonce=NONCE)
     with Peer(keyed.port, hello=False) as peer:  # a proof before the hello

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -13,6 +14,7 @@ from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.cabinet.fake import FakeCabinet
 from tests.cabinet.peer import Peer, ptp, run
+from tests.values.test_circ import NO_CIRCLES
 
 NAN = math.nan
 Connect = Callable[..., Peer]
@@ -296,3 +298,23 @@ def test_home_is_a_motion_of_the_robot(peer: Peer) -> None:
     slow = wire.PtpHome(dynamics=wire.JointDynamics(velocity=(0.0,) * 7))
     refused = peer.ask(run(wire.Item(motion=slow)))
     assert (refused.code, refused.parameter) == (Code.OUT_OF_RANGE, "items[0].motion.dynamics.velocity[0]")
+
+
+@pytest.mark.parametrize("name", NO_CIRCLES)
+def test_the_cabinet_refuses_the_arcs_that_the_client_refuses(peer: Peer, name: str) -> None:
+    *points, parameter, words = NO_CIRCLES[name]
+    start, via, end = (wire.Pose(xyz=xyz, quat=(0.0, 0.0, 0.0, 1.0)) for xyz in points)  # type: ignore[arg-type]
+    line, arc = wire.Item(motion=wire.Lin(target=start)), wire.Item(motion=wire.Circ(via=via, end=end))
+    spline = wire.Spline(segments=(wire.SplSegment(target=start), wire.CircSegment(via=via, end=end)))
+    hold = wire.Item(motion=wire.Hold(duration=0.1))
+    for items, path in (
+        ((line, hold, arc), "items[2].motion."),
+        ((wire.Item(motion=spline),), "items[0].motion.segments[1]."),
+    ):
+        refused = peer.ask(run(*items))
+        assert isinstance(refused, wire.Rejected), refused
+        assert (refused.code, refused.parameter) == (Code.OUT_OF_RANGE, path + parameter)
+        assert re.search(words, refused.text) and refused.allowed, refused.text
+    other = replace(arc, frame="flange")  # another motion frame: the cabinet does not know where it starts
+    if name != "via and end":
+        assert peer.ask(run(line, other)).code == Code.UNSUPPORTED  # the fake robot knows no lines

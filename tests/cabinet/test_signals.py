@@ -121,3 +121,29 @@ def test_process_data_are_read_and_written(peer: Peer) -> None:
     for message, code in wrong:
         answer = peer.ask(message)
         assert isinstance(answer, wire.Rejected) and answer.code == code, message
+
+
+def test_dialogs_are_shown_one_at_a_time(peer: Peer) -> None:
+    def ask(text: str, *buttons: str) -> wire.AskOperator:
+        return wire.AskOperator(kind=wire.DialogKind.QUESTION, text=text, buttons=buttons)
+
+    def closed(number: int) -> wire.DialogClosed:
+        return peer.wait_for(wire.DialogClosed, lambda event: event.dialog == number)
+
+    first = peer.ask(ask("clamped?", "Yes", "No"))
+    assert (closed(first.id).button, closed(first.id).text) == (1, "")
+    broken = peer.ask(ask("broken", "Ok"))
+    assert closed(broken.id).button == -1 and "unplugged" in closed(broken.id).text
+    stays = peer.ask(ask("stay", "Ok"))
+    busy = peer.ask(ask("next", "Ok"))
+    assert (busy.code, stays.id) == (
+        Code.BUSY,
+        broken.id + 1,
+    ) and '"stay"; press one of its buttons' in busy.text
+    assert isinstance(peer.ask(wire.SetOverride(value=1.0)), wire.Accepted)  # everything else goes on
+    for wrong in (("",), ("x" * 65,), ("Yes", "Yes")):
+        refused = peer.ask(ask("labels", *wrong))
+        assert refused.code in (Code.BAD_LENGTH, Code.OUT_OF_RANGE)
+        assert refused.parameter == f"buttons[{len(wrong) - 1}]"
+    peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="answer"))
+    assert closed(stays.id).button == 0

@@ -64,6 +64,17 @@ def fitted(peer: Peer) -> tuple[str, str, str]:
     return state.mode.tool, state.mode.workpiece, state.mode.frame
 
 
+FAR = wire.Pose(xyz=(2.1, 0.0, 0.0), quat=(0.0, 0.0, 0.0, 1.0))
+
+
+def shape(
+    kind: wire.ShapeKind = wire.ShapeKind.BOX,
+    size: tuple[float, float, float] = (0.1, 0.1, 0.1),
+    pose: wire.Pose = HERE,
+) -> wire.Shape:
+    return wire.Shape(kind=kind, size=size, pose=pose)
+
+
 #: Invalid fields of tools: what the client refuses in tests/values/test_tool.py, with the same codes.
 BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"name": ""}, Code.BAD_LENGTH, "name"),
@@ -76,6 +87,13 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"com": (0.0, NAN, 0.0)}, Code.NOT_FINITE, "com[1]"),
     ({"com": (0.0, 0.0, 2.1)}, Code.OUT_OF_RANGE, "com[2]"),
     ({"inertia": (NAN, *BALL[1:])}, Code.NOT_FINITE, "inertia[0]"),
+    ({"shapes": (shape(size=(0.1, 0.0, 0.1)),)}, Code.OUT_OF_RANGE, "shapes[0].size[1]"),
+    ({"shapes": (shape(), shape(size=(0.1, 0.1, 4.1)))}, Code.OUT_OF_RANGE, "shapes[1].size[2]"),
+    ({"shapes": (shape(size=(0.1, NAN, 0.1)),)}, Code.NOT_FINITE, "shapes[0].size[1]"),
+    ({"shapes": (shape(wire.ShapeKind.SPHERE),)}, Code.OUT_OF_RANGE, "shapes[0].size[1]"),
+    ({"shapes": (shape(wire.ShapeKind.CAPSULE),)}, Code.OUT_OF_RANGE, "shapes[0].size[2]"),
+    ({"shapes": (shape(pose=FAR),)}, Code.OUT_OF_RANGE, "shapes[0].pose.xyz[0]"),
+    ({"shapes": (shape(),) * 17}, Code.BAD_LENGTH, "shapes"),
     ({"inertia": (-1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
     ({"inertia": (1e-3, 1e-3, 3e-3, 0.0, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
     ({"inertia": (1e-3, 1e-3, 1e-3, 2e-3, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
@@ -123,6 +141,27 @@ def test_tools_come_and_go_and_the_state_reports_it(peer: Peer) -> None:
     assert fitted(peer) == ("gripper", "", "tip")
     peer.ask(wire.AttachTool(name="", frame=""))
     assert fitted(peer) == ("", "", "flange")
+
+
+def test_every_client_receives_what_is_attached(cabinet: FakeCabinet, peer: Peer) -> None:
+    pen = replace(GRIPPER, name="pen", shapes=(shape(), shape(wire.ShapeKind.SPHERE, (0.1, 0.0, 0.0))))
+    with Peer(cabinet.port) as other:
+        seen: list[tuple[wire.ToolInfo | None, wire.ToolInfo | None]] = []
+
+        def changed(since: int) -> int:
+            event = other.wait(lambda _, message: isinstance(message, wire.ToolChanged), since=since)
+            seen.append((event.tool, event.workpiece))
+            return len(other.seen)
+
+        at = len(other.seen)
+        peer.ask(wire.DefineTool(tool=pen))
+        peer.ask(wire.AttachTool(name="pen", frame=""))
+        at = changed(at)
+        peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
+        at = changed(at)
+        peer.ask(wire.AttachTool(name="", frame=""))
+        changed(at)
+    assert seen == [(pen, None), (pen, EMPTY), (None, None)]
 
 
 def test_templates_of_the_project_are_tools_too(cabinet: FakeCabinet, peer: Peer) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heptarm.io.plan_box import PlanBox
 from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import objects, run, sim
 from tests.retry import retry, starved
@@ -133,7 +134,12 @@ def test_dry_run_moves_nothing(target: str) -> None:
     assert after["q"] == pytest.approx(before["q"], abs=1e-6)
 
 
-def test_plan_reports_limits_and_collisions_and_moves_nothing(target: str, tmp_path: Path) -> None:
+def test_plan_reports_limits_and_collisions_and_moves_nothing(
+    target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    panel = PlanBox(["iiwa14"])
+    panel.take()
     (before,) = objects("state", "--target", target)
     words = ("plan", "ptp", "0", "90", "0", "-30", "0", "60", "0", "--deg", "--speed", "0.5")
     (ahead,) = objects(*words, "--out", str(tmp_path / "plan.svg"), "--target", target)
@@ -142,8 +148,10 @@ def test_plan_reports_limits_and_collisions_and_moves_nothing(target: str, tmp_p
     assert ahead["checked"] is False and ahead["end_q"] == pytest.approx(
         np.radians([0, 90, 0, -30, 0, 60, 0])
     )
-    done = run(*words, "--box", "0.6,0,0.1,0.6,0.8,0.2", "--target", target)
+    done = run(*words, "--box", "0.6,0,0.1,0.6,0.8,0.2", "--show", "--target", target)
     assert done.returncode == 1 and re.search(r"collisions .*link_\d .*box 0 after", done.stdout)
+    ghost = panel.take()
+    assert ghost is not None and len(ghost.touches) == 1 and ghost.q[-1] == pytest.approx(ahead["end_q"])
     refused = run("plan", "lin-rel", "--x", "3", "--target", target)
     assert refused.returncode == 1 and "Can not plan motion" in refused.stderr
     (after,) = objects("state", "--target", target)
@@ -159,6 +167,8 @@ def test_plan_reports_limits_and_collisions_and_moves_nothing(target: str, tmp_p
         ),
         (("move", "ptp", "0", "inf", "0", "-1", "0", "1", "0"), ("inf",)),
         (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
+        (("move", "lin", *"000000", "--frame", "/Table"), ("one of base, got '/Table'", "heptarm.frames")),
+        (("plan", "lin", *"000000", "--frame", "/Table"), ("one of base, got '/Table'",)),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
 )

@@ -143,6 +143,8 @@ def test_every_command_uses_the_key(
         monkeypatch.setattr("heptarm.cli.rl._load", lambda *_: None)
     if name == "stop":  # stops before it connects, without a key
         monkeypatch.setattr("heptarm.cli.stop.halt", lambda *_, **__: None)
+    if name == "live":  # its extra is not installed here
+        monkeypatch.setattr("heptarm.cli.live.require", lambda *_, **__: None)
     if name == "replay":
         ha.Trajectory.of([0.0, 1.0], [[0.0] * 7, [0.1] * 7]).save(tmp_path / "recorded.npz")
     used: list[str | None] = []

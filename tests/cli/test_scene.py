@@ -28,6 +28,10 @@ class Drawing:
     color: tuple[int, ...] = ()
     position: Any = None
     wxyz: Any = None
+    is_removed: bool = False
+
+    def remove(self) -> None:
+        self.is_removed = True
 
 
 @dataclass
@@ -45,9 +49,9 @@ class Canvas:
     def add_frame(self, name: str, **_: object) -> Drawing:
         return Drawing()
 
-    def add_mesh_simple(self, name: str, vertices: Any, faces: Any, *, color: tuple[int, ...]) -> Drawing:
+    def add_mesh_simple(self, name: str, vertices: Any, faces: Any, **given: Any) -> Drawing:
         assert faces.max() < len(vertices)
-        self.shapes[name] = Drawing(vertices, color)
+        self.shapes[name] = Drawing(vertices, **given)
         return self.shapes[name]
 
 
@@ -76,6 +80,34 @@ def test_every_shape_of_arm_and_scene_is_drawn_and_moves_with_its_body(tmp_path:
     assert cube.position == pytest.approx((0.55, 0.0, 0.5), abs=1e-3)
     pad = canvas.shapes[f"/world/{model.geom('scene/left_pad').id}"]
     assert abs(float(pad.position[1])) > 0.04  # the simulator's gripper is open
+
+
+def test_shapes_of_the_attached_tool_are_drawn_on_the_flange_until_it_is_off() -> None:
+    from heptarm.panel.drawing import DrawnWorld
+
+    at = ha.Pose.xyz_abc(0.0, 0.02, 0.1, 0.0, 0.0, 0.5)
+    kinds = (
+        ha.shapes.box(0.1, 0.2, 0.3, at=at),
+        ha.shapes.cylinder(0.05, 0.2),
+        ha.shapes.sphere(0.05),
+        ha.shapes.capsule(0.05, 0.2),
+    )
+    canvas = Canvas()
+    world, shapes = DrawnWorld(canvas, "iiwa14", root="/arm1"), tuple((one, one.pose) for one in kinds)
+    world.carry(shapes)
+    drawn = [canvas.shapes[f"/arm1/flange/carried/{number}"] for number in range(4)]
+    sizes = [np.ptp(one.vertices, axis=0).tolist() for one in drawn]
+    expected = [(0.1, 0.2, 0.3), (0.1, 0.1, 0.2), (0.1, 0.1, 0.1), (0.1, 0.1, 0.3)]
+    assert np.allclose(sizes, expected, atol=2e-3)
+    assert drawn[0].position == pytest.approx(at.xyz)
+    assert np.roll(drawn[0].wxyz, -1) == pytest.approx(at.quat)
+    world.carry(shapes)
+    assert not any(one.is_removed for one in drawn)  # nothing has changed
+    world.carry(())
+    assert all(one.is_removed for one in drawn)
+    gripper = Canvas()
+    DrawnWorld(gripper, "iiwa14", Scene.of("table")).carry(shapes)
+    assert not any("carried" in name for name in gripper.shapes)  # the scene has its own tool on the flange
 
 
 def test_shapes_of_every_kind_are_drawn(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ It answers every line on standard output.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -79,6 +80,9 @@ def _listen() -> None:
             _cabinets[0].plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
         elif word == "release":
             _cabinets[0].plant.safety.withdraw()
+        elif word.startswith("answer"):
+            with contextlib.suppress(ValueError):  # no dialog is shown yet
+                _cabinets[0].operator.do(word)
         else:
             _cabinets[0].operator.do(word)
         print(word, flush=True)

@@ -281,6 +281,31 @@ def case_somebody_taps_the_arm(probe: Probe, stage: Stage) -> None:
     refused(act(probe, "wait_for_taps", "WaitForTaps", force=9999.0), "force")
 
 
+def case_the_operator_is_asked(probe: Probe, stage: Stage) -> None:
+    def answered(sent: Sent, button: int) -> Any:
+        over = Event()
+
+        def press() -> None:
+            while not over.wait(0.05):
+                stage.do(f"answer {button}")
+
+        hand = Thread(target=press)
+        hand.start()
+        try:
+            return sent.end()
+        finally:
+            over.set()
+            hand.join()
+
+    end = done(answered(probe.send("ask", "Ask", text="Is the part clamped?", buttons=["Yes", "No"]), 1))
+    assert (end.message, end.button) == ("No", 1)
+    refused(act(probe, "ask", "Ask", text="Go on?", buttons=["Yes"], timeout=0.3), "nobody pressed")
+    refused(act(probe, "ask", "Ask", text="and", buttons=["Ok"]), "Go on?")  # it stays
+    stage.do("answer 0")
+    refused(act(probe, "ask", "Ask", text="x", buttons=["Ok"], kind="loud"), "kind")
+    refused(act(probe, "ask", "Ask", text="x", buttons=[]), "buttons")
+
+
 # --------------------------------------------------------------------------------------------- gripper
 
 

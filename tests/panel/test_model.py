@@ -24,7 +24,9 @@ PATIENCE = 30.0
 
 @pytest.fixture(scope="module")
 def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PanelArm]:
-    options = PanelOptions(recordings=tmp_path_factory.mktemp("recordings"))
+    options = PanelOptions(
+        recordings=tmp_path_factory.mktemp("recordings"), gripper="open=MediaFlange.OutputX3Pin1"
+    )
     with ha.connect("sim://iiwa14?speed=2", control=False, watchdog=5.0, timeout=PATIENCE) as arm:
         model = model_of(arm, "sim://iiwa14?speed=2", options)
         yield model
@@ -337,6 +339,60 @@ def test_points_of_another_tool_are_refused(model: PanelArm) -> None:
             model.run("bare")
 
 
+# ------------------------------------------------------------------------------- plans and the gripper
+
+
+def test_the_motion_to_the_points_is_planned_and_shown(model: PanelArm, observer: ha.Arm) -> None:
+    with pytest.raises(CommandRejected, match="list of points is empty"):
+        model.preview()
+    model.teach("here")
+    model.arm.move(ha.ptp(HOME + 0.1))
+    before = observer.state.q
+    model.preview(speed=0.5)
+    plan = model.plan
+    assert plan is not None and plan.q[-1] == pytest.approx(HOME, abs=2e-3) and plan.robot == "iiwa14"
+    assert 0.0 <= model.plan_time <= plan.t[-1]
+    message = model.poll().message
+    assert message is not None and message.what.startswith("Planned: ")
+    assert observer.state.q == pytest.approx(before, abs=2e-3), "nothing moves"
+    model.hide_plan()
+    assert model.plan is None and model.plan_time == 0.0
+
+
+def test_the_gripper_opens_and_closes(model: PanelArm, observer: ha.Arm) -> None:
+    def said(words: str) -> None:
+        until(lambda: (m := model.poll().message) is not None and m.what == words)
+
+    is_open, is_closed = "InputX3Pin3", "InputX3Pin4"
+    model.arm.operator.set_signal(is_open, True)
+    model.open_gripper()
+    said("The gripper is open")
+    assert observer.io["OutputX3Pin1"]
+    model.close_gripper()
+    with pytest.raises(ModeConflict, match="gripper moves"):
+        model.open_gripper()
+    observer.io.wait("OutputX3Pin2", timeout=PATIENCE)
+    model.arm.operator.set_signal(is_open, False)
+    model.arm.operator.set_signal(is_closed, True)
+    said("The gripper is closed on nothing")
+    model.gripper, gripper = None, model.gripper
+    with pytest.raises(CommandRejected, match="knows no gripper"):
+        model.close_gripper()
+    model.gripper = gripper
+
+
+def test_a_gripper_is_that_of_the_options_or_of_the_scene(model: PanelArm) -> None:
+    target = address(model)
+    bins = model_of(model.arm, target, PanelOptions(scene="bins"))
+    assert bins.gripper is not None
+    assert model_of(model.arm, target, PanelOptions(scene="bins", read_only=True)).gripper is None
+    assert model_of(model.arm, target, PanelOptions()).gripper is None
+    with pytest.raises(CommandRejected, match="signals of a gripper must be"):
+        model_of(model.arm, target, PanelOptions(gripper="fingers=DO1"))
+    with pytest.raises(CommandRejected, match="Nothing"):
+        model_of(model.arm, target, PanelOptions(gripper="open=Nothing.Here"))
+
+
 # --------------------------------------------------------------------------------- the other actions
 
 
@@ -387,6 +443,7 @@ def test_a_panel_that_only_shows_refuses_all_but_stop(model: PanelArm) -> None:
         lambda: shows.set_override(0.5),
         lambda: shows.set_output("LEDBlue", True),
         lambda: shows.attach_tool(""),
+        shows.open_gripper,
         lambda: shows.operate("emergency_stop"),
         lambda: shows.jog(JointJog(np.zeros(7))),
     )

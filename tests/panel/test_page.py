@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.panel.model import PanelArm
+from heptarm.panel.process import Panel, PanelOptions, model_of
 from tests.cli.running import sim
 
 pytest.importorskip("viser")
@@ -59,6 +64,9 @@ class Page:
 
     def press(self, label: str) -> None:
         self.button(label).click()
+
+    def check(self, label: str) -> None:
+        self.browser.find_element("xpath", f"//label[normalize-space()={label!r}]").click()
 
     def tab(self, label: str) -> None:
         self.browser.find_element("xpath", f"//*[normalize-space(text())={label!r}]").click()
@@ -158,3 +166,97 @@ def test_a_panel_that_only_shows_has_a_stop_and_nothing_else(
             page.press("STOP")
             with pytest.raises(ha.MotionAborted):
                 handle.wait(timeout=PATIENCE)
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Panel, PanelArm]]:
+    """A panel in this process, of a private simulator."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    with ha.connect("sim://iiwa14?scene=bins", control=False, watchdog=5.0, timeout=PATIENCE) as arm:
+        options = PanelOptions(port=0, scene="bins")
+        model = model_of(arm, "sim://iiwa14?scene=bins", options)
+        panel = Panel([model], options)
+        thread = threading.Thread(target=panel.run, daemon=True)
+        thread.start()
+        yield panel, model
+        panel.close()
+        thread.join(PATIENCE)
+
+
+class Scene:
+    """Where things of the scene are on the page, by the camera that viser reports."""
+
+    def __init__(self, page: Page, panel: Panel) -> None:
+        self._canvas = page.browser.find_element("tag name", "canvas")
+        self._page, self._panel = page, panel
+
+    def pixel(self, point: np.ndarray) -> tuple[int, int]:
+        """Place of a point of the world relative to the middle of the canvas [pixels]."""
+        (client,) = self._panel.server.get_clients().values()
+        camera = client.camera
+        w, x, y, z = camera.wxyz
+        right, down, forward = ha.Pose.of((0, 0, 0), (x, y, z, w)).rotation.T
+        to = np.asarray(point) - camera.position
+        scale = 0.5 * self._canvas.size["height"] / np.tan(camera.fov / 2) / (to @ forward)
+        return round(to @ right * scale), round(to @ down * scale)
+
+    def drag(self, begin: np.ndarray, end: np.ndarray) -> None:
+        """Drag with the mouse from a point of the world to another one."""
+        (x, y), (u, v) = self.pixel(begin), self.pixel(end)
+        chain = webdriver.ActionChains(self._page.browser)
+        chain.move_to_element_with_offset(self._canvas, x, y).pause(0.5).click_and_hold().pause(0.3)
+        for _ in range(5):
+            chain.move_by_offset(round((u - x) / 5), round((v - y) / 5)).pause(0.1)
+        chain.release().perform()
+
+
+def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelArm], tmp_path: Path) -> None:
+    panel, model = own
+    page = Page(browser, panel.url)
+    arm = model.arm
+    page.press("Take control")
+    until(lambda: arm.in_control, "nobody took control")
+    arm.move(ha.ptp(ha.deg(0, 25, 0, -90, 0, 65, 0)))
+
+    # the handle: it appears at the TCP, is dragged by an arrow, and the arm goes there while the button is held
+    page.check("Handle to drag the TCP")
+    start = arm.wait_for_rest(timeout=PATIENCE).pose
+    scene = Scene(page, panel)
+    arrow = start.rotation[:, 0] * 0.15
+    until(lambda: scene.drag(start.xyz + arrow, start.xyz + 1.6 * arrow) or model.goal, "the handle stays")
+    goal = model.goal
+    assert goal is not None
+    moved = start.rotation.T @ (goal.xyz - start.xyz)
+    assert moved[0] > 0.01 and abs(moved[1:]).max() < 1e-6, "along the dragged axis only"
+    with page.held("Hold: go to the handle"):
+        arm.wait_until(lambda state: state.pose.distance_to(goal) < 2e-3, timeout=PATIENCE)
+    assert arm.wait_for_rest(timeout=PATIENCE).pose.distance_to(goal) < 5e-3
+
+    # points: taught, planned, shown by a ghost, saved to a file and loaded from it
+    page.tab("Program")
+    page.press("Teach here")
+    until(lambda: model.points.names == ("P1",), "no point was taught")
+    page.press("Preview")
+    page.shows("nothing moves")
+    page.press("Hide plan")
+    until(lambda: model.plan is None, "the plan is still shown")
+    browser.execute_cdp_cmd(
+        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)}
+    )
+    page.press("Save")
+    file = tmp_path / "points.json"
+    until(lambda: file.exists() and file.read_text(), "nothing was saved")
+    model.points.rename("P1", "other")
+    browser.find_element("css selector", "input[type=file]").send_keys(str(file))
+    until(lambda: model.points.names == ("P1",), "nothing was loaded")
+
+    # a program's plan, through the user's folder of open panels
+    plan = arm.plan(ha.lin_rel(z=-0.05, frame="base"))
+    until(lambda: plan.show() is None, "the panel takes no plans")
+    until(lambda: model.plan is not None and len(model.plan.t) == len(plan.t), "the plan never came")
+
+    # the gripper of the scene
+    page.press("Close gripper")
+    page.shows("The gripper is closed on nothing")
+    page.press("Open gripper")
+    page.shows("The gripper is open")

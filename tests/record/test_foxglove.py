@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import importlib
 import json
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
 
+import heptarm as ha
+from heptarm.model.kinematics import forward
 from heptarm.record.mcap_file import RecordingFile
+from heptarm.values.robot import robot
+from heptarm.wire import messages as wire
 from tests.record.bodies import EPOCH, body, fri_words, samples, to_ours
 from tests.record.test_file import FACTS, written
 
@@ -66,7 +72,7 @@ def shape(message: Any) -> dict[str, Any]:
 
 def test_every_channel_has_a_schema_in_an_encoding_that_foxglove_reads(recorded: list[Any]) -> None:
     topics = {channel.topic for _, channel, _ in recorded}
-    assert topics >= {"/state", "/fri", "/tcp", "/log", "/journal", "/signals"}
+    assert topics >= {"/state", "/fri", "/tcp", "/tf", "/log", "/journal", "/signals"}
     for schema, channel, message in recorded:
         assert (schema.encoding, channel.message_encoding) in ENCODINGS, channel.topic
         if schema.encoding == "protobuf":
@@ -90,5 +96,26 @@ def test_foxgloves_messages_are_those_that_it_publishes(recorded: list[Any]) -> 
         parsed = kind.FromString(message.data)
         same = message_factory.GetMessageClass(ours(schema)).FromString(message.data)
         assert str(parsed) == str(same) and parsed.ByteSize() == same.ByteSize() > 0, channel.topic
-        assert parsed.timestamp.ToNanoseconds() == message.publish_time
-    assert names == {"foxglove.Log", "foxglove.PoseInFrame"}
+        stamped = parsed.transforms if schema.name == "foxglove.FrameTransforms" else [parsed]
+        assert all(one.timestamp.ToNanoseconds() == message.publish_time for one in stamped)
+    assert names == {"foxglove.Log", "foxglove.PoseInFrame", "foxglove.FrameTransforms"}
+
+
+def test_the_frames_are_a_chain_from_the_base_to_the_flange(tmp_path: Path) -> None:
+    file = RecordingFile(tmp_path / "left.mcap", FACTS, epoch=EPOCH, chunk=50_000, arm="left")
+    file.states(samples(1), to_ours=to_ours)
+    file.finish({})
+    with (tmp_path / "left.mcap").open("rb") as stream:
+        found = {channel.topic: message.data for _, channel, message in make_reader(stream).iter_messages()}
+    transforms = published("foxglove.FrameTransforms").FromString(found["/left/tf"]).transforms
+    assert published("foxglove.PoseInFrame").FromString(found["/left/tcp"]).frame_id == "left_base"
+    frame, pose = "left_base", ha.Pose.of((0, 0, 0), (0, 0, 0, 1))
+    for one in transforms:
+        assert one.parent_frame_id == frame
+        frame, (place, turn) = one.child_frame_id, (one.translation, one.rotation)
+        pose = pose @ ha.Pose.of((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
+    state = wire.State.decode(body(0))
+    assert state.joints is not None and frame == "left_flange"
+    np.testing.assert_allclose(pose.matrix, forward(robot("iiwa14"), state.joints.q), atol=1e-9)
+    names = [one.child_frame_id for one in transforms]
+    assert names == [*(f"left_link_{index}" for index in range(8)), "left_flange"], "as in the URDF"

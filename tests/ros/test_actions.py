@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.ros.interface.action import MAX_GOALS, ActionDispatcher, ActionResult, GoalWork, RosAction
-from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.actions import ACTIONS, ask
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.trajectory.goal import GoalOutcome
 
@@ -53,4 +54,30 @@ def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> No
 
 
 def test_names_of_actions_are_unique() -> None:
-    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 10
+    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 11
+
+
+def test_the_operator_answers_a_goal_unless_it_is_cancelled() -> None:
+    asked: list[tuple[str, ...]] = []
+    answered = threading.Event()
+
+    def pad_ask(text: str, *buttons: str, kind: str, timeout: float) -> str:
+        asked.append((text, *buttons, kind))
+        if text == "broken":
+            raise CommandRejected("this cabinet has no dialogs")
+        assert timeout == 600.0 and (text != "slow" or answered.wait(20.0))
+        return buttons[-1]
+
+    def goal(text: str) -> Any:
+        return SimpleNamespace(text=text, buttons=["Yes", "No"], kind="", timeout=0.0)
+
+    context: Any = SimpleNamespace(arm=SimpleNamespace(pad=SimpleNamespace(ask=pad_ask)))
+    end = ask(context, goal("ready?"))(CLIENT)
+    assert (end.outcome, end.text, end.fields) == (GoalOutcome.SUCCEEDED, "No", {"button": 1})
+    end = ask(context, goal("broken"))(CLIENT)
+    assert (end.outcome, end.fields) == (GoalOutcome.ABORTED, {"button": -1}) and "no dialogs" in end.text
+    leaving: Any = SimpleNamespace(is_cancel_requested=lambda: True)
+    end = ask(context, goal("slow"))(leaving)
+    assert end.outcome is GoalOutcome.CANCELED and "stays on the smartPAD" in end.text
+    answered.set()
+    assert asked[0] == ("ready?", "Yes", "No", "question")

@@ -32,11 +32,14 @@ EMPTY: dict[str, Any] = {
 }
 
 
+CORNER = ha.Pose.xyz_abc(0.1, 0.2, 0.3, *ha.deg(90, 0, 0))
+
+
 class FakeDriver:
     """A driver of an arm at rest."""
 
     configuration = NodeConfiguration.of({})
-    arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE))
+    arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE), frames={"/Table/Corner": CORNER})
 
 
 def pose(x: float, y: float, z: float, turn: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)) -> SimpleNamespace:
@@ -87,6 +90,9 @@ TARGET, VIA = ha.Pose.at(0.5, 0.1, 0.4), ha.Pose.at(0.5, 0.0, 0.5)
             ha.lin(TARGET, joint_speed=[0.1] * 7, blend_m=0.01, blend_rad=0.1),
         ),
         (message(2, pose=stamped("link_0"), jerk_mps3=2.0), ha.circ(VIA, TARGET, jerk_mps3=2.0)),
+        (message(1, pose=stamped("/Table/Corner")), ha.lin(TARGET, frame=CORNER)),
+        (message(2, pose=stamped("Table/Corner")), ha.circ(VIA, TARGET, frame=CORNER)),
+        (message(0, pose=stamped("Table/Corner")), ha.ptp(TARGET, frame=CORNER)),
         (message(3, pose=stamped("base", 0.0, 0.0, 0.1)), ha.lin_rel(z=0.1, frame="base")),
         (message(3, pose=stamped("", 0.0, 0.0, 0.1, (0, 0, 0, 0))), ha.lin_rel(z=0.1)),
         (

@@ -25,14 +25,28 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 import heptarm as ha
 from tests.conformance.case import long, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
-from tests.conformance.stress import THREADS, preempted_often, refused_in_flight, status
+from tests.conformance.stress import GROWTH, GROWTH_EACH, THREADS, preempted_often, refused_in_flight, status
+from tests.long import LONG
 from tests.ros1.peer import Client, NodeProcess, collect, stamp, until
 
 
-def test_fifty_preemptions_one_after_the_other(client: Client, node: NodeProcess) -> None:
-    threads = status(node.process.pid, "Threads")
-    preempted_often(client)
-    assert status(node.process.pid, "Threads") <= threads + THREADS
+@pytest.mark.parametrize(
+    ("count", "seconds"),
+    [(50, 2.5), pytest.param(3000, 300.0, marks=[pytest.mark.long, pytest.mark.timeout(900)])],
+)
+def test_preemptions_one_after_the_other(
+    client: Client, node: NodeProcess, count: int, seconds: float
+) -> None:
+    """Fifty in a moment; with LONG=1 ten in each second for five minutes."""
+    pid = node.process.pid
+    threads = status(pid, "Threads")
+    if LONG:
+        preempted_often(client)  # every code path has its memory then
+    before = status(pid, "VmRSS")
+    preempted_often(client, count=count, seconds=seconds)
+    assert status(pid, "Threads") <= threads + THREADS
+    grown = 1024 * (status(pid, "VmRSS") - before)
+    assert not LONG or grown < GROWTH + GROWTH_EACH * count, f"the memory has grown by {grown / 1e6:.1f} MB"
 
 
 @pytest.mark.parametrize(
@@ -185,13 +199,14 @@ def simulated(ros: None, spare: Stage) -> Iterator[list[float]]:
         assert code == 0, node.said
 
 
-def test_jumps_of_the_clock(simulated: list[float]) -> None:
+@pytest.mark.parametrize("rounds", [1, pytest.param(40, marks=[pytest.mark.long, pytest.mark.timeout(1800)])])
+def test_jumps_of_the_clock(simulated: list[float], rounds: int) -> None:
     states = collect("/jump/joint_states", JointState)
     client = actionlib.ActionClient("/jump/heptarm/follow_joint_trajectory", FollowJointTrajectoryAction)
     assert client.wait_for_server(rospy.Duration(60))
     near = lambda: bool(states) and abs(stamp(states[-1]) - simulated[0]) < 2.0  # noqa: E731
     until(near, "states do not have the simulated time")
-    for jump in (3600.0, -4000.0, 0.0):
+    for jump in (3600.0, -4000.0, 0.0) * rounds:
         goal = FollowJointTrajectoryGoal()
         goal.trajectory.joint_names = list(states[-1].name)
         there = list(states[-1].position)

@@ -17,16 +17,30 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 import heptarm as ha
 from tests.conformance.case import long, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
-from tests.conformance.stress import THREADS, preempted_often, refused_in_flight, status
+from tests.conformance.stress import GROWTH, GROWTH_EACH, THREADS, preempted_often, refused_in_flight, status
+from tests.long import LONG
 from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, to_duration, to_time, until
 
 Start = Callable[..., NodeProcess]
 
 
-def test_fifty_preemptions_one_after_the_other(client: Client, node: NodeProcess) -> None:
-    threads = status(node.process.pid, "Threads")
-    preempted_often(client)
-    assert status(node.process.pid, "Threads") <= threads + THREADS
+@pytest.mark.parametrize(
+    ("count", "seconds"),
+    [(50, 2.5), pytest.param(3000, 300.0, marks=[pytest.mark.long, pytest.mark.timeout(900)])],
+)
+def test_preemptions_one_after_the_other(
+    client: Client, node: NodeProcess, count: int, seconds: float
+) -> None:
+    """Fifty in a moment; with LONG=1 ten in each second for five minutes."""
+    pid = node.process.pid
+    threads = status(pid, "Threads")
+    if LONG:
+        preempted_often(client)  # every code path has its memory then
+    before = status(pid, "VmRSS")
+    preempted_often(client, count=count, seconds=seconds)
+    assert status(pid, "Threads") <= threads + THREADS
+    grown = 1024 * (status(pid, "VmRSS") - before)
+    assert not LONG or grown < GROWTH + GROWTH_EACH * count, f"the memory has grown by {grown / 1e6:.1f} MB"
 
 
 @pytest.mark.parametrize(
@@ -111,13 +125,16 @@ def simulated(ros: Ros) -> Iterator[list[float]]:
     ros.node.destroy_publisher(publisher)
 
 
-def test_jumps_of_the_clock(ros: Ros, spare: Stage, nodes: Start, simulated: list[float]) -> None:
+@pytest.mark.parametrize("rounds", [1, pytest.param(40, marks=[pytest.mark.long, pytest.mark.timeout(1800)])])
+def test_jumps_of_the_clock(
+    ros: Ros, spare: Stage, nodes: Start, simulated: list[float], rounds: int
+) -> None:
     nodes(spare.target, space="/jump", use_sim_time=True)
     states = ros.collect(JointState, "/jump/joint_states")
     action = ros.act(FollowJointTrajectory, "/jump/heptarm/follow_joint_trajectory")
     near = lambda: bool(states) and abs(stamp(states[-1]) - simulated[0]) < 2.0  # noqa: E731
     until(near, "states do not have the simulated time")
-    for jump in (3600.0, -4000.0, 0.0):
+    for jump in (3600.0, -4000.0, 0.0) * rounds:
         goal = FollowJointTrajectory.Goal()
         goal.trajectory.joint_names = list(states[-1].name)
         there = list(states[-1].position)

@@ -21,6 +21,7 @@ from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.shape import Shape, sphere
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 THERE = Pose.xyz_abc(0.5, 0.0, 0.5, *ha.deg(180, 0, 180))
@@ -246,11 +247,17 @@ CALLS: dict[str, Call] = {
         lambda arm, v: arm.attach_tool(Tool("t", frames={f"f{i}": Pose.at() for i in range(len(v))})),
         "frames",
     ),
+    "ToolInfo.shapes": Call(
+        lambda arm, v: arm.attach_tool(Tool("t", shapes=[sphere(0.01)] * len(v))), "shapes"
+    ),
+    "Shape.size": Call(lambda arm, v: arm.attach_tool(Tool("t", shapes=[Shape("box", v)])), "size", 3, 0.1),
     "FrameInfo.name": Call(
         lambda arm, v: arm.attach_tool(Tool("t", frames={v: Pose.at()})), "frames[0].name"
     ),
     "AttachTool.name": Call(lambda arm, v: arm.attach_tool(v), "name"),
     "AttachTool.frame": Call(lambda arm, v: arm.attach_tool("t", frame=v), "frame"),
+    "AskOperator.text": Call(lambda arm, v: arm.pad.ask(v, "Ok"), "text"),
+    "AskOperator.buttons": Call(lambda arm, v: arm.pad.ask("Ready?", *v), "buttons"),
     "ShowMessage.text": Call(lambda arm, v: arm.pad.show(v), "text"),
     "SetKey.slot": Call(lambda arm, v: arm.pad.set_key(v, "x"), "slot"),
     "SetKey.text": Call(lambda arm, v: arm.pad.set_key(0, v), "text"),

@@ -106,7 +106,7 @@ def test_a_long_program_is_sampled_more_coarsely() -> None:
         (
             (ha.circ(moved(x=0.05), moved(x=0.1)),),
             ha.CommandRejected,
-            "coincide or lie on a line",
+            "start, via and end lie on a line: .* at least 0.0001 rad .* got 0 rad",
         ),
     ],
 )

@@ -31,7 +31,7 @@ MODULES = (
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
 CONNECTED = (
     *("connect", "connect_all", "target_from_env", "Client", "Recorder", "TwoSignalGripper"),
-    *("live", "LiveView"),
+    *("live", "LiveView", "record_client"),
     *("start_together", "states_together", "stop_all", "run"),
 )
 #: Values whose methods are called, by the name in a report.

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.motion.circle import Circ, arc, circ
+from heptarm.values.motion.circle import Circ, arc, circ, circle_through
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose, Redundancy, deg
@@ -51,6 +51,12 @@ def test_an_arc_keeps_its_distance_from_the_axis(
         wanted = flat * math.cos(fraction * angle) + across * math.sin(fraction * angle)
         assert at - (at @ axis) * axis == pytest.approx(wanted, abs=1e-9)
     assert motion.end.angle_to(START) < 1e-9
+    circle = circle_through(START, motion.via, motion.end)
+    assert circle.angle == pytest.approx(abs(angle), abs=1e-6)
+    assert circle.radius == pytest.approx(float(np.linalg.norm(flat)), rel=1e-6)
+    assert circle.length == pytest.approx(circle.radius * circle.angle)
+    assert circle.normal == pytest.approx(math.copysign(1.0, angle) * axis, abs=1e-6)
+    assert (circle.centre - centre) @ (START.xyz - circle.centre) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_planes_turn_by_the_right_hand() -> None:
@@ -65,7 +71,7 @@ def test_planes_turn_by_the_right_hand() -> None:
 @pytest.mark.parametrize(
     ("make", "error", "words"),
     [
-        (lambda: circ(VIA, VIA), CommandRejected, "same point"),
+        (lambda: circ(VIA, VIA), CommandRejected, "via and end 0 m apart .give a point"),
         (lambda: circ(VIA, [1, 2, 3]), ShapeError, "end"),
         (lambda: circ(VIA, END, orientation="sideways"), CommandRejected, "sideways"),
         (lambda: circ(VIA, END, orientation="ignore"), CommandRejected, "spline"),
@@ -88,3 +94,33 @@ def test_planes_turn_by_the_right_hand() -> None:
 def test_what_makes_no_arc_is_refused(make: object, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         make()  # type: ignore[operator]
+
+
+#: Start, via and end that define no circle, the parameter that is refused, and words of the error.
+NO_CIRCLES = {
+    "start and via": ((0.1, 0, 0), (0.1, 0, 5e-6), (0.2, 0, 0), "via", "start and via .* m apart"),
+    "via and end": ((0, 0, 0), (0.2, 0, 0), (0.2, 0, 0), "via", "via and end .* m apart"),
+    "start and end": ((0, 0, 0), (0.2, 0, 0), (0, 0, 0), "end", "a full circle is two arcs"),
+    "between": ((0, 0, 0), (0.1, 0, 0), (0.2, 0, 0), "via", "on a line"),
+    "before": ((0, 0, 0), (-0.1, 0, 0), (0.2, 0, 0), "via", "on a line"),
+    "almost": (
+        (0, 0, 0),
+        (0.1, 9e-6, 0),
+        (0.2, 0, 0),
+        "via",
+        "on a line: .* beside the direction to the end, got 9",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NO_CIRCLES)
+def test_points_without_a_circle_are_refused(name: str) -> None:
+    *points, parameter, words = NO_CIRCLES[name]
+    with pytest.raises(CommandRejected, match=words) as refused:
+        circle_through(*(Pose.at(*one) for one in points))  # type: ignore[misc]
+    assert refused.value.parameter == parameter and refused.value.allowed and refused.value.hint
+
+
+def test_flat_arcs_are_arcs() -> None:
+    circle = circle_through(Pose.at(), Pose.at(0.1, 2e-5), Pose.at(0.2))
+    assert circle.radius == pytest.approx(250.0, rel=1e-3) and circle.length == pytest.approx(0.2, rel=1e-6)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import socket
+import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -129,3 +132,38 @@ def test_what_cannot_be_shown_is_refused(peer: Peer, tmp_path: Path, monkeypatch
                 ha.live(arm)
             assert "--save" in raised.value.hint
         assert arm.state_rate == rate
+
+
+def test_a_viewer_elsewhere_receives_the_same(peer: Peer, tmp_path: Path) -> None:
+    """Rerun's own server, which writes what it receives."""
+    rerun_cli = pytest.importorskip("rerun_cli")
+    program = Path(rerun_cli.__file__).with_name("rerun.exe" if sys.platform == "win32" else "rerun")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    file = tmp_path / "received.rrd"
+    command = [str(program), "--port", str(port), "--save", str(file)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
+        try:
+            until(lambda: listens(port))
+            with peer.arm() as arm, ha.live(arm, to=f"rerun+http://127.0.0.1:{port}/proxy") as view:
+                until(lambda: view.states > 20)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # rerun ends a file only when its server ends
+                until(lambda: count(file) == view.states)
+        finally:
+            server.kill()
+
+
+def count(file: Path) -> int:
+    """States that are in a file so far."""
+    table = Read(file).rows.get("/arm/q", {})
+    return len(table.get("time", ()))
+
+
+def listens(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port)).close()
+    except OSError:
+        return False
+    return True

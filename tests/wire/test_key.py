@@ -49,6 +49,8 @@ def test_python_computes_the_golden_vectors() -> None:
     up, down = exchange.tags(hello.nonce, challenge.nonce)
     assert up.of(v["stop_frame"][:-16]) == v["stop_frame"][-16:]
     assert down.of(v["accepted_frame"][:-16]) == v["accepted_frame"][-16:]
+    up.begin_round()
+    assert up.of(v["stop_frame"][:-16]) == v["stop_frame_after_wrap"][-16:]
 
 
 def test_a_python_session_speaks_the_golden_vectors() -> None:
@@ -78,6 +80,7 @@ def test_java_computes_the_golden_vectors() -> None:
         v["client_mac"],
         v["cabinet_mac"],
         v["stop_frame"][-16:],
+        v["stop_frame_after_wrap"][-16:],
         v["accepted_frame"][-16:],
         *4 * [b"\0\0\0\5"],
     ]
@@ -102,6 +105,12 @@ def test_both_sides_prove_the_key() -> None:
     assert client.is_proven and client.state is cabinet.state is SessionState.OPEN
 
 
+def test_no_two_sessions_have_the_same_nonce() -> None:
+    sessions = [Session(side, key=KEY) for side in Side for _ in range(3)]
+    nonces = {one.hello(name="t").nonce for one in sessions} | {one.challenge().nonce for one in sessions}
+    assert len(nonces) == len(sessions)
+
+
 def test_a_wrong_key_proves_nothing() -> None:
     client, cabinet = challenged(other=b"other")
     pour(client.send(client.proof()), cabinet)
@@ -123,10 +132,14 @@ def refuses(client: Session, *frames: bytes) -> int:
     return error.value.code
 
 
-def test_a_client_with_a_key_opens_no_session_without_a_challenge() -> None:
-    client = Session(Side.CLIENT, key=KEY)
-    client.send(client.hello(name="t"))
-    assert refuses(client, pack(Welcome.TYPE, welcome(mac=bytes(32)).encode(), seq=0)) == Code.WRONG_KEY
+@pytest.mark.parametrize("knows", [False, True], ids=["rogue", "with the key"])
+def test_a_client_with_a_key_opens_no_session_without_a_challenge(knows: bool) -> None:
+    client, exchange = Session(Side.CLIENT, key=KEY), KeyExchange(KEY)
+    hello = client.hello(name="t")
+    client.send(hello)
+    exchange.add(Hello.TYPE, hello.encode())
+    mac = exchange.cabinet_mac(Welcome.TYPE, welcome(mac=b"").encode()) if knows else bytes(32)
+    assert refuses(client, pack(Welcome.TYPE, welcome(mac=mac).encode(), seq=0)) == Code.WRONG_KEY
 
 
 @pytest.mark.parametrize("nonce", [NONCES[0], b"", bytes(31), bytes(33)])
@@ -212,6 +225,13 @@ def test_an_attacked_line_ends_the_session(attack: str, side: Side) -> None:
     assert sender.state is SessionState.OPEN
 
 
+def test_an_answer_after_a_lost_frame_is_refused() -> None:
+    client, cabinet = open_pair(KEY)
+    pour(requests(client, 1)[0], cabinet)
+    cabinet.send(Ping(sent=1))  # lost
+    assert refuses(client, cabinet.send(Accepted(id=0), request=1)) == Code.FORGED_FRAME
+
+
 def test_a_frame_of_the_other_direction_is_refused() -> None:
     client, _ = open_pair(KEY)
     echoed = client.send(Ping(sent=1))
@@ -236,7 +256,7 @@ def test_tags_go_on_after_the_sequence_number_wraps() -> None:
     first = client.send(Ping(sent=1))
     second = client.send(Ping(sent=2))
     assert [one.message for one in pour(first + second, cabinet)] == [Ping(sent=1), Ping(sent=2)]  # type: ignore[union-attr]
-    again, _ = open_pair(KEY)
-    assert again.send(Ping(sent=2))[-16:] != second[-16:]
-    assert cabinet._reader.tag is not None
-    assert cabinet._reader.tag.of(second[:-16]) == second[-16:]
+    up, _ = KeyExchange(KEY).tags(client._nonce, cabinet._nonce)
+    assert up.of(second[:-16]) != second[-16:]  # what was sent before the wrap fits no more
+    up.begin_round()
+    assert up.of(second[:-16]) == second[-16:]

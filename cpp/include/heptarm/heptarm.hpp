@@ -458,6 +458,26 @@ inline const char* name(Role value) {
 
 inline bool is_known(Role value) { return *name(value) != 0; }
 
+/// Kind of a solid shape.
+enum class ShapeKind : std::uint8_t {
+    box = 0,  ///< its edges along its axes
+    cylinder = 1,  ///< along its z axis
+    sphere = 2,
+    capsule = 3,  ///< a cylinder along its z axis with a half sphere at both ends
+};
+
+inline const char* name(ShapeKind value) {
+    switch (value) {
+        case ShapeKind::box: return "box";
+        case ShapeKind::cylinder: return "cylinder";
+        case ShapeKind::sphere: return "sphere";
+        case ShapeKind::capsule: return "capsule";
+    }
+    return "";
+}
+
+inline bool is_known(ShapeKind value) { return *name(value) != 0; }
+
 /// What to do with a program while another one runs.
 enum class When : std::uint8_t {
     queue = 0,  ///< run it after the queued programs
@@ -803,6 +823,26 @@ inline const char* name(Severity value) {
 }
 
 inline bool is_known(Severity value) { return *name(value) != 0; }
+
+/// What a dialog of the smartPAD looks like.
+enum class DialogKind : std::uint8_t {
+    question = 0,
+    info = 1,
+    warning = 2,
+    error = 3,
+};
+
+inline const char* name(DialogKind value) {
+    switch (value) {
+        case DialogKind::question: return "question";
+        case DialogKind::info: return "info";
+        case DialogKind::warning: return "warning";
+        case DialogKind::error: return "error";
+    }
+    return "";
+}
+
+inline bool is_known(DialogKind value) { return *name(value) != 0; }
 
 /// Groups of the pushed state. Each is sampled at its own period and carries its own time stamp.
 struct Groups {
@@ -1573,6 +1613,20 @@ struct FrameInfo {
     }
 };
 
+/// A solid shape of a tool or a workpiece.
+struct Shape {
+    ShapeKind kind = ShapeKind::box;
+    std::array<double, 3> size = filled<3>(unset);  ///< of a box its edges; otherwise the radius, and the length along z of a cylinder or a capsule; above 0, and 0 where the kind has no size [m]
+    Pose pose;  ///< of its middle
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.kind, "kind");
+        visit(self.size, "size", {0.0, 4.0});
+        visit(self.pose, "pose");
+    }
+};
+
 /// A tool or a workpiece.
 struct ToolInfo {
     std::string name;
@@ -1580,6 +1634,7 @@ struct ToolInfo {
     std::array<double, 3> com = filled<3>(unset);  ///< centre of mass; a tool's in the flange frame, a workpiece's in the frame to which it is attached; zeros if the cabinet does not report it [m]
     std::array<double, 6> inertia = filled<6>(unset);  ///< xx yy zz xy xz yz about the centre of mass [kg m²]
     std::vector<FrameInfo> frames;  ///< in the same frame; the first is the default motion frame; a name contains no / and is not tool, flange or base
+    std::vector<Shape> shapes;  ///< what of it collides and is drawn, in the same frame; a virtual cabinet mounts them, a robot ignores them
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1588,6 +1643,7 @@ struct ToolInfo {
         visit(self.com, "com", {-2.0, 2.0});
         visit(self.inertia, "inertia");
         visit(self.frames, "frames", {-infinite, infinite, false, false, false, 0, 32});
+        visit(self.shapes, "shapes", {-infinite, infinite, false, false, false, 0, 16});
     }
 };
 
@@ -2246,6 +2302,22 @@ struct DatagramStatistics {
     }
 };
 
+/// Shows a dialog on the smartPAD; the accepted id is its number, and DialogClosed has the answer. Refused while a dialog is shown: nobody but the operator can close one.
+struct AskOperator {
+    static constexpr std::uint16_t TYPE = 59;
+    static constexpr const char* NAME = "AskOperator";
+    DialogKind kind = DialogKind::question;
+    std::string text;
+    std::vector<std::string> buttons;  ///< different labels of 1 to 64 bytes
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.kind, "kind");
+        visit(self.text, "text", {-infinite, infinite, false, false, false, 1, 512});
+        visit(self.buttons, "buttons", {-infinite, infinite, false, false, false, 1, 12});
+    }
+};
+
 /// Starts a servo motion at the current position; Accepted carries its id.
 struct ServoOpen {
     static constexpr std::uint16_t TYPE = 64;
@@ -2540,6 +2612,20 @@ struct ControlChanged {
     }
 };
 
+/// The attached tool or workpiece has changed, or was defined again.
+struct ToolChanged {
+    static constexpr std::uint16_t TYPE = 106;
+    static constexpr const char* NAME = "ToolChanged";
+    std::optional<ToolInfo> tool;  ///< absent: none
+    std::optional<ToolInfo> workpiece;  ///< absent: none
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.tool, "tool");
+        visit(self.workpiece, "workpiece");
+    }
+};
+
 /// Safety or readiness has changed.
 struct SafetyChanged {
     static constexpr std::uint16_t TYPE = 101;
@@ -2626,6 +2712,22 @@ struct SegmentReached {
     }
 };
 
+/// The operator has answered a dialog.
+struct DialogClosed {
+    static constexpr std::uint16_t TYPE = 107;
+    static constexpr const char* NAME = "DialogClosed";
+    std::uint32_t dialog = 0;  ///< its number
+    std::int32_t button = 0;  ///< index of the pressed button; -1: the smartPAD could not show the dialog
+    std::string text;  ///< why it could not; empty: it was shown
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.dialog, "dialog");
+        visit(self.button, "button");
+        visit(self.text, "text");
+    }
+};
+
 /// Pushed state: the newest sample of each subscribed group.
 struct State {
     static constexpr std::uint16_t TYPE = 112;
@@ -2680,7 +2782,7 @@ struct State {
 };
 
 /// Any message.
-using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, State>;
+using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, AskOperator, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, ToolChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, DialogClosed, State>;
 
 /// The message with this id in a body. Throws DecodeError.
 inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {
@@ -2720,6 +2822,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case ProcessData::TYPE: return decode<ProcessData>(data, size);
         case GetDatagramStatistics::TYPE: return decode<GetDatagramStatistics>(data, size);
         case DatagramStatistics::TYPE: return decode<DatagramStatistics>(data, size);
+        case AskOperator::TYPE: return decode<AskOperator>(data, size);
         case ServoOpen::TYPE: return decode<ServoOpen>(data, size);
         case ServoJoints::TYPE: return decode<ServoJoints>(data, size);
         case ServoJointsVelocity::TYPE: return decode<ServoJointsVelocity>(data, size);
@@ -2735,11 +2838,13 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case TriggerFired::TYPE: return decode<TriggerFired>(data, size);
         case MotionFinished::TYPE: return decode<MotionFinished>(data, size);
         case ControlChanged::TYPE: return decode<ControlChanged>(data, size);
+        case ToolChanged::TYPE: return decode<ToolChanged>(data, size);
         case SafetyChanged::TYPE: return decode<SafetyChanged>(data, size);
         case KeyPressed::TYPE: return decode<KeyPressed>(data, size);
         case Notice::TYPE: return decode<Notice>(data, size);
         case ConditionFired::TYPE: return decode<ConditionFired>(data, size);
         case SegmentReached::TYPE: return decode<SegmentReached>(data, size);
+        case DialogClosed::TYPE: return decode<DialogClosed>(data, size);
         case State::TYPE: return decode<State>(data, size);
         default: throw DecodeError("unknown message id " + std::to_string(type));
     }

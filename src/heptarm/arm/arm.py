@@ -47,6 +47,7 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
+from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.values.workspace import Workspace
@@ -637,7 +638,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
-        motions = program.with_kept_joints(self._connection, motions)
+        motions = program.resolved(self._connection, self._tooling, motions)
         self._foresight.examine(motions, when, ceiling)
         return program.send(
             self._connection,
@@ -853,6 +854,11 @@ class Arm:
     def tools(self) -> dict[str, KnownTool]:
         """Tools that can be attached by name: templates of the project, and defined ones."""
         return self._tooling.known
+
+    @property
+    def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
+        """Shapes of the attached tool and workpiece, each with its pose in the flange frame; see `heptarm.shapes`."""
+        return self._tooling.shapes
 
     @property
     def frames(self) -> dict[str, Pose]:

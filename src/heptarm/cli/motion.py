@@ -11,13 +11,14 @@ import numpy as np
 from cyclopts import Parameter
 
 from heptarm.arm.motion.servo import ServoStats
-from heptarm.arm.translate.motions import items
-from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, MoveOptions, Speed
+from heptarm.arm.translate.motions import in_base, items
+from heptarm.cli.options import NO_TARGET, Access, CommandTarget, FrameOfPose, Json, MoveOptions, Speed
 from heptarm.cli.output import confirm, emit, state_data
 from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.arrays import within
+from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.motion.line import lin, lin_rel
@@ -54,7 +55,7 @@ def move_ptp(
 
 
 def move_lin(
-    x: Annotated[float, Parameter(help="Position along x of the base [m].")],
+    x: Annotated[float, Parameter(help="Position along x [m].")],
     y: Annotated[float, Parameter(help="Along y [m].")],
     z: Annotated[float, Parameter(help="Along z [m].")],
     a: Annotated[float, Parameter(help="Rotation about z [rad], with --deg [deg].")],
@@ -62,15 +63,18 @@ def move_lin(
     c: Annotated[float, Parameter(help="Then about x.")],
     /,
     *,
+    frame: FrameOfPose = BASE,
     options: MoveOptions = _MOVE,
 ) -> int:
-    """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad].
+    """Straight line to a pose: x y z [m], a b c about z y x [rad], in the base or a taught frame.
 
     For example:
 
         heptarm move lin 0.5 0 0.4 180 0 180 --deg --target lab1
+
+        heptarm move lin 0 0 0.1 180 0 180 --deg --frame /Table/Corner --target lab1
     """
-    motion = lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), degrees=options.degrees)))
+    motion = lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), degrees=options.degrees)), frame=frame)
     return _move(motion, options)
 
 
@@ -107,7 +111,7 @@ def _move(motion: Motion, options: MoveOptions) -> int:
     """
     with options.target.connect(control=not options.dry_run) as arm:
         # a motion outside the limits is refused here, before any question
-        items((motion,), arm.robot, options.speed)
+        items((in_base(motion, arm.frames),), arm.robot, options.speed)
         title, percent = arm.robot.title, f"{options.speed:.0%}"
         if options.dry_run:
             preview = arm.plan(motion, speed=options.speed)

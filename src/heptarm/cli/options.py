@@ -167,6 +167,9 @@ Json = Annotated[
 Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are in degrees.")]
 Speed = Annotated[float, Parameter(name="--speed", help="Fraction of the full speed, (0, 1].")]
 Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask before a real robot moves.")]
+FrameOfPose = Annotated[
+    str, Parameter(name="--frame", help='Frame of the pose: "base", or a taught frame such as /Table.')
+]
 DryRun = Annotated[
     bool,
     Parameter(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,7 @@ from heptarm.cli.options import NO_TARGETS, CommandTargets, Json
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
 from heptarm.panel.guard import is_local
+from heptarm.panel.model import PanelArm
 from heptarm.panel.process import STATE_RATE, Panel, PanelOptions, model_of
 
 
@@ -34,6 +36,13 @@ def panel(
         str, Parameter(help="DIR with link_0.stl to link_7.stl, or .obj, in place of heptarm's own.")
     ] = "",
     recordings: Annotated[Path, Parameter(help="Folder for recordings.")] = Path(),
+    gripper: Annotated[
+        str,
+        Parameter(
+            help='Signals of a gripper: "open=OUTPUT close=OUTPUT is_open=INPUT is_closed=INPUT", those that are not '
+            "named on the media flange. Default: the gripper of the scene."
+        ),
+    ] = "",
     light: Annotated[bool, Parameter(negative="", help="A light page instead of a dark one.")] = False,
     target: CommandTargets = NO_TARGETS,
     as_json: Json = False,
@@ -53,6 +62,7 @@ def panel(
         scene=scene,
         meshes=meshes,
         recordings=recordings,
+        gripper=gripper,
         light=light,
     )
     if allow_control and read_only:
@@ -63,10 +73,11 @@ def panel(
         )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
-        models = []
+        models: list[PanelArm] = []
         for text, one in target.each():
             arm = stack.enter_context(one.connect(control=False, state_rate=STATE_RATE))
-            models.append(model_of(arm, text, options))
+            alone = replace(options, scene="", gripper="")  # these are the first arm's
+            models.append(model_of(arm, text, alone if models else options))
         page = Panel(models, options)
         stack.callback(page.close)
         if as_json:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, Json, Speed
+from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, FrameOfPose, Json, Speed
 from heptarm.cli.output import emit
+from heptarm.values.frames import BASE
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
@@ -43,6 +44,10 @@ class PlanOptions:
     out: Annotated[
         Path | None, Parameter(name=["--out", "-o"], help="Write a figure: .png, .svg, .pdf or .html.")
     ] = None
+    show: Annotated[
+        bool,
+        Parameter(negative="", help="Show it in an open panel, otherwise as a figure in the web browser."),
+    ] = False
     target: CommandTarget = NO_TARGET
     as_json: Json = False
 
@@ -72,15 +77,24 @@ def plan_ptp(
 
 
 def plan_lin(
-    x: Metres, y: Metres, z: Metres, a: Turn, b: Turn, c: Turn, /, *, options: PlanOptions = _OPTIONS
+    x: Metres,
+    y: Metres,
+    z: Metres,
+    a: Turn,
+    b: Turn,
+    c: Turn,
+    /,
+    *,
+    frame: FrameOfPose = BASE,
+    options: PlanOptions = _OPTIONS,
 ) -> int:
-    """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad].
+    """Straight line to a pose: x y z [m], a b c about z y x [rad], in the base or a taught frame.
 
     For example:
 
         heptarm plan lin 0.5 0 0.4 180 0 180 --deg --scene table --target lab1
     """
-    return _plan(lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), options))), options)
+    return _plan(lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), options)), frame=frame), options)
 
 
 def plan_lin_rel(
@@ -121,6 +135,8 @@ def _plan(motion: Motion, options: PlanOptions) -> int:
         from heptarm.record import plot
 
         written = {"file": str(plot.save(preview.plot(), options.out))}
+    if options.show:
+        preview.show()
     if options.as_json:
         emit(preview_data(preview) | written)
     else:

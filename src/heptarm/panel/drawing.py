@@ -1,4 +1,4 @@
-"""What is drawn in three dimensions: arm and scene, the path driven, the force of a contact, frames, taught points."""
+"""What is drawn in three dimensions: arm and scene, a plan, the path driven, the force of a contact, frames, points."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from heptarm.io.plan_box import PlanOutline
 from heptarm.sim.plant.appearance import ArmMeshes
-from heptarm.sim.plant.scene import Scene
-from heptarm.sim.plant.shapes import drawn_shapes
+from heptarm.sim.plant.carried import GEOMS, mujoco_size
+from heptarm.sim.plant.scene import Scene, is_mounted
+from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from heptarm.values.shape import Shape
 
+_GHOST, _TOUCH = (90, 170, 255), (224, 49, 49)
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
 #: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
 _ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.01, 0.6, 2.0
@@ -68,6 +72,30 @@ class DrawnWorld:
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
+        self._scene, self._root, self._has_tool = server.scene, root, is_mounted(self._model)
+        self._carried: tuple[tuple[Shape, Pose], ...] = ()
+        self._carried_handles: list[Any] = []
+
+    def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
+        """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
+
+        Where the scene has a tool on the flange, that one is drawn alone.
+        """
+        if self._has_tool or shapes == self._carried:
+            return
+        for handle in self._carried_handles:
+            handle.remove()
+        self._carried = shapes
+        self._carried_handles = [
+            self._scene.add_mesh_simple(
+                f"{self._root}/flange/carried/{number}",
+                *solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
+                color=_TOOL,
+                position=pose.xyz,
+                wxyz=wxyz(pose),
+            )
+            for number, (one, pose) in enumerate(shapes)
+        ]
 
     def show(self, q: Array) -> None:
         """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""
@@ -88,6 +116,64 @@ class DrawnWorld:
     def flange(self) -> Any:
         """MuJoCo's view of the flange, as it was shown last: `xpos` is its position in the base, shape (3,) [m]."""
         return self._data.site("flange")
+
+
+class DrawnGhost:
+    """A plan in viser: a translucent arm that moves along it, its path, and where bodies would touch.
+
+    Args:
+        server: a viser server.
+        model: "iiwa7", "iiwa14", "med7" or "med14".
+        meshes: of the arm.
+        root: node of viser's scene that is the base of the arm.
+    """
+
+    def __init__(self, server: Any, model: str, meshes: ArmMeshes, root: str) -> None:
+        self._scene, self._root = server.scene, f"{root}/plan"
+        self._model = compiled(model, (), None, meshes)
+        self._data = mujoco.MjData(self._model)
+        self._plan: PlanOutline | None = None
+        self._shapes: list[tuple[int, Any]] = []
+        self._lines: list[Any] = []
+
+    def show(self, plan: PlanOutline | None, t: float) -> None:
+        """Move the ghost to a time of a plan [s]; None: hide it."""
+        if plan is not self._plan:
+            self._plan = plan
+            self._draw_path(plan)
+            for _, handle in self._shapes:
+                handle.visible = plan is not None
+        if plan is None:
+            return
+        if not self._shapes:
+            self._shapes = [(one.index, self._translucent(one)) for one in drawn_shapes(self._model)]
+        self._data.qpos[:7] = [np.interp(t, plan.t, column) for column in plan.q.T]
+        mujoco.mj_kinematics(self._model, self._data)
+        quat = np.zeros(4)
+        for index, handle in self._shapes:
+            mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
+            handle.position, handle.wxyz = self._data.geom_xpos[index].copy(), quat.copy()
+
+    def _translucent(self, one: DrawnShape) -> Any:
+        node = f"{self._root}/{one.index}"
+        return self._scene.add_mesh_simple(node, one.vertices, one.faces, color=_GHOST, opacity=0.35)
+
+    def _draw_path(self, plan: PlanOutline | None) -> None:
+        for handle in self._lines:
+            handle.remove()
+        self._lines = []
+        if plan is None or len(plan.path) < 2:
+            return
+        segments = np.stack([plan.path[:-1], plan.path[1:]], axis=1).astype(np.float32)
+        self._lines.append(
+            self._scene.add_line_segments(
+                f"{self._root}/path", segments, _GHOST, thickness=3.0, thickness_units="screen"
+            )
+        )
+        for number, t in enumerate(plan.touches):
+            place = np.array([np.interp(t, plan.t, column) for column in plan.path.T])
+            node = f"{self._root}/touch{number}"
+            self._lines.append(self._scene.add_icosphere(node, radius=0.02, color=_TOUCH, position=place))
 
 
 class DrawnMarks:

@@ -6,6 +6,7 @@ what a button does can be tested, and refused, in one place.
 
 from __future__ import annotations
 
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionError
+from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
 from heptarm.values.arrays import Array, Value, within
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
     from heptarm.arm.motion.handle import MotionHandle
     from heptarm.record.recorder import Recorder
+    from heptarm.skills.gripper import Gripper
 
 #: Time that the history of the force covers [s].
 HISTORY = 10.0
@@ -34,6 +37,8 @@ HISTORY = 10.0
 _MOST_FORCES, _MOST_PLACES = 1000, 1500
 #: The path gets a new point when the motion frame is this far from the last one [m].
 _STEP = 0.002
+#: For so long a ghost stays at the end of its plan [s].
+_PAUSE = 1.0
 #: What a person does about a reason why the arm stands, and on a virtual robot.
 _REMEDIES = {
     "emergency stop": (
@@ -118,6 +123,10 @@ class PanelArm:
         operate: carries out a command of the operator of a virtual robot; None: there is none.
         may_control: whether this panel may do more than look and stop.
         folder: where recordings go.
+        gripper: that its buttons open and close; None: there is none.
+
+    Attributes:
+        plan: that a ghost of the arm shows; None: there is none.
     """
 
     def __init__(
@@ -128,8 +137,13 @@ class PanelArm:
         operate: Callable[[str], str] | None = None,
         may_control: bool = True,
         folder: Path = Path(),
+        gripper: Gripper | None = None,
     ) -> None:
         self.arm = arm
+        self.gripper = gripper
+        self.plan: PlanOutline | None = None
+        self._plan_since = 0.0
+        self._gripping = threading.Lock()
         self.may_control = may_control
         self.points = PointList(arm.robot)
         self.goal: Pose | None = None
@@ -341,6 +355,78 @@ class PanelArm:
         """End jogging; with an owner only if it is the one who jogs."""
         self._jogger.release(owner)
 
+    # ------------------------------------------------------------------------------------- plans
+
+    def show_plan(self, plan: PlanOutline) -> None:
+        """Let a ghost of the arm move along a plan, again and again."""
+        self._plan_since = time.monotonic()
+        self.plan = plan
+
+    def hide_plan(self) -> None:
+        """Show no plan."""
+        self.plan = None
+
+    @property
+    def plan_time(self) -> float:
+        """Time of the plan at which the ghost is now [s]."""
+        if self.plan is None:
+            return 0.0
+        duration = float(self.plan.t[-1])
+        return min((time.monotonic() - self._plan_since) % (duration + _PAUSE), duration)
+
+    def preview(self, *names: str, speed: float = 0.1) -> None:
+        """Plan the motion to taught points, and show it; nothing moves.
+
+        Args:
+            names: of the points; none: all of them in order.
+            speed: fraction of the full speed, (0, 1].
+
+        Raises:
+            CommandRejected: there is no such point, the list is empty, or a point cannot be reached in this way.
+        """
+        chosen = self._chosen(names)
+        found = self.arm.plan(self.points.motions(chosen), speed=speed)
+        self.show_plan(found.outline())
+        self._say(f"Planned: {found.duration:.1f} s; {found.closest('velocity')}")
+
+    # ----------------------------------------------------------------------------------- gripper
+
+    def open_gripper(self) -> None:
+        """Begin to open the gripper; the outcome is a message."""
+        self._grip(opens=True)
+
+    def close_gripper(self) -> None:
+        """Begin to close the gripper; the outcome is a message."""
+        self._grip(opens=False)
+
+    def _grip(self, *, opens: bool) -> None:
+        self._check_allowed()
+        gripper = self.gripper
+        if gripper is None:
+            raise CommandRejected(
+                "the panel knows no gripper",
+                parameter="gripper",
+                hint='start it with --gripper "open=OUTPUT close=OUTPUT is_open=INPUT is_closed=INPUT"',
+            )
+        if not self._gripping.acquire(blocking=False):
+            raise ModeConflict("the gripper moves", parameter="gripper", hint="wait until it has arrived")
+
+        def move() -> None:
+            try:
+                gripper.open() if opens else gripper.close()
+                holds = not opens and gripper.holds_something
+                said = "is open" if opens else "holds something" if holds else "is closed on nothing"
+                self._say(f"The gripper {said}")
+            except HeptarmError as error:
+                self.report(error)
+            finally:
+                self._gripping.release()
+
+        self._say(f"The gripper {'opens' if opens else 'closes'}")
+        threading.Thread(target=move, name="heptarm-panel-gripper", daemon=True).start()
+
+    # ------------------------------------------------------------------------------------ points
+
     def teach(self, name: str = "", *, straight: bool = False) -> TaughtPoint:
         """Add the arm's position to the list of points.
 
@@ -372,11 +458,7 @@ class PanelArm:
         """
         self._check_allowed()
         within(speed, "speed", 0.0, 1.0, above=True)
-        chosen = names or self.points.names
-        if not chosen:
-            raise CommandRejected(
-                "the list of points is empty", parameter="points", hint="teach a point first"
-            )
+        chosen = self._chosen(names)
         if self._jogger.is_moving:
             raise ModeConflict("the arm is being jogged", parameter="points", hint="release the button first")
         tools = {list(self.points)[self.points.index(name)].tool for name in chosen}
@@ -392,6 +474,15 @@ class PanelArm:
         self._visiting, self._handle = tuple(chosen), handle
         handle.add_done_callback(self._on_done)
         self._say(f"Moving to {', '.join(chosen)}")
+
+    def _chosen(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of points, none: all of them; refused if there are none."""
+        chosen = names or self.points.names
+        if not chosen:
+            raise CommandRejected(
+                "the list of points is empty", parameter="points", hint="teach a point first"
+            )
+        return chosen
 
     def _on_done(self, handle: MotionHandle) -> None:
         error = handle.error

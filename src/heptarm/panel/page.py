@@ -15,7 +15,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.panel import texts
-from heptarm.panel.drawing import DrawnMarks, DrawnWorld, wxyz
+from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import HISTORY, PanelArm, Readout
 from heptarm.values.frames import BASE, FLANGE, TOOL
@@ -52,6 +52,7 @@ class ArmPage:
         model: the arm.
         world: its bodies.
         marks: what else is drawn of it.
+        ghost: shows its plan.
         root: node of viser's scene that is the base of the arm; empty: the world.
         tab: where the readouts go.
         atop: makes the buttons of all arms; called between the state and the tabs.
@@ -63,6 +64,7 @@ class ArmPage:
         model: PanelArm,
         world: DrawnWorld,
         marks: DrawnMarks,
+        ghost: DrawnGhost,
         *,
         root: str,
         tab: Any,
@@ -70,7 +72,7 @@ class ArmPage:
     ) -> None:
         self.model = model
         self._server, self._gui = server, server.gui
-        self._world, self._marks, self._root = world, marks, root
+        self._world, self._marks, self._ghost, self._root = world, marks, ghost, root
         self._points: tuple[Any, ...] = ()
         self._client: int | None = None
         self._trail: tuple[int, ...] = ()
@@ -98,6 +100,9 @@ class ArmPage:
         self._head = self._gui.add_html("")
         atop()
         self._safety = self._gui.add_html("")
+        self._plan = self._gui.add_html("")
+        self._hide = self._gui.add_button("Hide plan", color="gray", visible=False)
+        self._hide.on_click(lambda _: model.hide_plan())
         if model.may_control:
             self._make_control()
             tabs = self._gui.add_tab_group()
@@ -124,16 +129,21 @@ class ArmPage:
         if state is None or state.groups.joints is None:
             return
         self._world.show(state.q)
+        self._world.carry(self.model.arm.shapes)
         if tcp is not None:
             force = None if state.groups.wrench is None else state.wrench.force
             self._marks.show(tcp, np.array(self._world.flange.xpos), force)
         self._marks.show_target(readout.target)
+        self._ghost.show(self.model.plan, self.model.plan_time)
 
     def write(self, readout: Readout) -> None:
         """Write the texts."""
         model, state = self.model, readout.state
         _put(self._head, texts.head(readout))
         _put(self._safety, texts.safety(readout))
+        _put(self._plan, texts.plan(model.plan))
+        if self._hide.visible != (model.plan is not None):
+            self._hide.visible = model.plan is not None
         _put(self._joints, texts.joints(state, model.arm.robot))
         _put(self._place, texts.place(readout.tcp, state))
         _put(self._wrench, texts.wrench(state))
@@ -230,6 +240,9 @@ class ArmPage:
             self._button("Recover", model.recover, color="gray")
             self._button("Pause", model.pause, color="gray")
             self._button("Resume", model.resume, color="gray")
+            if model.gripper is not None:
+                self._button("Open gripper", model.open_gripper, color="gray")
+                self._button("Close gripper", model.close_gripper, color="gray")
 
     def _make_recording(self) -> None:
         self._grid()
@@ -354,6 +367,7 @@ class ArmPage:
         ):
             handle = gui.add_button(label, color="orange")
             handle.on_click(self._runner(action))
+        self._button("Preview", lambda: model.preview(speed=float(self._run_speed.value) / 100), color="gray")
         self._button("Cancel", model.end_run, color="gray")
         save = gui.add_button("Save", color="gray")
         save.on_click(

@@ -11,6 +11,7 @@ import argparse
 import contextlib
 import io
 import json
+import math
 import os
 import signal
 import sys
@@ -21,13 +22,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from heptarm.arm.link.halt import halt
 from heptarm.errors import CommandRejected, HeptarmError, require
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
+from heptarm.io.plan_box import PlanBox
 from heptarm.panel import texts
 from heptarm.panel.guard import PageGuard, is_local
 from heptarm.panel.model import PanelArm, groups_for
+from heptarm.skills.gripper import Gripper, TwoSignalGripper
 from heptarm.values.arrays import integer
 from heptarm.wire.messages import StopKind
 
@@ -36,6 +41,8 @@ if TYPE_CHECKING:
 
 #: Pictures per second, and every how many of them texts and plots are drawn [Hz].
 RATE, _TEXTS, _PLOTS = 25.0, 3, 6
+#: Every how many of them the panel looks for plans.
+_PLANS = 12
 #: States per second that the panel subscribes to [Hz].
 STATE_RATE = 50.0
 #: Distance of the bases of several arms [m].
@@ -57,6 +64,8 @@ class PanelOptions:
         positions: file in which a simulator writes the positions of all bodies of the scene; None: there is none.
         meshes: folder with meshes of the arms; empty: heptarm's own.
         recordings: folder for recordings.
+        gripper: signals of the gripper, "open=NAME close=NAME is_open=NAME is_closed=NAME", those that are not named on
+            the media flange; empty: that of the scene, if it has one.
         light: a light page instead of a dark one.
     """
 
@@ -68,6 +77,7 @@ class PanelOptions:
     positions: Path | None = None
     meshes: str = ""
     recordings: Path = Path()
+    gripper: str = ""
     light: bool = False
 
     @property
@@ -85,6 +95,7 @@ class Panel:
 
     Attributes:
         url: with the token, to print once.
+        server: of viser.
 
     Raises:
         MissingExtra: viser is not installed.
@@ -93,7 +104,7 @@ class Panel:
 
     def __init__(self, arms: Sequence[PanelArm], options: PanelOptions) -> None:
         viser = require("viser", extra="viz")
-        from heptarm.panel.drawing import DrawnMarks, DrawnWorld
+        from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld
         from heptarm.panel.page import ArmPage
         from heptarm.sim.plant.appearance import ArmMeshes
         from heptarm.sim.plant.scene import Scene
@@ -107,7 +118,7 @@ class Panel:
         # viser's own lines have a URL without the token, which lets nobody in
         with contextlib.redirect_stdout(io.StringIO()), guard.installed():
             server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
-        self._server = server
+        self.server = server
         self._arms = tuple(arms)
         self._ended = threading.Event()
         self._pages: list[ArmPage] = []
@@ -156,6 +167,7 @@ class Panel:
                         root=root,
                     ),
                     DrawnMarks(server, root),
+                    DrawnGhost(server, model.arm.robot.name, meshes, root),
                     root=root,
                     tab=tab,
                     atop=self._make_stop if tabs is None else lambda: None,
@@ -168,10 +180,11 @@ class Panel:
         server.on_client_disconnect(self._forget)
         guard.port = server.get_port()  # from now on it lets in who has the token
         self.url = guard.url
+        self._box = PlanBox([model.arm.robot.name for model in self._arms])
 
     def _make_stop(self) -> None:
         """The button that stops all arms, as soon as it is pressed."""
-        gui = self._server.gui
+        gui = self.server.gui
         gui.add_html(texts.STOP)
         button = gui.add_button("STOP", color="red")
         command = gui.add_command("Stop the arm", hotkey="S", description="stops every arm of this panel")
@@ -201,15 +214,33 @@ class Panel:
     def draw(self, count: int) -> None:
         """One picture, the count-th."""
         readouts = [model.poll() for model in self._arms]
-        if not self._server.get_clients() and count > 1:
+        if not self.server.get_clients() and count > 1:
             return  # nobody looks
-        with self._server.atomic():
+        if count % _PLANS == 0:
+            self._take_plan()
+        with self.server.atomic():
             for page, readout in zip(self._pages, readouts, strict=True):
                 page.draw(readout)
                 if count % _TEXTS == 0:
                     page.write(readout)
                 if count % _PLOTS == 0:
                     page.plot()
+
+    def _take_plan(self) -> None:
+        """Show the plan that a program has handed over, with the arm of its model that is nearest to its beginning."""
+        plan = self._box.take()
+        if plan is None:
+            return
+
+        def distance(model: PanelArm) -> float:
+            state = model.arm.connection.newest()
+            if state is None or state.groups.joints is None:
+                return math.inf
+            return float(np.abs(state.q - plan.q[0]).max())
+
+        fitting = [model for model in self._arms if model.arm.robot.name == plan.robot]
+        if fitting:
+            min(fitting, key=distance).show_plan(plan)
 
     def run(self) -> None:
         """Draw until `close` is called."""
@@ -224,10 +255,11 @@ class Panel:
     def close(self) -> None:
         """End the pages; the arms stay connected."""
         self._ended.set()
+        self._box.close()
         for model in self._arms:
             model.close()
         with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
+            self.server.stop()
 
 
 def _stop(model: PanelArm) -> None:
@@ -272,10 +304,40 @@ def model_of(
         operate = arm.operator.do
     return PanelArm(
         arm,
+        gripper=_gripper_of(arm, options) if options.may_control else None,
         halt=halting(arm, chosen.host, chosen.port),
         operate=operate,
         may_control=options.may_control,
         folder=options.recordings,
+    )
+
+
+def _gripper_of(arm: Arm, options: PanelOptions) -> Gripper | None:
+    """The gripper of the options, or of the scene of a virtual robot; None: there is none.
+
+    Raises:
+        CommandRejected: its signals are named in a wrong way, or there are none of these names.
+    """
+    from heptarm.sim.plant.scene import GRIPPER, Scene, Wiring
+
+    try:
+        if options.gripper:
+            wiring = Wiring.of(options.gripper)
+        elif arm.is_virtual and options.scene:
+            scene = Scene.of(options.scene)
+            if all(one.name != GRIPPER for one in scene.read().actuators):
+                return None
+            wiring = scene.wiring
+        else:
+            return None
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="gripper", value=options.gripper) from None
+    return TwoSignalGripper(
+        arm,
+        open=wiring.open,
+        close=wiring.close,
+        is_open=wiring.is_open,
+        is_closed=wiring.is_closed,
     )
 
 

@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.model import Advice, Readout
 from heptarm.panel.points import PointList
 from heptarm.values.arrays import Array
@@ -106,6 +107,19 @@ def safety(readout: Readout) -> str:
 def _colour(load: float) -> str:
     """Colour of a load, a fraction of the largest: blue, from a half on orange, from 0.85 on red."""
     return "#4dabf7" if load < 0.5 else "#ff922b" if load < 0.85 else "#fa5252"
+
+
+def plan(outline: PlanOutline | None) -> str:
+    """What the ghost shows."""
+    if outline is None:
+        return ""
+    length = float(np.linalg.norm(np.diff(outline.path, axis=0), axis=1).sum())
+    count = len(outline.touches)
+    touches = f"<small>bodies would touch at {count} place{'s' * (count > 1)}</small>" if count else ""
+    return (
+        f'<div class="ha"><div class="box {"bad" if count else ""}">Plan: {fixed(float(outline.t[-1]), 2)} s, '
+        f"{fixed(1e3 * length, 0)} mm; nothing moves{touches}</div></div>"
+    )
 
 
 def joints(state: State | None, robot: RobotModel) -> str:

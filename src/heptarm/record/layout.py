@@ -247,9 +247,11 @@ def _log_descriptor() -> bytes:
     return _file_set(_TIMESTAMP, _file("foxglove/Log.proto", "foxglove", [log], [_TIME]))
 
 
+_VECTOR = _message("Vector3", *(_field(name, i, _DOUBLE) for i, name in enumerate("xyz", 1)))
+_QUATERNION = _message("Quaternion", *(_field(name, i, _DOUBLE) for i, name in enumerate("xyzw", 1)))
+
+
 def _pose_descriptor() -> bytes:
-    vector = _message("Vector3", *(_field(name, i, _DOUBLE) for i, name in enumerate("xyz", 1)))
-    quaternion = _message("Quaternion", *(_field(name, i, _DOUBLE) for i, name in enumerate("xyzw", 1)))
     pose = _message(
         "Pose",
         _field("position", 1, _MESSAGE, ".foxglove.Vector3"),
@@ -258,14 +260,33 @@ def _pose_descriptor() -> bytes:
     stamped = _message(
         "PoseInFrame", _STAMPED, _field("frame_id", 2, _STRING), _field("pose", 3, _MESSAGE, ".foxglove.Pose")
     )
-    shapes = _file("foxglove/Pose.proto", "foxglove", [vector, quaternion, pose])
+    shapes = _file("foxglove/Pose.proto", "foxglove", [_VECTOR, _QUATERNION, pose])
     needs = ["foxglove/Pose.proto", _TIME]
     return _file_set(_TIMESTAMP, shapes, _file("foxglove/PoseInFrame.proto", "foxglove", [stamped], needs))
+
+
+def _transforms_descriptor() -> bytes:
+    one = _message(
+        "FrameTransform",
+        _STAMPED,
+        _field("parent_frame_id", 2, _STRING),
+        _field("child_frame_id", 3, _STRING),
+        _field("translation", 4, _MESSAGE, ".foxglove.Vector3"),
+        _field("rotation", 5, _MESSAGE, ".foxglove.Quaternion"),
+    )
+    several = _message(
+        "FrameTransforms", _field("transforms", 1, _MESSAGE, ".foxglove.FrameTransform", is_repeated=True)
+    )
+    content = _file(
+        "foxglove/FrameTransforms.proto", "foxglove", [_VECTOR, _QUATERNION, one, several], [_TIME]
+    )
+    return _file_set(_TIMESTAMP, content)
 
 
 #: Name and descriptor of the messages that are written one by one.
 LOG = ("foxglove.Log", _log_descriptor())
 POSE_IN_FRAME = ("foxglove.PoseInFrame", _pose_descriptor())
+FRAME_TRANSFORMS = ("foxglove.FrameTransforms", _transforms_descriptor())
 
 
 def encode_log(nanos: int, level: str, text: str, name: str) -> bytes:
@@ -282,6 +303,17 @@ def encode_pose(nanos: int, frame: str, xyz: Sequence[float], quat: Sequence[flo
     """A pose in a frame; `nanos` since 1970, [m], quaternion x y z w."""
     pose = put_bytes(1, _numbers(xyz)) + put_bytes(2, _numbers(quat))
     return put_bytes(1, _timestamp(nanos)) + put_bytes(2, frame.encode()) + put_bytes(3, pose)
+
+
+def encode_transforms(nanos: int, transforms: Sequence[tuple[bytes, Sequence[float]]]) -> bytes:
+    """Transforms of frames; `nanos` since 1970, each with its `transform_head` and its quaternion x y z w."""
+    stamp = put_bytes(1, _timestamp(nanos))
+    return b"".join(put_bytes(1, stamp + head + put_bytes(5, _numbers(quat))) for head, quat in transforms)
+
+
+def transform_head(parent: str, child: str, xyz: Sequence[float]) -> bytes:
+    """What does not change of a transform: the names of its frames, and the place of the child in its parent [m]."""
+    return put_bytes(2, parent.encode()) + put_bytes(3, child.encode()) + put_bytes(4, _numbers(xyz))
 
 
 def _timestamp(nanos: int) -> bytes:

@@ -1,17 +1,20 @@
 """The file of a recording: MCAP with protobuf and JSON messages, which Foxglove and rerun open without a plugin.
 
-Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp (the motion frame for a 3D view, at most
-30 per second), /log (what happened, as text), /journal (the same with all its data), /signals (IO and control mode,
-when they change). The log time of a message is its receipt, the publish time of a state the moment of its sampling.
-In a recording of several arms the topics begin with the arm's name, as in /left/state.
+Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp and /tf (the motion frame, and the frames
+of the links with the names of the URDF, for a 3D view, at most 30 per second), /log (what happened, as text), /journal
+(the same with all its data), /signals (IO and control mode, when they change). The log time of a message is its
+receipt, the publish time of a state the moment of its sampling. In a recording of several arms the topics begin with
+the arm's name, as in /left/state, and so do the frames: left_base.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, require
 from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
 from heptarm.record.layout import (
+    FRAME_TRANSFORMS,
     FRI_CYCLE,
     LOG,
     POSE_IN_FRAME,
@@ -29,8 +33,11 @@ from heptarm.record.layout import (
     cycle_rows,
     encode_log,
     encode_pose,
+    encode_transforms,
+    transform_head,
 )
 from heptarm.record.samples import StateSample, rest_of, state_rows
+from heptarm.values.robot import ROBOTS, robot
 from heptarm.wire import messages as wire
 
 #: Name of the metadata at the beginning of a file, and of those at its end.
@@ -39,6 +46,7 @@ BEGIN, END = "heptarm", "heptarm.end"
 ARM = "arm"
 #: States that are written before other threads get their turn.
 _TURN = 4
+_NO_TURN = (0.0, 0.0, 0.0, 1.0)
 #: Shortest time between two poses for a 3D view [ns].
 _POSE_PERIOD = 33_000_000
 #: Requests that are text for people, too; the others are in the journal only.
@@ -109,6 +117,8 @@ class RecordingFile:
         self._out.add_metadata(BEGIN, {**facts, **({ARM: arm} if arm else {})})
         self._states = self._add_rows("/state", STATE)
         self._pose = self._add("/tcp", *POSE_IN_FRAME)
+        self._frames = self._add("/tf", *FRAME_TRANSFORMS)
+        self._links = _LinkFrames(facts.get("robot", ""), f"{arm}_" if arm else "")
         self._log = self._add("/log", *LOG)
         self._journal = self._add_json("/journal", "heptarm.JournalEntry", _JOURNAL_SCHEMA)
         self._signals = self._add_json("/signals", "heptarm.Signals", _SIGNALS_SCHEMA)
@@ -152,10 +162,16 @@ class RecordingFile:
             self._write_rest(one, at, signals)
 
     def _write_pose(self, row: Any, received: int, sampled: int) -> None:
+        """Write what is three-dimensional: the pose of the motion frame, and the frames of the links."""
+        at, links = received + self._epoch, self._links
         if not np.isnan(row["xyz"]).any():
             self._pose_due = received + _POSE_PERIOD
-            data = encode_pose(sampled, "base", row["xyz"].tolist(), row["quat"].tolist())
-            self._out.add_message(self._pose, received + self._epoch, data, sampled)
+            data = encode_pose(sampled, links.base, row["xyz"].tolist(), row["quat"].tolist())
+            self._out.add_message(self._pose, at, data, sampled)
+        if not np.isnan(row["q"]).any():
+            self._pose_due = received + _POSE_PERIOD
+            data = encode_transforms(sampled, links.transforms(row["q"].tolist()))
+            self._out.add_message(self._frames, at, data, sampled)
 
     def _write_rest(self, one: StateSample, sampled: int, names: Sequence[str]) -> None:
         """Write control mode and signals if they have changed; their stamps do not count."""
@@ -211,6 +227,37 @@ class RecordingFile:
             self._file.close()
         except OSError:
             pass  # the disk is full: what was buffered is lost
+
+
+class _LinkFrames:
+    """Frames of an arm's links, each in the one before, as in the URDF of `heptarm_description`.
+
+    Args:
+        model: of the arm, such as "iiwa14"; an unknown one has no links.
+        prefix: before all names.
+    """
+
+    def __init__(self, model: str, prefix: str) -> None:
+        self.base = f"{prefix}base"
+        names = [self.base, *(f"{prefix}link_{index}" for index in range(8)), f"{prefix}flange"]
+        self._heads: list[bytes] = []
+        if model in ROBOTS:
+            links = robot(model).links
+            places = [np.zeros(3), *links.origin, links.flange]
+            self._heads = [
+                transform_head(parent, child, place.tolist())
+                for (parent, child), place in zip(pairwise(names), places, strict=True)
+            ]
+
+    def transforms(self, q: Sequence[float]) -> list[tuple[bytes, tuple[float, ...]]]:
+        """Heads and quaternions x y z w at joint positions [rad]."""
+        turns = [_NO_TURN]
+        for joint, angle in enumerate(q):
+            half = 0.5 * (-angle if joint == 3 else angle)
+            turn = (0.0, math.sin(half), 0.0) if joint % 2 else (0.0, 0.0, math.sin(half))
+            turns.append((*turn, math.cos(half)))
+        turns.append(_NO_TURN)
+        return list(zip(self._heads, turns, strict=False))
 
 
 def sampling_times(stamps: npt.NDArray[np.int64], to_ours: Callable[[int], int]) -> npt.NDArray[np.int64]:

@@ -168,7 +168,7 @@ class CollisionModel:
     def carrying(
         self,
         tool: Tool | KnownTool | None,
-        workpiece: Workpiece | None = None,
+        workpiece: Workpiece | KnownTool | None = None,
         *,
         at: Pose | None = None,
     ) -> CollisionModel:
@@ -189,7 +189,7 @@ class CollisionModel:
         if tool is not None:
             instance(tool, (Tool, KnownTool), "tool")
         if workpiece is not None:
-            instance(workpiece, Workpiece, "workpiece")
+            instance(workpiece, (Workpiece, KnownTool), "workpiece")
         if at is not None:
             check_pose(at, "at")
         view = copy(self)
@@ -360,7 +360,7 @@ class _Models:
 
 
 def _carried(
-    tool: Tool | KnownTool | None, workpiece: Workpiece | None, at: Pose | None
+    tool: Tool | KnownTool | None, workpiece: Workpiece | KnownTool | None, at: Pose | None
 ) -> tuple[CarriedShapes, ...]:
     """The shapes of a tool and of what it holds, as they are on the flange."""
     from heptarm.sim.plant.carried import CarriedShapes

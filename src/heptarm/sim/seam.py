@@ -112,6 +112,15 @@ class TargetKind(enum.IntEnum):
     POSITION_WITH_VELOCITY = 2
 
 
+class ShapeKind(enum.IntEnum):
+    """Kind of a shape of a tool or a workpiece."""
+
+    BOX = 0
+    CYLINDER = 1
+    SPHERE = 2
+    CAPSULE = 3
+
+
 class WrenchComponents(enum.IntFlag):
     """Components of a wrench."""
 
@@ -331,6 +340,102 @@ class AttachedLoad:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "AttachedLoad")
+        return value
+
+_BodyShape_0 = Struct(">B3d7d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyShape:
+    """A shape of a body on the flange."""
+
+    kind: ShapeKind = ShapeKind.BOX
+    #: Edges of a box; otherwise radius, length, 0 [m]
+    size: tuple[float, ...]
+    #: Of its middle in the body's frame [m]
+    pose: tuple[float, ...]
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_BodyShape_0.pack(self.kind, *self.size, *self.pose))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[BodyShape, int]:
+        v = codec.unpack(_BodyShape_0, data, pos)
+        pos += _BodyShape_0.size
+        kind = codec.read_enum(ShapeKind, v[0])
+        size = v[1:4]
+        pose = v[4:11]
+        return cls(kind=kind, size=size, pose=pose), pos
+
+_CarriedBody_0 = Struct(">B7d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarriedBody:
+    """A tool or a workpiece with its shapes."""
+
+    name: str = ""
+    #: Whether it is mounted on the flange itself
+    is_tool: bool
+    #: Of its frame in the flange frame [m]
+    pose: tuple[float, ...]
+    shapes: tuple[BodyShape, ...] = ()
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(codec.put_str(self.name))
+        out.append(_CarriedBody_0.pack(self.is_tool, *self.pose))
+        out.append(codec.put_count(len(self.shapes)))
+        for one_shapes in self.shapes:
+            one_shapes._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[CarriedBody, int]:
+        name, pos = codec.read_str(data, pos)
+        v = codec.unpack(_CarriedBody_0, data, pos)
+        pos += _CarriedBody_0.size
+        is_tool = codec.read_bool(v[0])
+        pose = v[1:8]
+        size, pos = codec.read_count(data, pos)
+        shapes_list: list[BodyShape] = []
+        for _ in range(size):
+            one_shapes, pos = BodyShape._read(data, pos)
+            shapes_list.append(one_shapes)
+        shapes = tuple(shapes_list)
+        return cls(name=name, is_tool=is_tool, pose=pose, shapes=shapes), pos
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarriedBodies:
+    """Everything with shapes that is attached to the flange."""
+
+    bodies: tuple[CarriedBody, ...] = ()
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(codec.put_count(len(self.bodies)))
+        for one_bodies in self.bodies:
+            one_bodies._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[CarriedBodies, int]:
+        size, pos = codec.read_count(data, pos)
+        bodies_list: list[CarriedBody] = []
+        for _ in range(size):
+            one_bodies, pos = CarriedBody._read(data, pos)
+            bodies_list.append(one_bodies)
+        bodies = tuple(bodies_list)
+        return cls(bodies=bodies), pos
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> CarriedBodies:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "CarriedBodies")
         return value
 
 _JointImpedance_0 = Struct(">7d7d")

@@ -53,7 +53,11 @@ class CarriesTools(Protocol[_Model_co]):
     """What a model of collisions may offer: then an arm gives it what is attached; `heptarm.CollisionModel` does."""
 
     def carrying(
-        self, tool: KnownTool | None, workpiece: Workpiece | None = None, *, at: Pose | None = None
+        self,
+        tool: KnownTool | None,
+        workpiece: Workpiece | KnownTool | None = None,
+        *,
+        at: Pose | None = None,
     ) -> _Model_co:
         """The same model, of an arm that carries a tool, and a workpiece at a frame in the flange frame."""
 

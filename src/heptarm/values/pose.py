@@ -23,6 +23,7 @@ from heptarm.values.arrays import (
     within,
     word,
 )
+from heptarm.values.frames import BASE, check_name
 from heptarm.values.text import fixed
 
 #: Whose axes an offset of a pose may refer to.
@@ -352,6 +353,21 @@ def check_pose(pose: Pose, parameter: str = "pose") -> None:
             value=pose,
             hint="build one with Pose.xyz_abc(x, y, z, a, b, c)",
         )
+
+
+def given_in(frame: str | Pose, *poses: Pose) -> tuple[str, tuple[Pose, ...]]:
+    """The name of the frame that poses refer to, and the poses in it.
+
+    Args:
+        frame: its name; or its pose in the base, in which the poses are computed at once.
+        poses: in that frame.
+
+    Raises:
+        ShapeError: neither a name nor a pose.
+    """
+    if not isinstance(frame, Pose):
+        return check_name(frame, "frame"), poses
+    return BASE, tuple(frame @ pose if isinstance(pose, Pose) else pose for pose in poses)
 
 
 def _turned(quat: list[float]) -> bool:

@@ -8,6 +8,7 @@ the moment of its sampling, of an FRI cycle its receipt, on this computer's cloc
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -198,6 +199,7 @@ class RerunStream:
     # ------------------------------------------------------------------------------------------------- parts
 
     def _send(self, path: str, times: npt.NDArray[np.int64], columns: Any) -> None:
+        time.sleep(0.0)  # the thread that receives states is not held up by the interpreter's lock
         at = self._rerun.TimeColumn(TIMELINE, timestamp=times.astype("datetime64[ns]"))
         self._recording.send_columns(f"{self._name}/{path}" if path else self._name, [at], columns)
 

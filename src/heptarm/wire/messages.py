@@ -37,6 +37,15 @@ class Role(enum.IntEnum):
     CONTROL = 1
 
 
+class ShapeKind(enum.IntEnum):
+    """Kind of a solid shape."""
+
+    BOX = 0
+    CYLINDER = 1
+    SPHERE = 2
+    CAPSULE = 3
+
+
 class When(enum.IntEnum):
     """What to do with a program while another one runs."""
 
@@ -190,6 +199,15 @@ class Severity(enum.IntEnum):
     INFO = 0
     WARNING = 1
     ERROR = 2
+
+
+class DialogKind(enum.IntEnum):
+    """What a dialog of the smartPAD looks like."""
+
+    QUESTION = 0
+    INFO = 1
+    WARNING = 2
+    ERROR = 3
 
 
 class Groups(enum.IntFlag):
@@ -1933,6 +1951,37 @@ class FrameInfo:
         self.pose._check(path + "pose.")
 
 
+_Shape_0 = Struct(">B3d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """A solid shape of a tool or a workpiece."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"size": (0.0, 4.0)}
+
+    kind: ShapeKind
+    size: tuple[float, ...]
+    pose: Pose
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Shape_0.pack(self.kind, *self.size))
+        self.pose._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Shape, int]:
+        v = codec.unpack(_Shape_0, data, pos)
+        pos += _Shape_0.size
+        kind = codec.read_enum(ShapeKind, v[0])
+        size = v[1:4]
+        pose, pos = Pose._read(data, pos)
+        return cls(kind=kind, size=size, pose=pose), pos
+
+    def _check(self, path: str) -> None:
+        codec.check_array(self.size, path + "size", 0.0, 4.0, False, False)
+        self.pose._check(path + "pose.")
+
+
 _ToolInfo_0 = Struct(">d3d6d")
 
 
@@ -1947,6 +1996,7 @@ class ToolInfo:
     com: tuple[float, ...]
     inertia: tuple[float, ...]
     frames: tuple[FrameInfo, ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -1954,6 +2004,9 @@ class ToolInfo:
         out.append(codec.put_count(len(self.frames)))
         for one_frames in self.frames:
             one_frames._write(out)
+        out.append(codec.put_count(len(self.shapes)))
+        for one_shapes in self.shapes:
+            one_shapes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ToolInfo, int]:
@@ -1969,7 +2022,13 @@ class ToolInfo:
             one_frames, pos = FrameInfo._read(data, pos)
             frames_list.append(one_frames)
         frames = tuple(frames_list)
-        return cls(name=name, mass=mass, com=com, inertia=inertia, frames=frames), pos
+        size, pos = codec.read_count(data, pos)
+        shapes_list: list[Shape] = []
+        for _ in range(size):
+            one_shapes, pos = Shape._read(data, pos)
+            shapes_list.append(one_shapes)
+        shapes = tuple(shapes_list)
+        return cls(name=name, mass=mass, com=com, inertia=inertia, frames=frames, shapes=shapes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.name.encode()), path + "name", 1, 64)
@@ -1979,6 +2038,9 @@ class ToolInfo:
         codec.check_length(len(self.frames), path + "frames", 0, 32)
         for index, its_frames in enumerate(self.frames):
             its_frames._check(f"{path}frames[{index}].")
+        codec.check_length(len(self.shapes), path + "shapes", 0, 16)
+        for index, its_shapes in enumerate(self.shapes):
+            its_shapes._check(f"{path}shapes[{index}].")
 
 
 _SignalInfo_0 = Struct(">BBdd")
@@ -4018,6 +4080,65 @@ class DatagramStatistics:
         self._check("")
 
 
+_AskOperator_0 = Struct(">B")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AskOperator:
+    """Shows a dialog on the smartPAD; the accepted id is its number, and DialogClosed has the answer. Refused while a dialog is shown: nobody but the operator can close one."""
+
+    TYPE: ClassVar[int] = 59
+    KIND: ClassVar[str] = "request"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "controller"
+
+    kind: DialogKind
+    text: str
+    buttons: tuple[str, ...]
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_AskOperator_0.pack(self.kind))
+        out.append(codec.put_str(self.text))
+        out.append(codec.put_count(len(self.buttons)))
+        for one_buttons in self.buttons:
+            out.append(codec.put_str(one_buttons))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[AskOperator, int]:
+        v = codec.unpack(_AskOperator_0, data, pos)
+        pos += _AskOperator_0.size
+        kind = codec.read_enum(DialogKind, v[0])
+        text, pos = codec.read_str(data, pos)
+        size, pos = codec.read_count(data, pos)
+        buttons_list: list[str] = []
+        for _ in range(size):
+            one_buttons, pos = codec.read_str(data, pos)
+            buttons_list.append(one_buttons)
+        buttons = tuple(buttons_list)
+        return cls(kind=kind, text=text, buttons=buttons), pos
+
+    def _check(self, path: str) -> None:
+        codec.check_length(len(self.text.encode()), path + "text", 1, 512)
+        codec.check_length(len(self.buttons), path + "buttons", 1, 12)
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> AskOperator:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "AskOperator")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
 _ServoOpen_2 = Struct(">d")
@@ -4908,6 +5029,68 @@ class ControlChanged:
         self._check("")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolChanged:
+    """The attached tool or workpiece has changed, or was defined again."""
+
+    TYPE: ClassVar[int] = 106
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    tool: ToolInfo | None = None
+    workpiece: ToolInfo | None = None
+
+    def _write(self, out: list[bytes]) -> None:
+        if self.tool is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.tool._write(out)
+        if self.workpiece is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.workpiece._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ToolChanged, int]:
+        present, pos = codec.read_flag(data, pos)
+        tool: ToolInfo | None = None
+        if present:
+            tool, pos = ToolInfo._read(data, pos)
+        present, pos = codec.read_flag(data, pos)
+        workpiece: ToolInfo | None = None
+        if present:
+            workpiece, pos = ToolInfo._read(data, pos)
+        return cls(tool=tool, workpiece=workpiece), pos
+
+    def _check(self, path: str) -> None:
+        if self.tool is not None:
+            self.tool._check(path + "tool.")
+        if self.workpiece is not None:
+            self.workpiece._check(path + "workpiece.")
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> ToolChanged:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "ToolChanged")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _SafetyChanged_0 = Struct(">HB")
 
 
@@ -5168,6 +5351,56 @@ class SegmentReached:
         self._check("")
 
 
+_DialogClosed_0 = Struct(">Ii")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DialogClosed:
+    """The operator has answered a dialog."""
+
+    TYPE: ClassVar[int] = 107
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    dialog: int
+    button: int
+    text: str = ""
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_DialogClosed_0.pack(self.dialog, self.button))
+        out.append(codec.put_str(self.text))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[DialogClosed, int]:
+        v = codec.unpack(_DialogClosed_0, data, pos)
+        pos += _DialogClosed_0.size
+        dialog = v[0]
+        button = v[1]
+        text, pos = codec.read_str(data, pos)
+        return cls(dialog=dialog, button=button, text=text), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> DialogClosed:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "DialogClosed")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -5292,7 +5525,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | DialogClosed | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5332,6 +5565,7 @@ MESSAGES: dict[int, type[Message]] = {
     56: ProcessData,
     57: GetDatagramStatistics,
     58: DatagramStatistics,
+    59: AskOperator,
     64: ServoOpen,
     65: ServoJoints,
     66: ServoJointsVelocity,
@@ -5347,11 +5581,13 @@ MESSAGES: dict[int, type[Message]] = {
     98: TriggerFired,
     99: MotionFinished,
     100: ControlChanged,
+    106: ToolChanged,
     101: SafetyChanged,
     102: KeyPressed,
     103: Notice,
     104: ConditionFired,
     105: SegmentReached,
+    107: DialogClosed,
     112: State,
 }
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)

@@ -27,14 +27,15 @@ import heptarm.wire.OrientationType;
 import heptarm.wire.Pose;
 import heptarm.wire.SafetyBits;
 import heptarm.wire.SetSignal;
+import heptarm.wire.Shape;
 import heptarm.wire.ToolInfo;
 
 /** An application on heptarm's core without any network; each step leaves a line that the test reads. */
 public class Alone extends RoboticsAPIApplication {
     private static final Move HOME = Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0);
     private static final ToolInfo GRIPPER = new ToolInfo("gripper", 1.0, new double[] {0, 0, 0.05}, new double[6],
-            new FrameInfo[] {new FrameInfo("tip", Move.pose(0, 0, 0.12)), new FrameInfo("camera", Move.pose(0.05, 0, 0.03))});
-    private static final ToolInfo PIECE = new ToolInfo("piece", 0.5, new double[3], new double[6], new FrameInfo[0]);
+            new FrameInfo[] {new FrameInfo("tip", Move.pose(0, 0, 0.12)), new FrameInfo("camera", Move.pose(0.05, 0, 0.03))}, new Shape[0]);
+    private static final ToolInfo PIECE = new ToolInfo("piece", 0.5, new double[3], new double[6], new FrameInfo[0], new Shape[0]);
 
     @Inject
     private LBR lbr;

@@ -151,7 +151,7 @@ public class Curving extends RoboticsAPIApplication {
     }
 
     private void refusals() {
-        say("two points make no circle", fails(circ(at(0, 50, 0), at(0, 50, 0)), "line"));
+        say("two points make no circle", fails(circ(at(0, 50, 0), at(0, 50, 0)), "apart"));
         say("a batch names the motion that cannot be planned",
                 fails(batch(lin(at(0, 50, 0)), ptp(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0)), "motion 2"));
         boolean empty = false;

@@ -116,6 +116,14 @@ class Operator:
         """
         self.do(f"press {integer(slot, 'slot', 0, 3)} {instance(bar, str, 'bar')}")
 
+    def answer(self, button: int) -> None:
+        """Press a button of the dialog that the smartPAD shows, from 0.
+
+        Raises:
+            CommandRejected: it shows no dialog, or one without that button.
+        """
+        self.do(f"answer {integer(button, 'button', 0, 11)}")
+
     def push(self, force: npt.ArrayLike, *, duration: float) -> None:
         """Push the flange.
 

@@ -1,4 +1,4 @@
-"""The smartPAD: messages, user keys for this program, process data."""
+"""The smartPAD: messages, questions to the operator, user keys for this program, process data."""
 
 from __future__ import annotations
 
@@ -7,13 +7,18 @@ from collections.abc import Callable
 from typing import Literal
 
 from heptarm.arm.link.connection import Connection
-from heptarm.errors import RemoteProtocolError, ShapeError, Timeout
+from heptarm.errors import CommandRejected, RemoteProtocolError, ShapeError, Timeout
 from heptarm.values.arrays import callback as check_callback
-from heptarm.values.arrays import finite, flag, instance, integer, within, word
+from heptarm.values.arrays import finite, flag, instance, integer, shown, within, word
 from heptarm.values.frames import check_name
 from heptarm.wire import messages as wire
 
 _SLOTS = 4
+#: Most buttons of a dialog of Sunrise.
+_MOST_BUTTONS = 12
+#: Longest wait for an answer between two checks of the link [s].
+_CHECK_INTERVAL = 0.2
+_KINDS = {one.name.lower(): one for one in wire.DialogKind}
 _SEVERITIES = {one.name.lower(): one for one in wire.Severity}
 _LEDS = {one.name.lower(): one for one in wire.KeyLed}
 
@@ -30,6 +35,85 @@ class Pad:
         self._connection.request(
             wire.ShowMessage(severity=_SEVERITIES[severity], text=_text(text, "text", 512))
         )
+
+    def ask(
+        self,
+        text: str,
+        *buttons: str,
+        kind: Literal["question", "info", "warning", "error"] = "question",
+        timeout: float = 600.0,
+    ) -> str:
+        """Ask the operator: show a dialog on the smartPAD and wait until one of its buttons is pressed.
+
+        A dialog stays on the smartPAD until somebody presses a button, also when this call has ended before: no program
+        can close it. Its answer is then dropped, and no other dialog can be shown meanwhile. The arm may move beneath
+        it. It is no safety function.
+
+        Args:
+            text: the question, 1 to 512 bytes.
+            buttons: different labels, 1 to 12 of 1 to 64 bytes.
+            kind: what the dialog looks like.
+            timeout: longest wait [s].
+
+        Returns:
+            The label of the pressed button.
+
+        Raises:
+            Timeout: nobody pressed a button in time.
+            ModeConflict: the smartPAD still shows another dialog; the text has it.
+            ConnectionLost: the connection has ended.
+            NotInControl: this client does not control the robot.
+            CommandRejected: this cabinet cannot show dialogs.
+        """
+        labels = _labels(buttons)
+        message = wire.AskOperator(
+            kind=_KINDS[word(kind, "kind", _KINDS)], text=_text(text, "text", 512, least=1), buttons=labels
+        )
+        seconds = within(timeout, "timeout", 0.0, 1e9, unit="s")
+        self._connection.check_may_wait("arm.pad.ask()")
+        closed: queue.SimpleQueue[tuple[int, int, str]] = queue.SimpleQueue()
+
+        def put(number: int, button: int, problem: str) -> None:
+            closed.put((number, button, problem))
+
+        listeners = self._connection.events.dialog_listeners
+        listeners.append(put)
+        try:
+            with self._connection.stopping_on_interrupt():
+                button, problem = self._answer(message, closed, seconds)
+        finally:
+            listeners.remove(put)
+        if not 0 <= button < len(labels):
+            raise CommandRejected(problem or "the smartPAD could not show the dialog", parameter="text")
+        return labels[button]
+
+    def _answer(
+        self, message: wire.AskOperator, closed: queue.SimpleQueue[tuple[int, int, str]], timeout: float
+    ) -> tuple[int, str]:
+        """Send a question and wait for its button, or for what went wrong."""
+        connection, clock = self._connection, self._connection.clock
+        link = connection.link
+        answer = link.request(message, timeout=connection.options.timeout)
+        if not isinstance(answer, wire.Accepted):
+            raise RemoteProtocolError(
+                f"the cabinet answered AskOperator with {type(answer).__name__}, not with Accepted"
+            )
+        deadline = clock.nanos() + round(timeout * 1e9)
+        while True:
+            rest = max(0.0, (deadline - clock.nanos()) * 1e-9)
+            try:
+                number, button, problem = closed.get(timeout=min(rest, _CHECK_INTERVAL))
+            except queue.Empty:
+                if link.error is not None:
+                    raise connection.final_error() or link.error from None
+                if rest <= 0.0:
+                    raise Timeout(
+                        f"nobody pressed a button within {timeout:g} s",
+                        hint="the dialog stays on the smartPAD until somebody does; that answer is dropped",
+                    ) from None
+                continue
+            if number == answer.id:
+                return button, problem
 
     def set_key(
         self,
@@ -143,11 +227,26 @@ class Pad:
         self._connection.request(wire.SetProcessData(name=name, value=text))
 
 
-def _text(text: str, name: str, longest: int) -> str:
-    """A text of limited length. Raises ShapeError."""
-    if len(instance(text, str, name).encode(errors="replace")) > longest:
+def _labels(buttons: tuple[str, ...]) -> tuple[str, ...]:
+    """The labels of a dialog's buttons. Raises ShapeError."""
+    labels = tuple(_text(one, f"buttons[{index}]", 64, least=1) for index, one in enumerate(buttons))
+    if not 1 <= len(labels) <= _MOST_BUTTONS or len(set(labels)) < len(labels):
         raise ShapeError(
-            f"{name} must have at most {longest} bytes, got {len(text.encode(errors='replace'))}",
+            f"buttons must be 1 to {_MOST_BUTTONS} different labels, got {shown(list(labels))}",
+            code=3,
+            parameter="buttons",
+            value=labels,
+            hint='for example arm.pad.ask("Is the part clamped?", "Yes", "No")',
+        )
+    return labels
+
+
+def _text(text: str, name: str, longest: int, *, least: int = 0) -> str:
+    """A text of limited length. Raises ShapeError."""
+    if not least <= len(instance(text, str, name).encode(errors="replace")) <= longest:
+        allowed = f"{least} to {longest}" if least else f"at most {longest}"
+        raise ShapeError(
+            f"{name} must have {allowed} bytes, got {len(text.encode(errors='replace'))}",
             code=3,
             parameter=name,
             value=text,

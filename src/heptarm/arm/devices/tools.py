@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy.typing as npt
+
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError
@@ -20,6 +22,7 @@ from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body
+from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
@@ -65,9 +68,11 @@ class Tooling:
 
     @property
     def known(self) -> dict[str, KnownTool]:
-        """Tools by name: templates that the cabinet reported, and tools that this client defined."""
-        templates = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
-        return templates | self._defined
+        """Tools by name: those that the cabinet reported, and those that this client defined."""
+        reported = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
+        event = self._connection.events.attached
+        latest = {} if event is None or event.tool is None else {event.tool.name: known_tool(event.tool)}
+        return reported | self._defined | latest
 
     @property
     def taught(self) -> dict[str, Pose]:
@@ -94,18 +99,33 @@ class Tooling:
         held = self._workpiece.body.placed(self.on_flange(attached.frame))
         return held if tool is None else tool.body.joined(held)
 
+    def _carried(self) -> tuple[KnownTool | None, Workpiece | KnownTool | None, Pose]:
+        """The attached tool and workpiece as far as they are known, and the frame that holds the workpiece."""
+        attached = self.attached
+        if attached is None:
+            return None, None, _ORIGIN
+        event = self._connection.events.attached
+        held: Workpiece | KnownTool | None = self._workpiece
+        if held is None and event is not None and event.workpiece is not None:
+            held = known_tool(event.workpiece)
+        if held is not None and attached.workpiece != held.name:
+            held = None
+        return self.known.get(attached.tool), held, self.on_flange(attached.frame)
+
     def loaded(self, model: _Model) -> _Model:
         """A model of collisions with the shapes of what is attached, if it has a place for them."""
         if not isinstance(model, CarriesTools):
             return model
-        attached = self.attached
-        tool = None if attached is None else self.known.get(attached.tool)
-        held = self._workpiece
-        if held is not None and (attached is None or attached.workpiece != held.name):
-            held = None
-        at = self.on_flange(FLANGE if attached is None else attached.frame)
+        tool, held, at = self._carried()
         loaded: _Model = model.carrying(tool, held, at=at)
         return loaded
+
+    @property
+    def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
+        """Shapes of what is attached, each with its pose in the flange frame."""
+        tool, held, at = self._carried()
+        own = () if tool is None else tuple((one, one.pose) for one in tool.shapes)
+        return own if held is None else own + tuple((one, at @ one.pose) for one in held.shapes)
 
     # ------------------------------------------------------------------------------- attaching
 
@@ -243,13 +263,23 @@ class Tooling:
             raise unknown(name, "frame", (*frames, BASE, *taught))
         return Pose.from_matrix(forward(self._connection.robot, state.q)) @ frames[name]
 
+    def reached(self, q: npt.ArrayLike, moving: str) -> Pose | None:
+        """Pose of a motion frame in the base at joint positions, shape (7,) [rad]; None: the frame is not known."""
+        tip = (self._flange_frames() or {FLANGE: _ORIGIN}).get(moving)
+        return None if tip is None else Pose.from_matrix(forward(self._connection.robot, q)) @ tip
+
+    @property
+    def fixed(self) -> dict[str, Pose]:
+        """The fixed frames by name, in the base frame: the base itself, and the taught ones."""
+        return {BASE: _ORIGIN} | self.taught
+
     def on_flange(self, name: str) -> Pose:
         """Pose of a frame on the flange in the flange frame; of an unknown one the flange itself."""
         return (self._flange_frames() or {}).get(name, _ORIGIN)
 
     def in_base(self, name: str) -> Pose | None:
         """Pose of a fixed frame in the base: the base itself, or a taught frame; None: it is no fixed one."""
-        return _ORIGIN if name == BASE else self.taught.get(name)
+        return self.fixed.get(name)
 
     def axes(self, frame: str | Pose) -> Callable[[Pose], Pose]:
         """A function that returns a frame's pose in the base, by the pose of the flange.

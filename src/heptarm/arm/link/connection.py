@@ -143,6 +143,8 @@ class Events:
 
     Attributes:
         key_listeners: called with (slot, pressed) of each user key of the smartPAD.
+        attached: the cabinet's last report on tool and workpiece; None: nothing has changed since the connection.
+        dialog_listeners: called with the number, the pressed button and the problem of each closed dialog.
     """
 
     def __init__(self, on_control: Callable[[wire.ControlChanged], None]) -> None:
@@ -152,6 +154,8 @@ class Events:
         self._servo_status: wire.ServoStatus | None = None
         self._fri_changes: dict[int, wire.FriChanged] = {}
         self.key_listeners: list[Callable[[int, bool], None]] = []
+        self.attached: wire.ToolChanged | None = None
+        self.dialog_listeners: list[Callable[[int, int, str], None]] = []
 
     def dispatch(self, message: Message) -> None:
         """Pass an event on to its receiver."""
@@ -169,8 +173,13 @@ class Events:
                     listener(message.slot, message.down)
                 except Exception:  # the link thread has to go on
                     _log.exception("a key callback raised an error")
+        elif isinstance(message, wire.DialogClosed):
+            for closed in list(self.dialog_listeners):
+                closed(message.dialog, message.button, message.text)
         elif isinstance(message, wire.FriChanged):
             self._note_fri(message)
+        elif isinstance(message, wire.ToolChanged):
+            self.attached = message
         elif isinstance(message, wire.ControlChanged):
             self._on_control(message)
         elif isinstance(message, wire.SafetyChanged):
@@ -197,8 +206,9 @@ class Events:
         return sum(program.limit for program in list(self._programs.values()))
 
     def forget_unclaimed(self) -> None:
-        """Drop events of the previous link: its program numbers mean nothing on a new one."""
+        """Drop events of the previous link: they mean nothing on a new one."""
         self._unclaimed.clear()
+        self.attached = None
 
     def lose(self, error: HeptarmError) -> None:
         """End all accepted programs with an error."""
@@ -211,7 +221,7 @@ class Events:
         for program in self._programs.values():
             program.on_fork(error)
         self._programs = {}
-        self.key_listeners = []
+        self.key_listeners, self.dialog_listeners = [], []
 
     def _deliver(self, program: SentProgram, message: Message) -> None:
         if isinstance(message, wire.MotionFinished):

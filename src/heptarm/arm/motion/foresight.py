@@ -15,7 +15,7 @@ import numpy as np
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
-from heptarm.arm.motion.program import with_kept_joints
+from heptarm.arm.motion.program import resolved
 from heptarm.arm.translate.motions import items
 from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
 from heptarm.model.batch import forward_batch
@@ -141,7 +141,7 @@ class Foresight:
             start = self._rest()
         else:
             robot.check(start, "start")
-        motions = with_kept_joints(self._connection, tuple(motions), start)
+        motions = resolved(self._connection, tooling, tuple(motions), start)
         items(motions, robot, ceiling)
         tooling.check(motions, None)
         program = self._planned(motions, start, ceiling, step)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from heptarm.errors import require
+from heptarm.io.plan_box import PlanOutline, hand_over
 from heptarm.record import plot as plots
 from heptarm.values.arrays import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision
@@ -229,12 +230,22 @@ class ProgramPreview(Value):
         spans = np.ptp(points, axis=0)
         axes.set_box_aspect(np.maximum(spans, max(float(spans.max()), 1.0) * 0.2))
 
-    def show(self) -> Path:
-        """Open the figure of `plot` in the web browser; returns the page's file, which stays.
+    def outline(self) -> PlanOutline:
+        """What a panel shows of it."""
+        touches = np.array([one.t for one in self.collisions], float)
+        return PlanOutline(self.robot.name, self.t, self.q, self.tcp[:, :3], touches)
+
+    def show(self) -> Path | None:
+        """Show it: as a ghost of the arm in an open panel of this user, otherwise as a figure in the web browser.
+
+        Returns:
+            The page of the figure, a file that stays; None: a panel shows it.
 
         Raises:
-            MissingExtra: matplotlib is not installed.
+            MissingExtra: no panel is open, and matplotlib is not installed.
         """
+        if hand_over(self.outline()):
+            return None
         folder = Path(tempfile.mkdtemp(prefix="heptarm-preview-"))
         page = plots.save(self.plot(), folder / "preview.html")
         webbrowser.open(page.as_uri())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isinf
 
 import numpy as np
@@ -14,16 +14,21 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import BreakRule, MotionHandle
 from heptarm.arm.translate.conditions import condition_message, reaction_message
 from heptarm.arm.translate.modes import mode_message
-from heptarm.arm.translate.motions import items
+from heptarm.arm.translate.motions import in_base, items
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError
 from heptarm.values.arrays import Array
 from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
 from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.circle import Circ, circle_through
+from heptarm.values.motion.line import Lin
 from heptarm.values.motion.motion import Hold, Motion, triggers_of
-from heptarm.values.motion.ptp import Ptp
+from heptarm.values.motion.ptp import Ptp, PtpPose
+from heptarm.values.motion.spline import JointSpline, Segment, Spline
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
+from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
 _WHEN = {"queue": wire.When.QUEUE, "replace": wire.When.REPLACE, "reject": wire.When.REJECT}
@@ -57,45 +62,111 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
     return tuple(motions)
 
 
-def with_kept_joints(
-    connection: Connection, motions: tuple[Motion, ...], start: Array | None = None
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a motion starts, as far as it is known: its joint positions, or the pose of a motion frame.
+
+    Attributes:
+        q: set-point of the joints, shape (7,) [rad].
+        pose: of the motion frame `moving`, in the base.
+        moving: its name.
+    """
+
+    q: Array | None = None
+    pose: Pose | None = None
+    moving: str = ""
+
+    def behind(self, motion: Motion) -> _Place:
+        """Where a motion that starts here ends."""
+        if isinstance(motion, Hold):
+            return self
+        if isinstance(motion, Ptp):
+            return _Place(motion.q)
+        if isinstance(motion, JointSpline):
+            return _Place(motion.points[-1].q)
+        if isinstance(motion, PtpPose | Lin | Circ):
+            return _Place(pose=_end(motion), moving=motion.moving)
+        if isinstance(motion, Spline):
+            return _Place(pose=_end(motion.segments[-1]), moving=motion.moving)
+        return _Place()
+
+    def seen(self, moving: str, tooling: Tooling) -> Pose | None:
+        """Pose of a motion frame here; None: not known."""
+        if self.q is not None:
+            return tooling.reached(self.q, moving)
+        return self.pose if self.moving == moving else None
+
+
+def _end(motion: PtpPose | Segment) -> Pose:
+    return motion.end if isinstance(motion, Circ) else motion.target
+
+
+def resolved(
+    connection: Connection, tooling: Tooling, motions: tuple[Motion, ...], start: Array | None = None
 ) -> tuple[Motion, ...]:
-    """The motions with a number for every joint that a PTP keeps: its set-point when the PTP starts.
+    """The motions with numbers for what depends on the arm: poses in the base, and joints that a PTP keeps.
+
+    Where the start of an arc is known, its points are checked.
 
     Args:
         connection: to the cabinet.
+        tooling: the attached tool and its frames.
         motions: in their order.
         start: set-point when the first one starts, shape (7,) [rad]; None: the present one.
 
     Raises:
-        CommandRejected: the set-point is not known yet: another motion runs, or one to a pose or home comes before.
+        CommandRejected: a set-point is not known yet: another motion runs, or one to a pose or home comes before. Or
+            poses in no fixed frame, or points of an arc that define no circle.
         StaleState: the newest state is too old, or lacks the joints.
     """
-    if not any(isinstance(one, Ptp) and one.keeps for one in motions):
-        return motions
-    known = start
-    if start is None:
-        state = connection.fresh()
-        moves = state.motion is not None and (state.motion.active or state.motion.queued > 0)
-        known = None if moves else state.q_cmd
+    place = _Place(start)
+    if start is None and any(isinstance(one, Ptp) and one.keeps for one in motions):
+        place = _Place(_rest(connection, connection.fresh()))
+    elif start is None and any(isinstance(one, Circ | Spline) for one in motions):
+        newest = connection.newest()
+        place = _Place(None if newest is None or newest.groups.joints is None else _rest(connection, newest))
     made: list[Motion] = []
-    for index, one in enumerate(motions):
-        if isinstance(one, Ptp) and one.keeps:
-            if known is None:
-                raise CommandRejected(
-                    f"motions[{index}] keeps joints (NaN) whose set-points are not known yet",
-                    parameter=f"motions[{index}].q",
-                    hint="wait until the arm rests, or give all seven joints",
-                )
-            made.append(replace(one, q=np.where(np.isnan(one.q), known, one.q)))
-        else:
-            made.append(one)
-        last = made[-1]
-        if isinstance(last, Ptp):
-            known = last.q
-        elif not isinstance(last, Hold):
-            known = None
+    for index, motion in enumerate(motions):
+        with _named(f"motions[{index}]." if len(motions) > 1 else ""):
+            one = in_base(motion, tooling.taught)
+            if isinstance(one, Ptp) and one.keeps:
+                one = _with_kept(one, place.q, index)
+            elif isinstance(one, Circ | Spline):
+                _check_arcs(one, place.seen(one.moving, tooling))
+        place = place.behind(one)
+        made.append(one)
     return tuple(made)
+
+
+def _rest(connection: Connection, state: State) -> Array | None:
+    """The joints' set-points in a state, shape (7,) [rad]; None: a program has not ended, or nothing is known."""
+    moves = state.motion is not None and (state.motion.active or state.motion.queued > 0)
+    if moves or connection.events.pending() > 0 or np.isnan(state.q_cmd).any():
+        return None
+    return state.q_cmd
+
+
+def _with_kept(motion: Ptp, known: Array | None, index: int) -> Ptp:
+    if known is None:
+        raise CommandRejected(
+            f"motions[{index}] keeps joints (NaN) whose set-points are not known yet",
+            parameter="q",
+            hint="wait until the arm rests, or give all seven joints",
+        )
+    return replace(motion, q=np.where(np.isnan(motion.q), known, motion.q))
+
+
+def _check_arcs(motion: Circ | Spline, start: Pose | None) -> None:
+    """Refuse arcs, also segments of a spline, whose points define no circle."""
+    if isinstance(motion, Circ):
+        if start is not None:
+            circle_through(start, motion.via, motion.end)
+        return
+    for index, one in enumerate(motion.segments):
+        if isinstance(one, Circ) and start is not None:
+            with _named(f"segments[{index}]."):
+                circle_through(start, one.via, one.end)
+        start = _end(one)
 
 
 def _text(value: object) -> str:

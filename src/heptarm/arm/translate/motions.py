@@ -6,7 +6,7 @@ motion type; a new motion type whose fields are those of its message needs none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import singledispatch
 from math import isinf, nan
@@ -15,15 +15,18 @@ from typing import Any
 import numpy as np
 
 from heptarm.arm.translate.fields import NAMES, frame_message, hints, message_of
-from heptarm.errors import HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.model.inverse_kinematics import redundancy
-from heptarm.values.arrays import Array, within
+from heptarm.values.arrays import Array, shown, within
+from heptarm.values.frames import BASE
+from heptarm.values.motion.circle import Circ
 from heptarm.values.motion.dynamics import DynamicMotion, Dynamics
 from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.line import LinRel
+from heptarm.values.motion.line import Lin, LinRel
 from heptarm.values.motion.motion import Hold, Motion
-from heptarm.values.motion.ptp import Ptp
-from heptarm.values.motion.spline import JointSpline, Segment, Spl, Spline
+from heptarm.values.motion.ptp import Ptp, PtpPose
+from heptarm.values.motion.spline import JointSpline, Segment, Spl, Spline, placed
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
@@ -79,6 +82,33 @@ def _item(
     return wire.Item(motion=message, frame=frame, mode=mode, until=until)
 
 
+def in_base(motion: Motion, frames: Mapping[str, Pose]) -> Motion:
+    """The motion with its poses in the base; messages have no others.
+
+    Args:
+        motion: any; an offset keeps its axes, which the cabinet knows.
+        frames: taught frames in the base, by name.
+
+    Raises:
+        CommandRejected: its frame is no fixed one.
+    """
+    if not isinstance(motion, PtpPose | Lin | Circ | Spline) or motion.frame == BASE:
+        return motion
+    name = motion.frame
+    if name not in frames:
+        listed = ", ".join((BASE, *frames))
+        raise CommandRejected(
+            f"frame of a target must be one of {listed}, got {shown(name)}",
+            code=42,
+            parameter="frame",
+            value=name,
+            allowed=listed,
+            hint="the process data heptarm.frames names the taught frames that clients know; for a frame on the arm "
+            "use lin_rel(...), or give its present pose: frame=arm.pose(...)",
+        )
+    return placed(motion, frames[name])
+
+
 #: Attributes of motions and segments that are poses.
 _POSES = ("target", "offset", "via", "end")
 #: No arm with its tool reaches as far; nearer poses are left to the cabinet's planner [m].
@@ -93,6 +123,8 @@ def _check_distance(xyz: Array, name: str) -> None:
 
 def _message(name: str, motion: Motion | Segment, robot: RobotModel) -> Any:
     kind = NAMES[name]
+    if isinstance(motion, PtpPose | Lin | Circ | Spline):
+        motion = in_base(motion, {})  # a message's poses are in the base
     for field in _POSES:
         if (pose := getattr(motion, field, None)) is not None:
             _check_distance(pose.xyz, field)

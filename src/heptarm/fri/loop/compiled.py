@@ -338,7 +338,7 @@ class LawTrial:
         shown.tau_ext, shown.wrench = np.zeros(7), np.zeros(6)
         if tau_ext is not None:
             shown.tau_ext = tau_ext
-            shown.wrench = self._estimator.wrench(shown.q.tolist(), shown.tau_ext.tolist())
+            shown.wrench = self._estimator.wrench(np.asarray(q).tolist(), np.asarray(tau_ext).tolist())
         if q_ipo is not None or self.t == 0.0:
             shown.q_ipo = q if q_ipo is None else q_ipo
         shown.t, shown.dt = self.t, self._dt

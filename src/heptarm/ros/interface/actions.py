@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import queue
+import threading
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -56,6 +57,8 @@ _LAST, _MAX_TAUGHT = "last", 100
 _TOLERANCE = 2e-3
 #: How long a cancelled motion may take to end [s].
 _BRAKING_TIMEOUT = 10.0
+#: Default of the longest wait for the operator's answer [s].
+_DIALOG_TIMEOUT = 600.0
 #: Defaults of waiting for taps: count, force [N], gap [s], timeout [s].
 _TAPS, _TAP_FORCE, _TAP_GAP, _TAP_TIMEOUT = 2, 8.0, 1.0, 60.0
 
@@ -76,13 +79,13 @@ def move_pose(context: NodeContext, goal: Any) -> GoalWork:
         how["speed_mps"] = goal.speed_mps
     if goal.path == motions.LIN_REL:
         return _move(context, goal, motions.offset(goal.pose, how))
-    pose = motions.stamped_pose(goal.pose, context.base)
+    pose = motions.stamped_pose(goal.pose, context.driver)
     if goal.path == motions.PTP:
         return _move(context, goal, ptp(pose, moving=moving))
     if goal.path == motions.LIN:
         return _move(context, goal, lin(pose, **how))
     if goal.path == motions.CIRC:
-        return _move(context, goal, circ(motions.stamped_pose(goal.via, context.base), pose, **how))
+        return _move(context, goal, circ(motions.stamped_pose(goal.via, context.driver), pose, **how))
     raise CommandRejected(
         f"path must be 0 (PTP), 1 (LIN), 2 (CIRC) or 3 (LIN_REL), got {goal.path}",
         parameter="path",
@@ -502,6 +505,39 @@ def _wait_for_taps(
     return ActionResult(GoalOutcome.ABORTED, f"not tapped {count} times within {timeout:g} s")
 
 
+def ask(context: NodeContext, goal: Any) -> GoalWork:
+    """Ask the operator at the smartPAD."""
+    return partial(_ask, context, goal)
+
+
+def _ask(context: NodeContext, goal: Any, client: GoalClient) -> ActionResult:
+    buttons = tuple(goal.buttons)
+    answers: queue.SimpleQueue[str | HeptarmError] = queue.SimpleQueue()
+
+    def wait() -> None:
+        try:
+            how: dict[str, Any] = {
+                "kind": goal.kind or "question",
+                "timeout": goal.timeout or _DIALOG_TIMEOUT,
+            }
+            answers.put(context.arm.pad.ask(goal.text, *buttons, **how))
+        except HeptarmError as error:
+            answers.put(error)
+
+    threading.Thread(target=wait, name="heptarm-ask", daemon=True).start()
+    while True:
+        try:
+            answer = answers.get(timeout=FEEDBACK_PERIOD)
+        except queue.Empty:
+            if client.is_cancel_requested():
+                text = "cancelled; the dialog stays on the smartPAD until somebody presses a button"
+                return ActionResult(GoalOutcome.CANCELED, text, {"button": -1})
+            continue
+        if isinstance(answer, str):
+            return ActionResult(GoalOutcome.SUCCEEDED, answer, {"button": buttons.index(answer)})
+        return ActionResult(GoalOutcome.ABORTED, str(answer), {"button": -1})
+
+
 #: All actions except trajectories.
 ACTIONS = (
     RosAction("~/move_joints", "heptarm_msgs/MoveJoints", move_joints),
@@ -510,6 +546,7 @@ ACTIONS = (
     RosAction("~/run_program", "heptarm_msgs/RunProgram", run_program),
     RosAction("~/touch", "heptarm_msgs/Touch", touch),
     RosAction("~/wait_for_taps", "heptarm_msgs/WaitForTaps", wait_for_taps),
+    RosAction("~/ask", "heptarm_msgs/Ask", ask),
     RosAction("~/guide", "heptarm_msgs/Guide", guide),
     RosAction("~/teach", "heptarm_msgs/Teach", teach),
     RosAction("~/replay", "heptarm_msgs/Replay", replay),

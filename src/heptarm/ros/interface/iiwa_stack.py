@@ -123,7 +123,7 @@ def command_line(context: NodeContext, message: Any) -> None:
 
 def _go_to_pose(context: NodeContext, message: Any, *, straight: bool) -> None:
     settings = context.iiwa_stack
-    pose = stamped_pose(message, context.base)
+    pose = stamped_pose(message, context.driver)
     _go(context, pose, straight=straight, moving=settings.moving, offset=settings.offset)
 
 
@@ -391,7 +391,7 @@ def move_along_spline(context: NodeContext, goal: Any) -> GoalWork:
 
 def _target(context: NodeContext, message: Any) -> tuple[Pose, Redundancy | None]:
     """Read an iiwa_msgs/CartesianPose, and its redundancy if neither Status nor Turn is negative."""
-    pose = stamped_pose(message.poseStamped, context.base)
+    pose = stamped_pose(message.poseStamped, context.driver)
     redundancy = message.redundancy
     if redundancy.status < 0 or redundancy.turn < 0:
         return pose, None

@@ -128,21 +128,37 @@ def pose_of(message: Any) -> Pose:
     return Pose.of((place.x, place.y, place.z), quat if any(quat) else (0.0, 0.0, 0.0, 1.0))
 
 
-def stamped_pose(message: Any, base: str) -> Pose:
-    """Convert a geometry_msgs/PoseStamped in the base.
+def stamped_pose(message: Any, driver: Driver) -> Pose:
+    """Convert a geometry_msgs/PoseStamped to a pose in the base.
 
     Args:
-        message: the message.
-        base: name of the base frame.
+        message: the message; in the base, or in a taught frame of the project.
+        driver: of the arm.
 
     Raises:
         ShapeError: it is in another frame, or its quaternion is not a rotation.
     """
-    frame = message.header.frame_id.lstrip("/")
-    if frame not in ("", base):
-        raise ShapeError(f"frame of the pose must be {base!r}, got {frame!r}", hint="transform it with tf")
     place, turn = message.pose.position, message.pose.orientation
-    return Pose.of([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
+    pose = Pose.of([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
+    frame = _frame(message.header, driver)
+    return pose if frame is None else frame @ pose
+
+
+def _frame(header: Any, driver: Driver) -> Pose | None:
+    """Pose in the base of the frame that a header names; None: it is the base itself."""
+    name = header.frame_id.lstrip("/")
+    base = driver.configuration.frame("base")
+    if name in ("", base):
+        return None
+    taught = {one.lstrip("/"): pose for one, pose in driver.arm.frames.items()}
+    if name not in taught:
+        raise ShapeError(
+            f"frame of the pose must be one of {', '.join((base, *driver.arm.frames))}, got {name!r}",
+            parameter="frame_id",
+            value=name,
+            hint="transform it with tf",
+        )
+    return taught[name]
 
 
 def joint_points(driver: Driver, names: Sequence[str], values: Sequence[float]) -> list[Array]:
@@ -209,15 +225,16 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
     if len(message.redundancy):
         near["redundancy"] = _redundancy(message.redundancy)
     if kind == PTP:
-        target = _pose(driver, message.pose)
+        target = stamped_pose(message.pose, driver)
         return ptp(target, moving=moving, **near, **plain, **blending)
     how: dict[str, Any] = {**_given(message, _PATH), **joints, **blending, "moving": moving}
     if message.orientation:
         how["orientation"] = message.orientation
     if kind == LIN:
-        return lin(_pose(driver, message.pose), **near, **how)
+        return lin(stamped_pose(message.pose, driver), **near, **how)
     if kind == CIRC:
-        return circ(pose_of(message.via), _pose(driver, message.pose), **near, **how)
+        via, frame = pose_of(message.via), _frame(message.pose.header, driver)
+        return circ(via if frame is None else frame @ via, stamped_pose(message.pose, driver), **near, **how)
     if kind == LIN_REL:
         return offset(message.pose, how)
     raise CommandRejected(f"kind of {name} must be 0 to {GUIDE}, got {kind}", parameter="kind", value=kind)
@@ -256,10 +273,6 @@ def segment_of(message: Any) -> Segment:
         parameter="kind",
         value=message.kind,
     )
-
-
-def _pose(driver: Driver, message: Any) -> Pose:
-    return stamped_pose(message, driver.configuration.frame("base"))
 
 
 def guiding(message: Any) -> Motion:

@@ -91,12 +91,12 @@ def command_joint(context: NodeContext, message: Any) -> None:
 
 def command_pose(context: NodeContext, message: Any) -> None:
     """Move to a geometry_msgs/PoseStamped."""
-    context.driver.start(ptp(stamped_pose(message, context.base)))
+    context.driver.start(ptp(stamped_pose(message, context.driver)))
 
 
 def command_lin(context: NodeContext, message: Any) -> None:
     """Move on a straight line to a geometry_msgs/PoseStamped."""
-    context.driver.start(lin(stamped_pose(message, context.base)))
+    context.driver.start(lin(stamped_pose(message, context.driver)))
 
 
 def joint_trajectory(context: NodeContext, message: Any) -> None:
@@ -125,12 +125,12 @@ def servo_velocity(context: NodeContext, message: Any) -> None:
 
 def servo_pose(context: NodeContext, message: Any) -> None:
     """Follow a geometry_msgs/PoseStamped."""
-    context.driver.follow(stamped_pose(message, context.base))
+    context.driver.follow(stamped_pose(message, context.driver))
 
 
 def servo_lin(context: NodeContext, message: Any) -> None:
     """Follow a geometry_msgs/PoseStamped on straight lines."""
-    context.driver.follow(stamped_pose(message, context.base), straight=True)
+    context.driver.follow(stamped_pose(message, context.driver), straight=True)
 
 
 def servo_twist(context: NodeContext, message: Any) -> None:
@@ -225,7 +225,7 @@ def fri_wrench(context: NodeContext, message: Any) -> None:
 
 def fri_pose(context: NodeContext, message: Any) -> None:
     """Command the pose of the flange in the base by a geometry_msgs/PoseStamped."""
-    context.driver.fri.command(pose=stamped_pose(message, context.base))
+    context.driver.fri.command(pose=stamped_pose(message, context.driver))
 
 
 _JOINTS, _POSE = "sensor_msgs/JointState", "geometry_msgs/PoseStamped"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import acos, cos, pi, sin
+from math import acos, cos, sin
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
+from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import Vec, flange
 from heptarm.sim.planning.command import PlanError
 from heptarm.values.arrays import Array
+from heptarm.values.motion.circle import arc_of
 from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose, multiply, quaternion
 from heptarm.values.robot import RobotModel
@@ -130,10 +132,6 @@ def blend_weight(sigma: float) -> float:
     return rest * rest * rest / 0.75
 
 
-#: Three points whose triangle has a side shorter than this [m], or is flatter than this, define no circle.
-_SHORT, _FLAT = 1e-6, 1e-4
-
-
 class Arc:
     """Arc from one point through another to a third, in phase with s.
 
@@ -154,29 +152,17 @@ class Arc:
     """
 
     def __init__(self, start: Array, via: Array, end: Array) -> None:
-        a, b = via - start, end - start
-        normal = np.cross(a, b)
-        sides = (np.linalg.norm(a), np.linalg.norm(b), np.linalg.norm(end - via))
-        area = float(np.linalg.norm(normal))
-        if min(sides) < _SHORT or area < _FLAT * float(sides[0] * sides[1]):
-            raise PlanError(
-                "planning",
-                "Can not plan motion: start, auxiliary point and end of the circle coincide or lie on a line; "
-                "choose an auxiliary point beside the line from start to end",
-            )
-        # centre of the circumcircle, relative to the start
-        to_centre = (np.cross(normal, a) * (b @ b) + np.cross(b, normal) * (a @ a)) / (2 * area * area)
-        self.axis = normal / area
-        spoke = -to_centre
-        across = np.cross(self.axis, spoke)
-        last = end - start - to_centre
-        self.sweep = float(np.arctan2(last @ across, last @ spoke)) % (2 * pi)
-        self.radius = float(np.linalg.norm(spoke))
-        self.length = self.radius * self.sweep
+        try:
+            circle = arc_of(start, via, end)
+        except CommandRejected as error:
+            raise PlanError("planning", f"Can not plan motion: {error.text}") from None
+        spoke = start - circle.centre
+        self.axis, self.sweep, self.radius = circle.normal, circle.angle, circle.radius
+        self.length = circle.length
         self.angle = 0.0
-        self._centre: Vec = tuple((start + to_centre).tolist())
+        self._centre: Vec = tuple(circle.centre.tolist())
         self._spoke: Vec = tuple(spoke.tolist())
-        self._across: Vec = tuple(across.tolist())
+        self._across: Vec = tuple(np.cross(circle.normal, spoke).tolist())
         self._turn: OrientationPath | None = None
         self._follows = False
 

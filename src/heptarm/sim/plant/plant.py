@@ -19,6 +19,7 @@ from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.planning.command import TICK
+from heptarm.sim.plant.carried import CarriedShapes, FlangeShapes
 from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
@@ -165,7 +166,7 @@ class Plant:
     ) -> None:
         self.robot: RobotModel = robot(model)
         self._errors = errors
-        self.model = compiled(model, boxes, scene)
+        self.model = compiled(model, boxes, scene, room=True)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
@@ -176,9 +177,8 @@ class Plant:
         self._load = ExternalLoad(self.model, self.data)
         bare = compiled(model) if is_mounted(self.model) else None
         self._payload = PayloadModel(self.model, self.data, self._mass, bare)
-        self._payloads: deque[tuple[Callable[[Body], None], Body]] = (
-            deque()
-        )  # to take effect in the next tick
+        self._mounted = FlangeShapes(self.model)
+        self._changes: deque[Callable[[], None]] = deque()  # of what is carried; made before the next tick
         self._control = ActiveLaw(self.robot, self.model, self.data)
         self.signals = IoImage(self.shared.signals)
         self._gripper: SimulatedGripper | None = None
@@ -309,17 +309,23 @@ class Plant:
 
     def set_load_data(self, load: Body) -> None:
         """Declare the load data of the controller; also the true payload, unless `set_payload` sets another one."""
-        self._payloads.append((self._payload.declare, load))
+        self._changes.append(lambda: self._payload.declare(load))
 
     def set_payload(self, load: Body) -> None:
         """Set the true payload on the flange; declared load data do not change it any more."""
-        self._payloads.append((self._payload.set_true, load))
+        self._changes.append(lambda: self._payload.set_true(load))
+
+    def carry(self, bodies: Sequence[CarriedShapes]) -> None:
+        """Mount the shapes of tool and workpiece on the flange, in place of those before; they collide.
+
+        Where the scene has a tool on the flange, it stays there alone.
+        """
+        self._changes.append(lambda: self._mounted.mount(bodies))
 
     def _take_loads(self) -> None:
         payload, sensed = self._payload, self._sensed
-        while self._payloads:
-            take, load = self._payloads.popleft()
-            take(load)
+        while self._changes:
+            self._changes.popleft()()
         sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
         if self._native is not None:
             self._native.believe(payload.mass, payload.bias, is_misjudged=payload.differs)
@@ -358,7 +364,7 @@ class Plant:
     def tick(self) -> None:
         """Advance by one millisecond: set-point, control law, dynamics, state."""
         m, d, interpolator = self.model, self.data, self.interpolator
-        if self._payloads:
+        if self._changes:
             self._take_loads()
         progress, remaining = self._advance()
         if self._gripper is not None:

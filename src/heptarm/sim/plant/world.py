@@ -10,7 +10,7 @@ from pathlib import Path
 import mujoco
 
 from heptarm.sim.plant.appearance import ArmMeshes, undress
-from heptarm.sim.plant.carried import CarriedShapes
+from heptarm.sim.plant.carried import CarriedShapes, make_room
 from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
 from heptarm.values.robot import robot
 
@@ -82,10 +82,18 @@ def compiled(
     scene: Scene | None = None,
     meshes: ArmMeshes | None = None,
     carried: Sequence[CarriedShapes] = (),
+    *,
+    room: bool = False,
 ) -> mujoco.MjModel:
     """MuJoCo's model of a robot among boxes and in a scene, see `specification`; its first seven joints are the arm's.
 
-    Where a scene has a tool, that one is on the flange: the shapes of another tool are left out.
+    Args:
+        model: name of the robot.
+        boxes: fixed boxes around it.
+        scene: what else is around it and on its flange; None: nothing.
+        meshes: see `specification`.
+        carried: what is on the flange. Where a scene has a tool, that one is there: the shapes of another are left out.
+        room: whether shapes can be mounted later, see `heptarm.sim.plant.carried.FlangeShapes`.
 
     Raises:
         ValueError: the file of the scene is not in MuJoCo's format.
@@ -97,6 +105,8 @@ def compiled(
     for one in carried:
         if not (one.is_tool and has_tool):
             one.add_to(spec)
+    if room and not has_tool:
+        make_room(spec)
     for number, box in enumerate(boxes):
         spec.worldbody.add_geom(
             name=f"box {number}",

@@ -15,7 +15,7 @@ from dataclasses import fields, replace
 from enum import IntEnum
 from functools import partial
 from math import isnan
-from typing import Any
+from typing import Any, cast
 
 import jpype
 import jpype.nio
@@ -27,6 +27,7 @@ from heptarm.sim import seam
 from heptarm.sim.fri.io import SessionSignal
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.planning.command import ConditionWatch, Order, PlanError, Seven
+from heptarm.sim.plant.carried import CarriedShapes
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.project import Project
 from heptarm.values.frames import TOOL
@@ -37,6 +38,7 @@ from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body
+from heptarm.values.shape import Shape, ShapeKind
 
 log = logging.getLogger("heptarm.sim")
 
@@ -322,6 +324,24 @@ class JavaPlant:
         given = seam.AttachedLoad.decode(bytes(load.encode()))
         self._plant.set_load_data(Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia)))
 
+    def setCarriedBodies(self, carried: Any) -> None:
+        """Set the shapes of everything attached to the flange."""
+        given = seam.CarriedBodies.decode(bytes(carried.encode()))
+        self._plant.carry(
+            [
+                CarriedShapes(one.name, tuple(map(_shape, one.shapes)), _pose(one.pose), is_tool=one.is_tool)
+                for one in given.bodies
+            ]
+        )
+
+
+def _shape(one: seam.BodyShape) -> Shape:
+    return Shape(cast("ShapeKind", one.kind.name.lower()), np.array(one.size), _pose(one.pose))
+
+
+def _pose(numbers: Sequence[float]) -> Pose:
+    return Pose.of(numbers[:3], numbers[3:])
+
 
 def java_memory() -> dict[str, int]:
     """Used bytes of the heap, and number of threads of Java."""
@@ -331,7 +351,7 @@ def java_memory() -> dict[str, int]:
 
 
 #: Methods whose errors concern their argument; those of the others concern the state of the plant.
-_ARGUMENT_ERRORS = ("setAttachedLoad",)
+_ARGUMENT_ERRORS = ("setAttachedLoad", "setCarriedBodies")
 
 
 def _carry_out(calls: Any, plant: JavaPlant) -> None:

@@ -119,7 +119,7 @@ def frames(arm: Arm) -> None:
     arm.wait_for_rest()
     offset = arm.pose(reference=name).xyz - before.xyz
     near(offset, (0.04, 0.02, 0.0), _PLACE, f"offset in the axes of {name}", unit="m")
-    arm.move(lin(arm.frames[name] @ before, speed_mps=0.2))
+    arm.move(lin(before, frame=name, speed_mps=0.2))
     near_pose(arm, start, f"back, by a target in {name}")
 
 

@@ -65,7 +65,7 @@ def circle(arm: Arm) -> None:
 
 @scenario(line=1, rows="C10 C11 C12", needs=("circ",))
 def arcs(arm: Arm) -> None:
-    """Arcs by centre, plane and angle, in three planes and an oblique one; an arc without a radius is refused."""
+    """Arcs by centre, plane and angle, in three planes and an oblique one; points that define no arc are refused."""
     from heptarm.errors import CommandRejected
 
     planes: tuple[str | tuple[float, float, float], ...] = ("xy", "xz", "yz", (1.0, 1.0, 1.0))
@@ -85,6 +85,12 @@ def arcs(arm: Arm) -> None:
     try:
         arc(start, 1.0, centre=start.xyz)
         holds(False, "an arc about itself is refused")
+    except CommandRejected as error:
+        note(error.text)
+    middle, end = _moved(start, 0.0, 0.03, 0.0), _moved(start, 0.0, 0.06, 0.0)
+    try:
+        arm.move([lin(start), circ(middle, end)])
+        holds(False, "an arc along a line is refused")
     except CommandRejected as error:
         note(error.text)
 

@@ -135,6 +135,37 @@ def keys(arm: Arm) -> None:
         note(error.text)
 
 
+@scenario(line=7, rows="J9", risk=Risk.STILL, operator=True, needs=("dialogs",))
+def dialog(arm: Arm) -> None:
+    """A dialog at the smartPAD: the operator's button is the answer; nobody else closes it."""
+
+    def press(_: object) -> bool:
+        try:
+            arm.operator.answer(1)
+        except HeptarmError:
+            return False
+        return True
+
+    presses = threading.Thread(target=lambda: arm.wait_until(press, timeout=_PATIENCE))
+    presses.start()
+    holds(
+        arm.pad.ask("Is the part clamped?", "Yes", "No", timeout=_PATIENCE) == "No",
+        "the second button was pressed",
+    )
+    presses.join()
+    try:
+        arm.pad.ask("Is anybody there?", "Yes", "No", timeout=0.1)
+        holds(False, "nobody answers")
+    except HeptarmError as error:
+        note(error.text)
+    try:
+        arm.pad.ask("And now?", "Yes")
+        holds(False, "another dialog is refused meanwhile")
+    except HeptarmError as error:
+        note(error.text)
+    arm.wait_until(press, timeout=_PATIENCE)
+
+
 @scenario(line=7, rows="J8", risk=Risk.STILL)
 def message(arm: Arm) -> None:
     """The smartPAD's log shows a text; a text that is too long is refused."""

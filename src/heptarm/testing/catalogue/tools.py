@@ -9,14 +9,20 @@ from heptarm.arm.arm import Arm
 from heptarm.errors import CommandRejected
 from heptarm.testing.measure import Unfit, above, baseline, fresh, holds, near, watch
 from heptarm.testing.scenario import Risk, scenario
+from heptarm.testing.stage import TABLE
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import hold
 from heptarm.values.pose import Pose, deg
+from heptarm.values.shape import capsule
 from heptarm.values.tool import Tool, Workpiece
+from heptarm.when import force
 
 _TIP = Pose.xyz_abc(0.03, 0.0, 0.12, *deg(0, 90, 0))
 _GRIPPER = Tool(
     "scenario-gripper", mass=1.5, com=(0.0, 0.0, 0.06), tcp=_TIP, frames={"pad": Pose.at(0.0, 0.04, 0.1)}
+)
+_PROBE = Tool(
+    "scenario-probe", tcp=Pose.at(0.0, 0.0, 0.15), shapes=[capsule(0.01, 0.13, at=Pose.at(0.0, 0.0, 0.075))]
 )
 _PART = Workpiece("scenario-part", mass=1.0, com=(0.0, 0.0, 0.05), frames={"peg": Pose.at(0.0, 0.0, 0.08)})
 
@@ -75,6 +81,29 @@ def load(arm: Arm) -> None:
             near(held.force, seen.force, 0.8, "force", unit="N")
             peg = arm.pose("scenario-part/peg")
             near(peg.xyz, (arm.pose() @ Pose.at(0, 0, 0.08)).xyz, 2e-4, "its own frame", unit="m")
+
+
+@scenario(
+    line=6, rows="I12", virtual=True, risk=Risk.CONTACT, space=0.1, needs=("tools", "lin_rel", "conditions")
+)
+def shapes(arm: Arm) -> None:
+    """The shapes of an attached tool collide: its tip meets the table, the force is felt there, and then it is gone."""
+    height = fresh(arm).pose.z - TABLE
+    if not 0.0 < height - _PROBE.tcp.z < 0.09:
+        raise Unfit("the table is not below the tip of the scenario's tool")
+    contact = force > 8.0
+    with arm.tool(_PROBE):
+        result = arm.move(lin_rel(z=-0.09, frame="base", speed_mps=0.02), until=contact, then="stay")
+        holds(result.stopped_by == contact, "stopped by a contact")
+        arm.wait_for_rest()
+        near(fresh(arm).pose.z, TABLE, 5e-3, "height of the tip", unit="m")
+        watch(arm, 0.3)
+        seen = arm.wrench("tool")
+        above(float(seen.force[2]), 3.0, "force at the tip, upwards", unit="N")
+        near(seen.torque, np.zeros(3), 0.2, "torque at the tip", unit="Nm")
+        arm.move(lin_rel(z=0.05, frame="base", speed_mps=0.1))
+    below = lin_rel(z=-0.06, frame="base", speed_mps=0.1)
+    holds(arm.move(below, until=contact).arrived, "the flange alone meets nothing there")
 
 
 @scenario(line=6, rows="I6 G10", virtual=True, operator=True, risk=Risk.CONTACT, space=0.02, needs=("tools",))

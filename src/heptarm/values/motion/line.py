@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from heptarm.errors import ShapeError
 from heptarm.values.arrays import Array, array, shown
-from heptarm.values.frames import TOOL, check_name
+from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
-from heptarm.values.pose import Pose, Redundancy, check_pose, near_of
+from heptarm.values.pose import Pose, Redundancy, check_pose, given_in, near_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -23,11 +23,12 @@ class Lin(PathMotion):
     """Straight line of the motion frame to a pose.
 
     Attributes:
-        target: pose in the base frame.
+        target: pose in `frame`.
         near: joint positions whose arm angle the target takes, shape (7,) [rad]; None: the current arm angle.
         redundancy: arm angle and Status of the target; given instead of `near`.
         moving: the motion frame.
         orientation: how the orientation changes along the path.
+        frame: the frame of the target: "base", or a taught frame.
     """
 
     target: Pose
@@ -35,11 +36,13 @@ class Lin(PathMotion):
     redundancy: Redundancy | None = None
     moving: str = TOOL
     orientation: Orientation = VARIABLE
+    frame: str = BASE
 
     def __post_init__(self) -> None:
         check_pose(self.target)
         object.__setattr__(self, "near", near_of(self.near, self.redundancy))
         check_name(self.moving, "moving")
+        check_name(self.frame, "frame")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,18 +79,20 @@ def lin(
     moving: str = TOOL,
     orientation: str = "variable",
     reference: str = "base",
+    frame: str | Pose = BASE,
     **limits: Unpack[PathSettings],
 ) -> Lin:
     """Straight line of the motion frame to a pose.
 
     Args:
-        pose: target of the motion frame in the base frame.
+        pose: target of the motion frame, in `frame`.
         near: joint positions whose arm angle the target takes, shape (7,) [rad].
         redundancy: arm angle E1 and Status of the target, instead of `near`.
         moving: the motion frame: "tool" (the tool frame, without a tool the flange), "flange" or the name of a frame.
         orientation: "variable": from the start's to the target's; "constant": the start's; "joint": as the joints turn
             it in a PTP.
-        reference: "base" or "path"; on a straight line both are the same.
+        reference: of the orientation, "base" or "path"; on a straight line both are the same.
+        frame: the frame of the target: "base", the name of a taught frame, or the pose of any frame in the base.
         **limits: as follows.
         dynamics: a `Dynamics`, to share between motions; the keywords below replace its values.
         speed_mps: speed along the path [m/s], up to 10.
@@ -108,12 +113,14 @@ def lin(
         LimitError: a value outside its range.
         CommandRejected: an unknown word, or both `near` and `redundancy`.
     """
+    name, (target,) = given_in(frame, pose)
     return Lin(
-        pose,
+        target,
         near_of(near, redundancy),
         redundancy,
         moving,
         orientation_of(orientation, reference),
+        name,
         **settings("lin", PathSettings, limits),
     )
 

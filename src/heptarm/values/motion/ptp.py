@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.arrays import Array, array
-from heptarm.values.frames import TOOL, check_name
+from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.dynamics import Blended, JointSettings, keywords, settings
-from heptarm.values.pose import Pose, Redundancy, check_pose, deg, near_of
+from heptarm.values.pose import Pose, Redundancy, check_pose, deg, given_in, near_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -55,21 +55,24 @@ class PtpPose(Blended):
     """Point-to-point motion to a pose of the motion frame.
 
     Attributes:
-        target: pose in the base frame.
+        target: pose in `frame`.
         near: joint positions whose arm angle and Status the target keeps, shape (7,) [rad]; None: the current ones.
         redundancy: arm angle, Status and Turn of the target; given instead of `near`.
         moving: the motion frame.
+        frame: the frame of the target: "base", or a taught frame.
     """
 
     target: Pose
     near: Array | None = None
     redundancy: Redundancy | None = None
     moving: str = TOOL
+    frame: str = BASE
 
     def __post_init__(self) -> None:
         check_pose(self.target)
         object.__setattr__(self, "near", near_of(self.near, self.redundancy))
         check_name(self.moving, "moving")
+        check_name(self.frame, "frame")
 
 
 @keywords(JointSettings)
@@ -79,17 +82,19 @@ def ptp(
     near: npt.ArrayLike | None = None,
     redundancy: Redundancy | None = None,
     moving: str = TOOL,
+    frame: str | Pose = BASE,
     **limits: Unpack[JointSettings],
 ) -> Ptp | PtpPose:
     """Point-to-point motion in joint space.
 
     Args:
-        target: joint positions, shape (7,) [rad], or a pose of the motion frame in the base frame. A NaN keeps this
-            joint's set-point, as in `ptp([nan, nan, nan, nan, nan, nan, 0.3])`; `arm.move` refuses it where the
+        target: joint positions, shape (7,) [rad], or a pose of the motion frame in `frame`. A NaN keeps this joint's
+            set-point, as in `ptp([nan, nan, nan, nan, nan, nan, 0.3])`; `arm.move` refuses it where the
             set-point at the start is not known yet: behind a running motion, or one to a pose.
         near: for a pose: joint positions whose arm angle and Status it keeps, shape (7,) [rad].
         redundancy: for a pose: arm angle E1, Status and Turn, instead of `near`.
         moving: for a pose: the motion frame: "tool", "flange" or the name of a frame.
+        frame: of a pose: "base", the name of a taught frame, or the pose of any frame in the base.
         **limits: as follows.
         dynamics: a `Dynamics` with joint limits, to share between motions; the keywords below replace its values.
         speed: fraction of each joint's maximum, (0, 1], one number for all joints or shape (7,).
@@ -107,9 +112,15 @@ def ptp(
     """
     chosen = settings("ptp", JointSettings, limits)
     if isinstance(target, Pose):
-        return PtpPose(target, near_of(near, redundancy), redundancy, moving, **chosen)
+        name, (pose,) = given_in(frame, target)
+        return PtpPose(pose, near_of(near, redundancy), redundancy, moving, name, **chosen)
     check_name(moving, "moving")
-    given = {"near": near is not None, "redundancy": redundancy is not None, "moving": moving != TOOL}
+    given = {
+        "near": near is not None,
+        "redundancy": redundancy is not None,
+        "moving": moving != TOOL,
+        "frame": isinstance(frame, Pose) or check_name(frame, "frame") != BASE,
+    }
     if any(given.values()):
         names = ", ".join(name for name, is_given in given.items() if is_given)
         raise CommandRejected(

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.arrays import Array, Value, array, finite_entries, shown, within
-from heptarm.values.frames import TOOL, check_name
+from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.circle import Circ, normal_of
 from heptarm.values.motion.dynamics import (
     DEFAULT,
@@ -28,8 +28,8 @@ from heptarm.values.motion.dynamics import (
 )
 from heptarm.values.motion.line import Lin
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
-from heptarm.values.motion.ptp import Ptp
-from heptarm.values.pose import Pose, check_pose
+from heptarm.values.motion.ptp import Ptp, PtpPose
+from heptarm.values.pose import Pose, check_pose, given_in
 from heptarm.values.robot import RobotModel
 from heptarm.values.text import described
 
@@ -47,7 +47,7 @@ class Spl(Value):
     """Curved segment of a spline, shaped by its neighbours.
 
     Attributes:
-        target: pose at its end, in the base frame.
+        target: pose at its end, in the frame of the spline.
         orientation: how the orientation changes along the path.
         dynamics: limits along this segment; those not given are the spline's.
     """
@@ -76,13 +76,16 @@ class Spline(DynamicMotion):
     Attributes:
         segments: curves, lines and arcs, 1 to 1000.
         moving: the motion frame.
+        frame: the frame of all poses of the segments: "base", or a taught frame.
     """
 
     segments: tuple[Segment, ...]
     moving: str = TOOL
+    frame: str = BASE
 
     def __post_init__(self) -> None:
         check_name(self.moving, "moving")
+        check_name(self.frame, "frame")
 
     def longest_duration(self, robot: RobotModel) -> float:
         """Slowest plausible estimate of its duration [s]."""
@@ -119,7 +122,7 @@ def spl(pose: Pose, *, orientation: str = "variable", **limits: Unpack[SegmentSe
     """Curved segment of a spline.
 
     Args:
-        pose: its end in the base frame; the curve passes through it.
+        pose: its end in the frame of the spline; the curve passes through it.
         orientation: "variable": it has the pose's orientation there; "constant": it keeps the one before; "ignore": the
             orientations before and after decide.
         **limits: dynamics and speeds along and of the rotation on this segment, see `lin`.
@@ -138,7 +141,11 @@ def spl(pose: Pose, *, orientation: str = "variable", **limits: Unpack[SegmentSe
 
 @keywords(SplineSettings)
 def spline(
-    segments: Sequence[Segment | Pose], *, moving: str = TOOL, **limits: Unpack[SplineSettings]
+    segments: Sequence[Segment | Pose],
+    *,
+    moving: str = TOOL,
+    frame: str | Pose = BASE,
+    **limits: Unpack[SplineSettings],
 ) -> Spline:
     """Smooth curve of the motion frame through poses, with lines and arcs where you give them.
 
@@ -148,6 +155,7 @@ def spline(
         segments: poses, or spl(...), lin(...) and circ(...) for segments with limits of their own; the spline starts
             where the arm is.
         moving: the motion frame, see `lin`.
+        frame: the frame of all poses of the segments, see `lin`.
         **limits: dynamics and speeds, see `lin`; for segments without limits of their own.
 
     Raises:
@@ -155,11 +163,32 @@ def spline(
         LimitError: a value outside its range.
         CommandRejected: a segment has something that a segment cannot have, such as blending or joint limits.
     """
-    return Spline(
+    made = Spline(
         tuple(_segment(one, index) for index, one in enumerate(_listed(segments, "segments"))),
         moving,
+        given_in(frame)[0],
         **settings("spline", SplineSettings, limits),
     )
+    return placed(made, frame) if isinstance(frame, Pose) else made
+
+
+_Aimed = TypeVar("_Aimed", bound=PtpPose | Lin | Circ | Spline | Spl)
+
+
+def placed(motion: _Aimed, frame: Pose) -> _Aimed:
+    """The same motion or segment with its poses in the base.
+
+    Args:
+        motion: with poses in a frame.
+        frame: pose of that frame in the base.
+    """
+    if isinstance(motion, Spline):
+        return replace(motion, segments=tuple(placed(one, frame) for one in motion.segments), frame=BASE)
+    if isinstance(motion, Circ):
+        return replace(motion, via=frame @ motion.via, end=frame @ motion.end, frame=BASE)
+    if isinstance(motion, Spl):
+        return replace(motion, target=frame @ motion.target)
+    return replace(motion, target=frame @ motion.target, frame=BASE)
 
 
 def _listed(values: Sequence[object], name: str) -> Sequence[object]:
@@ -191,6 +220,7 @@ def _segment(one: object, index: int) -> Segment:
         ("near", one.near is not None),
         ("redundancy", one.redundancy is not None),
         ("moving", one.moving != TOOL),
+        ("frame", one.frame != BASE),
         ("blending", one.blending != EXACT),
         ("joint limits", any(limit.startswith("joint_") for limit in one.dynamics.given())),
         ("triggers", bool(one.triggers)),
@@ -249,18 +279,21 @@ def ellipse(
     angle: float = 2 * pi,
     points: int = 36,
     moving: str = TOOL,
+    frame: str | Pose = BASE,
     **limits: Unpack[SplineSettings],
 ) -> Spline:
     """Ellipse as a spline with constant orientation.
 
     Args:
-        start: pose of the motion frame at its start; its distance from the axis through the centre is one half axis.
+        start: pose of the motion frame at its start, in `frame`; its distance from the axis through the centre is one
+            half axis.
         other: the other half axis [m].
-        centre: in the base frame, shape (3,) [m].
-        plane: "xy", "yz" or "xz" of the base (normals z, x, and -y), or a normal, shape (3,).
+        centre: in `frame`, shape (3,) [m].
+        plane: "xy", "yz" or "xz" of `frame` (normals z, x, and -y), or a normal, shape (3,).
         angle: how far to turn [rad], positive by the right-hand rule about the plane's normal, up to ten turns.
         points: per turn, 12 to 360; more make it more accurate.
         moving: see `lin`.
+        frame: the frame of start, centre and plane, see `lin`.
         **limits: dynamics and speeds, see `lin`.
 
     Raises:
@@ -296,6 +329,7 @@ def ellipse(
     return spline(
         [Pose(_on(middle + height, first, second, turn), start.quat) for turn in turns.tolist()],
         moving=moving,
+        frame=frame,
         **limits,
     )
 

@@ -17,7 +17,7 @@ public final class CabinetArm {
      */
     public static Arm of(LBR lbr, RoboticsAPIApplication application) {
         Log log = new TaskLog(application.getLogger(), true);
-        SunrisePanel panel = new SunrisePanel(application.getApplicationData(), log);
+        SunrisePanel panel = new SunrisePanel(application.getApplicationData(), application.getApplicationUI(), log);
         ProcessSettings settings = new ProcessSettings(application.getApplicationData(), log);
         return Arm.alone(SunriseRobot.of(lbr, application, panel, settings, log), log);
     }

@@ -32,7 +32,7 @@ public class HeptarmApplication extends RoboticsAPIApplication {
                 settings.text("heptarm.allow", ""), settings.number("heptarm.heartbeat", 0.5),
                 settings.number("heptarm.max_rate", 200.0), settings.number("heptarm.datagrams", 1) != 0);
         keyWeakness = config.keyWeakness();
-        SunrisePanel panel = new SunrisePanel(getApplicationData(), log);
+        SunrisePanel panel = new SunrisePanel(getApplicationData(), getApplicationUI(), log);
         server = new CabinetServer(SunriseRobot.of(lbr, this, panel, settings, log), config, Clocks.find(), log);
         try {
             panel.use(UserKeys.publish(this, server, log));

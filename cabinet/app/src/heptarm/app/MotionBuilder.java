@@ -53,7 +53,7 @@ import heptarm.wire.Spline;
 /** Builds Sunrise motions from the items of a program. It refuses what it cannot express, and ignores nothing. */
 final class MotionBuilder {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "ptp_home", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
-        "conditions", "triggers", "segments", "io", "user_keys", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
+        "conditions", "triggers", "segments", "io", "user_keys", "dialogs", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
 
     private static final int JOINTS = 7;

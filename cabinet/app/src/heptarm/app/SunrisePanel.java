@@ -3,11 +3,15 @@ package heptarm.app;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
+import com.kuka.roboticsAPI.uiModel.ApplicationDialogType;
+import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 
 import heptarm.core.CommandRejected;
 import heptarm.core.Log;
 import heptarm.core.robot.PanelPort;
+import heptarm.wire.AskOperator;
 import heptarm.wire.Code;
+import heptarm.wire.DialogKind;
 import heptarm.wire.SetKey;
 
 /** The smartPAD and the process data of the project. */
@@ -15,11 +19,13 @@ final class SunrisePanel implements PanelPort {
     private static final int INFO = 0;
 
     private final IApplicationData data;
+    private final IApplicationUI pad;
     private final Log log;
     private volatile UserKeys keys;
 
-    SunrisePanel(IApplicationData data, Log log) {
+    SunrisePanel(IApplicationData data, IApplicationUI pad, Log log) {
         this.data = data;
+        this.pad = pad;
         this.log = log;
     }
 
@@ -49,6 +55,23 @@ final class SunrisePanel implements PanelPort {
         } catch (RuntimeException e) {
             String type = old == null ? "text" : old.getClass().getSimpleName();
             throw new CommandRejected(Code.OUT_OF_RANGE, "value", text, type, name + " must be of type " + type + ", got " + text + " (" + e.getMessage() + ")");
+        }
+    }
+
+    public int ask(AskOperator dialog) {
+        return pad.displayModalDialog(type(dialog.kind), dialog.text, dialog.buttons);
+    }
+
+    private static ApplicationDialogType type(DialogKind kind) {
+        switch (kind) {
+            case INFO:
+                return ApplicationDialogType.INFORMATION;
+            case WARNING:
+                return ApplicationDialogType.WARNING;
+            case ERROR:
+                return ApplicationDialogType.ERROR;
+            default:
+                return ApplicationDialogType.QUESTION;
         }
     }
 

@@ -28,7 +28,7 @@ final class SunriseRobot {
         RobotInfo info = RobotModels.describe(lbr.getName(), lbr.getJointLimits().getMinJointPosition().get(),
                 lbr.getJointLimits().getMaxJointPosition().get());
         SunriseTools tools = new SunriseTools(lbr, application.getApplicationData(), settings.text("heptarm.tools", ""),
-                settings.text("heptarm.frames", ""), log);
+                settings.text("heptarm.frames", ""), probe, log);
         SunriseSignals signals = new SunriseSignals(lbr.getController(), settings.text("heptarm.io", SunriseSignals.FLANGE), log);
         return new Robot(info, lbr.getController().getName(), probe != null, capabilities(log),
                 new SunriseMotions(lbr, tools, signals, execution, application.getApplicationControl(), probe, log),

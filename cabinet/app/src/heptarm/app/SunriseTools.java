@@ -15,20 +15,24 @@ import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
 import heptarm.core.CommandRejected;
 import heptarm.core.Log;
+import heptarm.core.robot.SimulatorProbe;
 import heptarm.core.robot.ToolPort;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.Pose;
+import heptarm.wire.Shape;
 import heptarm.wire.ToolInfo;
 
 /** Tools, workpieces and frames of Sunrise behind the core's port; the core has checked the names. */
 final class SunriseTools implements ToolPort {
     private final LBR robot;
     private final IApplicationData data;
+    private final SimulatorProbe probe;
     private final Map<String, Tool> templates = new LinkedHashMap<String, Tool>();
     private final Map<String, ObjectFrame> taught = new LinkedHashMap<String, ObjectFrame>();
     private final String[] listed;
     private Tool tool;
+    private ToolInfo mounted;
     private Workpiece workpiece;
     private Map<String, ObjectFrame> toolFrames = new LinkedHashMap<String, ObjectFrame>();
     private Map<String, ObjectFrame> pieceFrames = new LinkedHashMap<String, ObjectFrame>();
@@ -38,10 +42,12 @@ final class SunriseTools implements ToolPort {
      * @param data application data of the project
      * @param listed names of the project's tool templates, separated by commas
      * @param frames paths of the project's taught frames, separated by commas
+     * @param probe of a simulated robot, which mounts shapes; null on a real one, which has no use for them
      */
-    SunriseTools(LBR robot, IApplicationData data, String listed, String frames, Log log) {
+    SunriseTools(LBR robot, IApplicationData data, String listed, String frames, SimulatorProbe probe, Log log) {
         this.robot = robot;
         this.data = data;
+        this.probe = probe;
         this.listed = names(listed);
         this.motionFrame = robot.getFlange();
         for (int i = 0; i < this.listed.length; i++) {
@@ -94,7 +100,7 @@ final class SunriseTools implements ToolPort {
 
     private static ToolInfo describe(String name, Tool tool) {
         return new ToolInfo(name, tool.getLoadData().getMass(), new double[3], new double[6],
-                describe(tool.getRootFrame(), frames(tool)));
+                describe(tool.getRootFrame(), frames(tool)), new Shape[0]);
     }
 
     private static FrameInfo[] describe(ObjectFrame from, Map<String, ObjectFrame> frames) {
@@ -154,6 +160,8 @@ final class SunriseTools implements ToolPort {
         workpiece = null;
         pieceFrames = new LinkedHashMap<String, ObjectFrame>();
         motionFrame = main;
+        mounted = info;
+        mount(null);
     }
 
     public synchronized void load(ToolInfo info) throws CommandRejected {
@@ -172,6 +180,14 @@ final class SunriseTools implements ToolPort {
         }
         workpiece = next;
         pieceFrames = frames;
+        mount(info);
+    }
+
+    private void mount(ToolInfo piece) {
+        if (probe != null) {
+            Transformation holding = robot.getFlange().transformationTo(motionFrame);
+            probe.mount(mounted, piece, new Pose(Convert.xyz(holding), Convert.quaternion(holding)));
+        }
     }
 
     private static void detach(PhysicalObject object) {

@@ -116,6 +116,9 @@ public final class Messages {
             case 58:
                 message = DatagramStatistics.read(in);
                 break;
+            case 59:
+                message = AskOperator.read(in);
+                break;
             case 64:
                 message = ServoOpen.read(in);
                 break;
@@ -161,6 +164,9 @@ public final class Messages {
             case 100:
                 message = ControlChanged.read(in);
                 break;
+            case 106:
+                message = ToolChanged.read(in);
+                break;
             case 101:
                 message = SafetyChanged.read(in);
                 break;
@@ -175,6 +181,9 @@ public final class Messages {
                 break;
             case 105:
                 message = SegmentReached.read(in);
+                break;
+            case 107:
+                message = DialogClosed.read(in);
                 break;
             case 112:
                 message = State.read(in);
@@ -203,6 +212,7 @@ public final class Messages {
             case 52:
             case 53:
             case 55:
+            case 59:
             case 64:
             case 65:
             case 66:
@@ -240,6 +250,7 @@ public final class Messages {
             case 54:
             case 55:
             case 57:
+            case 59:
             case 64:
             case 68:
             case 69:
@@ -280,6 +291,7 @@ public final class Messages {
             case 54:
             case 55:
             case 57:
+            case 59:
             case 64:
             case 65:
             case 66:

@@ -91,6 +91,7 @@ public final class SessionTransitions {
                     case 56:
                     case 57:
                     case 58:
+                    case 59:
                     case 64:
                     case 65:
                     case 66:
@@ -106,11 +107,13 @@ public final class SessionTransitions {
                     case 98:
                     case 99:
                     case 100:
+                    case 106:
                     case 101:
                     case 102:
                     case 103:
                     case 104:
                     case 105:
+                    case 107:
                     case 112:
                         return SessionState.OPEN;
                     case 8:

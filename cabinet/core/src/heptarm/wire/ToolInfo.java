@@ -12,13 +12,16 @@ public final class ToolInfo {
     public final double[] inertia;
     /** in the same frame; the first is the default motion frame; a name contains no / and is not tool, flange or base */
     public final FrameInfo[] frames;
+    /** what of it collides and is drawn, in the same frame; a virtual cabinet mounts them, a robot ignores them */
+    public final Shape[] shapes;
 
-    public ToolInfo(String name, double mass, double[] com, double[] inertia, FrameInfo[] frames) {
+    public ToolInfo(String name, double mass, double[] com, double[] inertia, FrameInfo[] frames, Shape[] shapes) {
         this.name = name;
         this.mass = mass;
         this.com = com;
         this.inertia = inertia;
         this.frames = frames;
+        this.shapes = shapes;
     }
 
     public void write(Encoder out) {
@@ -29,6 +32,10 @@ public final class ToolInfo {
         out.putCount(frames.length);
         for (int i = 0; i < frames.length; i++) {
             frames[i].write(out);
+        }
+        out.putCount(shapes.length);
+        for (int i = 0; i < shapes.length; i++) {
+            shapes[i].write(out);
         }
     }
 
@@ -42,7 +49,12 @@ public final class ToolInfo {
         for (int i = 0; i < framesSize; i++) {
             frames[i] = FrameInfo.read(in);
         }
-        return new ToolInfo(name, mass, com, inertia, frames);
+        int shapesSize = in.getCount();
+        Shape[] shapes = new Shape[shapesSize];
+        for (int i = 0; i < shapesSize; i++) {
+            shapes[i] = Shape.read(in);
+        }
+        return new ToolInfo(name, mass, com, inertia, frames, shapes);
     }
 
     public void validate(String path) throws Violation {
@@ -53,6 +65,10 @@ public final class ToolInfo {
         Check.length(frames.length, path + "frames", 0, 32);
         for (int i = 0; i < frames.length; i++) {
             frames[i].validate(path + "frames[" + i + "].");
+        }
+        Check.length(shapes.length, path + "shapes", 0, 16);
+        for (int i = 0; i < shapes.length; i++) {
+            shapes[i].validate(path + "shapes[" + i + "].");
         }
     }
 }

@@ -17,6 +17,7 @@ import heptarm.wire.JointImpedance;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.PoseState;
 import heptarm.wire.SafetyBits;
+import heptarm.wire.Shape;
 import heptarm.wire.ToolInfo;
 
 /** Stirs with a spoon: a servo motion along a circle, compliant joints, then straight lines with Cartesian compliance. Everything in SI. */
@@ -27,7 +28,7 @@ public class Stir extends RoboticsAPIApplication {
     private static final double[] DAMPING = {0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.7};
 
     private static final ToolInfo SPOON = new ToolInfo("spoon", 0.2, new double[] {0, 0, 0.08}, new double[6],
-            new FrameInfo[] {new FrameInfo("bowl", Move.pose(0, 0, 0.15))});
+            new FrameInfo[] {new FrameInfo("bowl", Move.pose(0, 0, 0.15))}, new Shape[0]);
 
     @Inject
     private LBR lbr;

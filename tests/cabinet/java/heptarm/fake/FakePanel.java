@@ -1,7 +1,10 @@
 package heptarm.fake;
 
+import java.util.concurrent.CountDownLatch;
+
 import heptarm.core.CommandRejected;
 import heptarm.core.robot.PanelPort;
+import heptarm.wire.AskOperator;
 import heptarm.wire.Code;
 import heptarm.wire.SetKey;
 
@@ -13,6 +16,7 @@ final class FakePanel implements PanelPort {
     private final FakeSafety safety;
     private volatile double speed = 0.5;
     private volatile String keyed = "";
+    private final CountDownLatch answered = new CountDownLatch(1);
 
     FakePanel(FakeFaults faults, FakeSafety safety) {
         this.faults = faults;
@@ -48,9 +52,27 @@ final class FakePanel implements PanelPort {
         }
     }
 
+    /** The operator presses the last button, unless the dialog is to stay until the thread ends. */
+    @Override
+    public int ask(AskOperator dialog) {
+        if ("broken".equals(dialog.text)) {
+            throw new IllegalStateException("the smartPAD is unplugged");
+        }
+        if ("stay".equals(dialog.text)) {
+            try {
+                answered.await();
+            } catch (InterruptedException e) {
+                throw new IllegalStateException(e);
+            }
+        }
+        return dialog.buttons.length - 1;
+    }
+
     @Override
     public void show(int severity, String text) {
-        if (text.startsWith(OPERATOR)) {
+        if ("answer".equals(text)) {
+            answered.countDown();
+        } else if (text.startsWith(OPERATOR)) {
             safety.operate(text.substring(OPERATOR.length()));
         } else {
             faults.order(text);

@@ -5,6 +5,7 @@ import heptarm.core.robot.ToolPort;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.Pose;
+import heptarm.wire.Shape;
 import heptarm.wire.ToolInfo;
 
 /** A project with two templates, one of whose names is listed, and one taught frame. A tool of 13 kg is refused. */
@@ -23,7 +24,7 @@ final class FakeTools implements ToolPort {
             return null;
         }
         Pose tip = new Pose(new double[] {0.0, 0.0, 0.1}, UPRIGHT);
-        return new ToolInfo(name, 1.0, new double[3], new double[6], new FrameInfo[] {new FrameInfo("tip", tip)});
+        return new ToolInfo(name, 1.0, new double[3], new double[6], new FrameInfo[] {new FrameInfo("tip", tip)}, new Shape[0]);
     }
 
     @Override

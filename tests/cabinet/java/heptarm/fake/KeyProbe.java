@@ -13,7 +13,7 @@ import heptarm.wire.Welcome;
 /**
  * What the cabinet computes with a key, from: key, bodies of Hello, Challenge, Proof and of a Welcome without mac, both nonces, a
  * client's frame and a cabinet's frame without tags; then the token, and a client's and a cabinet's datagram with their tags, first
- * those with the key, then those without.
+ * those with the key, then those without. The client's frame has two tags: before its sequence number wraps, and after.
  */
 public final class KeyProbe {
     private KeyProbe() {
@@ -31,7 +31,10 @@ public final class KeyProbe {
         print(exchange.clientMac());
         exchange.add(Proof.TYPE, proof, 0, proof.length);
         print(exchange.cabinetMac(Welcome.TYPE, bytes(args[4])));
-        tag(exchange.clientTag(clientNonce, cabinetNonce), bytes(args[7]));
+        FrameTag client = exchange.clientTag(clientNonce, cabinetNonce);
+        tag(client, bytes(args[7]));
+        client.beginRound();
+        tag(client, bytes(args[7]));
         tag(exchange.cabinetTag(clientNonce, cabinetNonce), bytes(args[8]));
         byte[] token = bytes(args[9]);
         byte[] secret = exchange.secret(clientNonce, cabinetNonce);

@@ -42,6 +42,7 @@ public final class ProgramChecks {
     }
 
     public void check(Run run) throws CommandRejected {
+        ArcChecks.check(run.items, "items");
         for (int i = 0; i < run.items.length; i++) {
             check(run.items[i], "items[" + i + "].");
         }

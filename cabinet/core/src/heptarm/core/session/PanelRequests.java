@@ -4,6 +4,7 @@ import heptarm.core.CommandRejected;
 import heptarm.core.robot.PanelPort;
 import heptarm.core.state.SignalTable;
 import heptarm.wire.Accepted;
+import heptarm.wire.AskOperator;
 import heptarm.wire.Code;
 import heptarm.wire.GetProcessData;
 import heptarm.wire.Message;
@@ -20,14 +21,16 @@ final class PanelRequests {
 
     private final SignalTable signals;
     private final PanelPort panel;
+    private final OperatorDialogs dialogs;
 
-    PanelRequests(SignalTable signals, PanelPort panel) {
+    PanelRequests(SignalTable signals, PanelPort panel, OperatorDialogs dialogs) {
         this.signals = signals;
         this.panel = panel;
+        this.dialogs = dialogs;
     }
 
     static boolean handles(Message message) {
-        return message instanceof SetSignals || message instanceof SetKey || message instanceof ShowMessage
+        return message instanceof SetSignals || message instanceof SetKey || message instanceof ShowMessage || message instanceof AskOperator
                 || message instanceof GetProcessData || message instanceof SetProcessData;
     }
 
@@ -39,6 +42,8 @@ final class PanelRequests {
             panel.setKey((SetKey) message);
         } else if (message instanceof ShowMessage) {
             panel.show(((ShowMessage) message).severity.value(), ((ShowMessage) message).text);
+        } else if (message instanceof AskOperator) {
+            return new Accepted(dialogs.ask((AskOperator) message));
         } else if (message instanceof SetProcessData) {
             SetProcessData request = (SetProcessData) message;
             if (request.name.startsWith(OWN)) {

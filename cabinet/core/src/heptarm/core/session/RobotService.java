@@ -31,6 +31,7 @@ public final class RobotService {
     public final MotionExecutor executor;
     public final ControlAuthority authority;
     public final CommandHandler commands;
+    private final OperatorDialogs dialogs;
     final StateSampler sampler;
     final Watchdog watchdog;
     private final FriMonitors monitors;
@@ -42,7 +43,7 @@ public final class RobotService {
         this.log = log;
         SignalTable signals = new SignalTable(robot.signals);
         safety = new SafetyMonitor(robot.safety, events, clock);
-        tools = new ToolTable(robot.tools);
+        tools = new ToolTable(robot.tools, events);
         reader = new StateReader(robot.sensors, clock);
         MotionReporter reporter = new MotionReporter(events, reader, clock, log);
         executor = new MotionExecutor(robot.motion, robot.sensors, new ConditionWatcher(robot.sensors, robot.signals, clock, log), reporter,
@@ -50,9 +51,10 @@ public final class RobotService {
         safety.add(executor);
         monitors = new FriMonitors(robot.motion, reporter, clock, log);
         authority = new ControlAuthority(robot.motion, executor, monitors, safety, events, log);
+        dialogs = new OperatorDialogs(robot.panel, events, log);
         sampler = new StateSampler(robot, reader, executor, signals, tools, clock, log);
         commands = new CommandHandler(robot, executor, monitors, safety, tools, new ProgramChecks(robot, tools, signals),
-                new PanelRequests(signals, robot.panel));
+                new PanelRequests(signals, robot.panel, dialogs));
         watchdog = new Watchdog(clock, log);
         watchdog.add("FRI sessions", 1, monitors);
         watchdog.add("the safety state", SAFETY_ROUNDS, safety);
@@ -83,6 +85,7 @@ public final class RobotService {
     }
 
     void endThreads() {
+        dialogs.close();
         watchdog.close();
         sampler.close();
     }

@@ -4,10 +4,12 @@ import java.util.LinkedHashMap;
 import java.util.Map;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.EventBus;
 import heptarm.core.checks.ToolChecks;
 import heptarm.core.robot.ToolPort;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
+import heptarm.wire.ToolChanged;
 import heptarm.wire.ToolInfo;
 
 /**
@@ -22,13 +24,16 @@ public final class ToolTable {
     private static final String TOOL = "tool";
 
     private final ToolPort port;
+    private final EventBus events;
     private final Map<String, ToolInfo> defined = new LinkedHashMap<String, ToolInfo>();
     private ToolInfo tool;
     private ToolInfo workpiece;
     private String motionFrame = FLANGE;
 
-    public ToolTable(ToolPort port) {
+    /** @param events receives each change of what is attached */
+    public ToolTable(ToolPort port, EventBus events) {
         this.port = port;
+        this.events = events;
     }
 
     /** Templates of the project whose names are known, then the tools that clients have defined. */
@@ -94,6 +99,7 @@ public final class ToolTable {
         tool = chosen;
         motionFrame = main;
         workpiece = null;
+        events.publish(new ToolChanged(tool, workpiece));
     }
 
     synchronized void load(ToolInfo newer, boolean attached, String path) throws CommandRejected {
@@ -105,6 +111,7 @@ public final class ToolTable {
             }
             port.load(null);
             workpiece = null;
+            events.publish(new ToolChanged(tool, workpiece));
             return;
         }
         if (workpiece != null) {
@@ -112,6 +119,7 @@ public final class ToolTable {
         }
         port.load(newer);
         workpiece = newer;
+        events.publish(new ToolChanged(tool, workpiece));
     }
 
     /** Refuses a frame name that cannot be a motion frame. */

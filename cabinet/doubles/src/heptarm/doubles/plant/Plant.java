@@ -5,6 +5,7 @@ import heptarm.doubles.seam.ImpedanceMode;
 import heptarm.doubles.seam.FriSessionSettings;
 import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.AttachedLoad;
+import heptarm.doubles.seam.CarriedBodies;
 import heptarm.doubles.seam.RobotDescription;
 
 /** The simulated robot, implemented in Python. Methods may be called from any thread. */
@@ -62,4 +63,7 @@ public interface Plant {
 
     /** Sets the load data of everything attached to the flange. */
     void setAttachedLoad(AttachedLoad load);
+
+    /** Sets the shapes of everything attached to the flange; they collide from the next tick on. */
+    void setCarriedBodies(CarriedBodies carried);
 }
