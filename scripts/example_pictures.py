@@ -58,6 +58,7 @@ PLOTS = {
     "20": ("front", "speed"),
     "21": ("joints", "speeds"),
     "22": ("front", "speed"),
+    "24": ("height", "force"),
     "23": ("front", "height"),
     "24": ("height", "force"),
 }

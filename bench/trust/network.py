@@ -21,6 +21,8 @@ from bench.measure.noise import Noise
 STREAMS = 6
 SECONDS = float(os.environ.get("BENCH_SECONDS", "60" if os.environ.get("LONG") else "10"))
 RATE = 200.0
+#: Longest time for connecting, stopping and closing [s].
+PATIENCE = 240.0
 _CLIENT = """
 import json, sys, threading, time
 import numpy as np
@@ -122,8 +124,18 @@ def stream(network: BadNetwork, port: int, kind: str, seconds: float) -> Outcome
     command = [sys.executable, "-c", _CLIENT, f"{ADDRESSES['cabinet']}:{port}", kind, str(seconds), str(RATE)]
     client = network.on("client", lambda: subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
     with client:
-        text = client.communicate(timeout=seconds + 240.0)[0]
-    return Outcome(**json.loads(text.splitlines()[-1]))
+        try:
+            lines = client.communicate(timeout=seconds + PATIENCE)[0].splitlines()
+        except subprocess.TimeoutExpired:
+            return _without_report(f"the client did not end within {seconds + PATIENCE:g} s")
+        finally:
+            client.kill()
+    return Outcome(**json.loads(lines[-1])) if lines else _without_report("the client ended without a report")
+
+
+def _without_report(why: str) -> Outcome:
+    """The outcome of a stream whose client sent no report: the other streams still count."""
+    return Outcome(why, lived=0.0, received=0, gap=None, stop=None, age=None, pause=0.0)
 
 
 @benchmark("bad_network")

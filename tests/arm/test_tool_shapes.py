@@ -70,13 +70,13 @@ def test_the_tool_is_felt_where_it_is_hit(arm: ha.Arm) -> None:
         assert state.pose.z == pytest.approx(TABLE, abs=0.006)
         arms = arm.pose("tool").xyz - arm.pose("flange").xyz
         moment = np.cross(arms, state.wrench.force)
-        assert np.linalg.norm(moment) > 1.2
+        assert np.linalg.norm(moment) > 0.8
         assert arm.wrench("flange").torque == pytest.approx(moment, abs=0.2 * float(np.linalg.norm(moment)))
 
 
 def test_other_clients_know_the_shapes_as_soon_as_they_are_there(arm: ha.Arm) -> None:
     assert arm.connection.cabinet is not None
-    with ha.connect(f"127.0.0.1:{arm.connection.cabinet.port}", control=False) as other:
+    with ha.connect(f"sim://127.0.0.1:{arm.connection.cabinet.port}", control=False) as other:
         assert other.shapes == arm.shapes == ()
         with arm.tool(PEN):
             other.wait_until(lambda _: bool(other.shapes))
@@ -90,7 +90,7 @@ def test_other_clients_know_the_shapes_as_soon_as_they_are_there(arm: ha.Arm) ->
 def test_a_client_that_comes_later_knows_the_shapes(arm: ha.Arm) -> None:
     assert arm.connection.cabinet is not None
     port = arm.connection.cabinet.port
-    with arm.tool(PEN), ha.connect(f"127.0.0.1:{port}", control=False) as other:
+    with arm.tool(PEN), ha.connect(f"sim://127.0.0.1:{port}", control=False) as other:
         assert other.tools["pen"].shapes == PEN.shapes
         table = ha.CollisionModel("iiwa14", boxes=[f"0.6,0,{TABLE / 2},0.4,0.8,{TABLE}"])
         down = ha.lin_rel(z=-0.1, frame="base")

@@ -48,6 +48,7 @@ ATTACKS: dict[str, Attack] = {
     "injected": lambda frames: _forged(frames) + frames[-1],
     "injected with a tag": lambda frames: _guessed(frames) + frames[-1],
     "changed": lambda frames: _changed(frames[-1], len(frames[-1]) - 17),
+    "changed in its tag": lambda frames: _changed(frames[-1], len(frames[-1]) - 1),
     "renumbered": lambda frames: _changed(frames[-1], 13),
     "repeated": lambda frames: frames[-2] + frames[-1],
     "dropped": lambda frames: b"" if len(frames) % 2 else frames[-1],

@@ -172,6 +172,7 @@ def test_a_panel_that_only_shows_has_a_stop_and_nothing_else(
 def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Panel, PanelArm]]:
     """A panel in this process, of a private simulator."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr("webbrowser.open", lambda _: True)
     with ha.connect("sim://iiwa14?scene=bins", control=False, watchdog=5.0, timeout=PATIENCE) as arm:
         options = PanelOptions(port=0, scene="bins")
         model = model_of(arm, "sim://iiwa14?scene=bins", options)
@@ -247,6 +248,7 @@ def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelAr
     file = tmp_path / "points.json"
     until(lambda: file.exists() and file.read_text(), "nothing was saved")
     model.points.rename("P1", "other")
+    page.shows("other")  # drawn again, with its new name
     browser.find_element("css selector", "input[type=file]").send_keys(str(file))
     until(lambda: model.points.names == ("P1",), "nothing was loaded")
 

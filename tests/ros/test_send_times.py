@@ -23,7 +23,7 @@ TICK, HORIZON, STEP = 0.01, 0.1, 0.002
 #: Largest error of the speed, a fraction of its peak, and largest lag [s].
 SPEED, LAG = 0.05, 0.04
 
-#: When messages arrive [s], and the time of the swing that each requests [s].
+#: When messages arrive [s], and the time of the swing that each is for [s].
 Arrivals = list[tuple[float, float]]
 Scene = Callable[[np.random.Generator, float], Arrivals]
 

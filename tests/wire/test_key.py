@@ -232,6 +232,12 @@ def test_an_answer_after_a_lost_frame_is_refused() -> None:
     assert refuses(client, cabinet.send(Accepted(id=0), request=1)) == Code.FORGED_FRAME
 
 
+def test_a_frame_of_another_session_is_refused() -> None:
+    client, _ = open_pair(KEY)
+    _, cabinet = open_pair(KEY)
+    assert refuses(cabinet, requests(client, 1)[0]) == Code.FORGED_FRAME
+
+
 def test_a_frame_of_the_other_direction_is_refused() -> None:
     client, _ = open_pair(KEY)
     echoed = client.send(Ping(sent=1))

@@ -245,14 +245,12 @@ class DrawnMarks:
         """Draw named frames, such as "frames" or "points", in place of those of the same kind."""
         wanted = {f"{kind}/{name}": pose for name, pose in places.items()}
         for name in [one for one in self._places if one.startswith(f"{kind}/") and one not in wanted]:
-            for handle in self._named.pop(name):
-                handle.remove()
+            self._erase(name)
             del self._places[name]
         for name, pose in wanted.items():
             if self._places.get(name) == pose:
                 continue
-            for handle in self._named.pop(name, ()):
-                handle.remove()
+            self._erase(name)
             self._drawn += 1
             node = (
                 f"{self._root}/{kind}/{self._drawn}"  # a name may have characters that viser's paths have not
@@ -264,3 +262,8 @@ class DrawnMarks:
                 ),
                 self._scene.add_label(f"{node}/label", name.partition("/")[2], anchor="bottom-left"),
             )
+
+    def _erase(self, name: str) -> None:
+        """Remove a named frame, its label first: viser removes what is below a node with it."""
+        for handle in reversed(self._named.pop(name, ())):
+            handle.remove()

@@ -206,9 +206,8 @@ class Events:
         return sum(program.limit for program in list(self._programs.values()))
 
     def forget_unclaimed(self) -> None:
-        """Drop events of the previous link: they mean nothing on a new one."""
+        """Drop events of the previous link: its program numbers mean nothing on a new one."""
         self._unclaimed.clear()
-        self.attached = None
 
     def lose(self, error: HeptarmError) -> None:
         """End all accepted programs with an error."""
@@ -370,6 +369,7 @@ class Connection:
         """Make a link and subscribe to states; a cabinet that is too busy is asked again."""
         deadline = self.clock.nanos() + round(self.options.timeout * 1e9)
         while True:
+            self.events.attached = None
             link = self._new_link(self._on_event, self.feed.push, self._on_lost)
             try:
                 self._welcome = link.open(

@@ -24,7 +24,7 @@ _COLOUR = (0.45, 0.47, 0.5, 1.0)
 #: Name of the body of the running plant that has what is mounted.
 _MOUNTED = "mounted"
 #: Names of the shapes that a model has room for: those of a tool and of a workpiece.
-_SLOTS = tuple(f"mounted/{index}" for index in range(2 * MOST_SHAPES))
+_SLOTS = tuple(f"{_MOUNTED}/{index}" for index in range(2 * MOST_SHAPES))
 #: Contact types of a shape that is mounted, as those of the links.
 _MEETS_ALL = 1
 #: MuJoCo's kind of each kind of shape.
@@ -71,11 +71,10 @@ def make_room(arm: mujoco.MjSpec) -> None:
     """Give an arm a body on its flange with shapes that collide with nothing, for `FlangeShapes`."""
     body = _on_flange(arm, _MOUNTED, Pose.of((0.0, 0.0, 0.0)))
     for name in _SLOTS:
-        size = [1e-3, 0.0, 0.0]
         body.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=size,
+            size=[1e-3, 0.0, 0.0],
             contype=0,
             conaffinity=0,
             mass=0.0,

@@ -39,6 +39,8 @@ class _LastLink:
     """The last link of a model, to which loads are added."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._scratch: mujoco.MjData | None = None
         site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._body = int(model.site_bodyid[site])
         self._at = model.site_pos[site].copy()
@@ -48,8 +50,9 @@ class _LastLink:
         self._com = model.body_ipos[self._body].copy()
         self._inertia = axes @ np.diag(model.body_inertia[self._body]) @ axes.T
 
-    def carry(self, model: mujoco.MjModel, load: Body) -> None:
+    def carry(self, load: Body) -> None:
         """Replace the load on the link."""
+        model = self._model
         com = self._at + self._turn @ load.com
         mass = self._mass + load.mass
         centre = (self._mass * self._com + load.mass * com) / mass
@@ -64,7 +67,9 @@ class _LastLink:
         model.body_ipos[self._body] = centre
         model.body_inertia[self._body] = moments
         model.body_iquat[self._body] = quat
-        mujoco.mj_setConst(model, mujoco.MjData(model))  # with scratch data: it changes their posture
+        if self._scratch is None:  # not the plant's, whose posture would change
+            self._scratch = mujoco.MjData(model)
+        mujoco.mj_setConst(model, self._scratch)
 
 
 class PayloadModel:
@@ -89,10 +94,10 @@ class PayloadModel:
         mass: Array,
         bare: mujoco.MjModel | None = None,
     ) -> None:
-        self._model, self._data, self._world_mass = model, data, mass
-        self._link = _LastLink(model)
+        self._data, self._world_mass = data, mass
         self._has_tool = bare is not None
         self._believed = copy(model) if bare is None else bare
+        self._true_link, self._believed_link = _LastLink(model), _LastLink(self._believed)
         # the controller's model has no contacts
         self._believed.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._scratch: mujoco.MjData | None = None
@@ -121,11 +126,11 @@ class PayloadModel:
             hanging = NOTHING if self._has_tool else self._declared
         if hanging != self._hanging:
             self._hanging = hanging
-            self._link.carry(self._model, hanging)
+            self._true_link.carry(hanging)
         if hanging == self._declared and not self._has_tool:
             self._agree()
             return
-        self._link.carry(self._believed, self._declared)
+        self._believed_link.carry(self._declared)
         if self._scratch is None:
             self._scratch = mujoco.MjData(self._believed)
         self.differs = True

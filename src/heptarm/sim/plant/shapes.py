@@ -60,24 +60,28 @@ def _shape(model: mujoco.MjModel, index: int) -> DrawnShape:
 
 def _mesh(model: mujoco.MjModel, index: int) -> tuple[Array, npt.NDArray[np.int64]]:
     """Vertices and faces of a shape in its own frame."""
-    kind = model.geom_type[index]
+    kind = int(model.geom_type[index])
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         one = int(model.geom_dataid[index])
         first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
         vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
         faces = model.mesh_face[face : face + int(model.mesh_facenum[one])]
         return np.array(vertices, float), np.array(faces, np.int64)
-    return solid(int(kind), model.geom_size[index])
+    return solid(kind, model.geom_size[index])
 
 
 def solid(kind: int, size: Array) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Vertices and faces of a shape in its own frame: MuJoCo's kind, and MuJoCo's size, shape (3,) [m].
+    """Vertices and faces of a shape that is no mesh, in its own frame.
+
+    Args:
+        kind: MuJoCo's.
+        size: likewise, shape (3,) [m].
 
     Raises:
         MissingExtra: the package trimesh is not installed.
     """
-    creation = require("trimesh.creation", extra="viz")
     radius, half, depth = size.tolist()
+    creation = require("trimesh.creation", extra="viz")
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
         mesh = creation.capsule(height=2 * half, radius=radius, count=(24, 24))
         mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])

@@ -1,0 +1,37 @@
+"""Questions to the operator against a scripted cabinet in memory: answers, and what ends the wait for one."""
+
+from __future__ import annotations
+
+import pytest
+
+import heptarm as ha
+from heptarm.wire import messages as wire
+from tests.arm.peer import Peer
+
+
+def closed(number: int, button: int, text: str = "") -> wire.DialogClosed:
+    return wire.DialogClosed(dialog=number, button=button, text=text)
+
+
+def test_the_answer_is_that_of_the_own_dialog(peer: Peer) -> None:
+    sent: list[wire.AskOperator] = []
+    peer.expect(wire.AskOperator, closed(3, 0), closed(4, 1), wire.Accepted(id=4), check=sent.append)
+    with peer.arm() as arm:
+        assert arm.pad.ask("Ready?", "Yes", "No", kind="warning") == "No"  # the events came before the number
+        assert arm.connection.events.dialog_listeners == []
+    assert sent == [wire.AskOperator(kind=wire.DialogKind.WARNING, text="Ready?", buttons=("Yes", "No"))]
+
+
+def test_a_dialog_that_is_not_shown_is_an_error(peer: Peer) -> None:
+    peer.expect(wire.AskOperator, wire.Accepted(id=1), closed(1, -1, "this cabinet has no dialogs"))
+    with peer.arm() as arm, pytest.raises(ha.CommandRejected, match="this cabinet has no dialogs"):
+        arm.pad.ask("Ready?", "Yes")
+
+
+def test_a_lost_connection_ends_the_wait(peer: Peer) -> None:
+    peer.expect(wire.AskOperator, wire.Accepted(id=1), lambda client, _: client.peer.drop())
+    arm = peer.arm()
+    with pytest.raises(ha.ConnectionLost):
+        arm.pad.ask("Ready?", "Yes")
+    assert arm.connection.events.dialog_listeners == []
+    arm.close()
