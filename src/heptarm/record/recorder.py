@@ -180,12 +180,13 @@ class _Tap:
     def write(self) -> int:
         """Write what has arrived; returns the number of states."""
         source, count = self._source, 0
+        journal = source.journal  # read first: an FRI client's takes over the events of its loop then
         while batch := self._samples.take(_BATCH):
             self._file.states(batch, to_ours=source.to_ours, signals=source.signal_names)
             count += len(batch)
         while self._entries:
             self._file.entry(self._entries.popleft())
-        self._cycles.write(source.journal.sessions, self._file)
+        self._cycles.write(journal.sessions, self._file)
         return count
 
     def close(self) -> None:
