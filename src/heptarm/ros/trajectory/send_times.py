@@ -82,16 +82,11 @@ class SendTimes:
         return max(float(np.median(np.diff(self._arrivals))), 1e-3)
 
     def _lost(self, late: float, step: Array, speed: Array) -> int:
-        """Number of points that were lost before one.
-
-        The place of a point behind lost ones is as far away as its time is late; that of a delayed one is not. Its
-        distance counts points only roughly, since the speed changes: if it accounts for most of the delay, the delay
-        counts them.
-        """
+        """Number of points that were lost before one: its place is as far away as its time is late."""
         most = round(late / self._period)
         if most < 1:
             return 0
         if float(np.abs(speed).max()) < _MOVING:
             return most
-        steps = round(float(step @ speed) / (float(speed @ speed) * self._period)) - 1
-        return most if 2 * steps >= most else max(0, steps)
+        steps = float(step @ speed) / (float(speed @ speed) * self._period)
+        return int(np.clip(round(steps) - 1, 0, most))
