@@ -74,39 +74,6 @@ def fail(s, out, p):
         raise ZeroDivisionError("nothing to divide by")
 
 
-@pytest.fixture(scope="module")
-def pushed() -> Iterator[ha.Arm]:
-    """An arm that its operator may push: a simulator of its own."""
-    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
-        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=1.0)
-        yield arm
-
-
-@patient
-@pytest.mark.parametrize("margin", [0.0, 5.0])
-def test_a_collision_guard_watches_the_session_of_its_block(pushed: ha.Arm, margin: float) -> None:
-    arm = pushed
-    met: list[ha.Collision] = []
-    guard = arm.collision_guard(10.0, margin=margin)
-    try:
-        with (
-            pytest.raises(ha.CollisionDetected, match="collision at A1: .* allowed are 10") as error,
-            arm.guarded(guard, on_collision=met.append),
-            arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.05}) as rt,
-        ):
-            assert rt.wait(0.2), "nothing touches it"
-            arm.operator.push([0.0, 40.0, 0.0], duration=60.0)
-            assert not rt.wait(20.0) and not rt.active
-    finally:
-        arm.operator.push([0.0, 0.0, 0.0], duration=0.0)
-    found = error.value.collision
-    assert found.joint == 0 and abs(found.torque) > 10.0 and error.value.history
-    assert found in met and rt.client.collision is not None
-    assert arm.wait_for_rest() is not None
-    with arm.fri("position", period_ms=LONG) as rt:  # outside of the block, nothing is watched
-        assert rt.wait(0.05)
-
-
 @patient
 def test_a_law_moves_the_arm_and_its_parameters_change_while_it_runs(arm: ha.Arm) -> None:
     with arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.0}) as rt:

@@ -17,7 +17,7 @@ from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import HandGuiding, Position
 from heptarm.wire import messages as wire
-from tests.retry import retry, starved
+from tests.retry import answers_late, retry, starved
 
 TABLE = 0.3
 HOME = ha.deg(0, 35, 0, -80, 0, 65, 0)
@@ -240,6 +240,33 @@ def test_a_guard_watches_a_servo_motion(arm: ha.Arm) -> None:
         while sv.tick() and sv.t < 30.0:
             sv.set(ha.Pose.of(start.xyz - [0, 0, min(0.05 * sv.t, 0.3)], start.quat))
     arm.wait_for_rest()
+
+
+@pytest.mark.parametrize("margin", [0.0, 5.0])
+def test_a_guard_watches_an_fri_session(arm: ha.Arm, margin: float) -> None:
+    retry(lambda: _pushed_in_a_session(arm, margin), answers_late)
+
+
+def _pushed_in_a_session(arm: ha.Arm, margin: float) -> None:
+    met: list[ha.Collision] = []
+    guard = arm.collision_guard(10.0, margin=margin)
+    try:
+        with (
+            pytest.raises(ha.CollisionDetected, match="collision at A1: .* allowed are 10") as error,
+            arm.guarded(guard, on_collision=met.append),
+            arm.fri("position", period_ms=10) as rt,
+        ):
+            assert rt.wait(0.2), "nothing touches it"
+            arm.operator.push([0.0, 40.0, 0.0], duration=60.0)
+            assert not rt.wait(20.0) and not rt.active
+    finally:
+        arm.operator.push([0.0, 0.0, 0.0], duration=0.0)
+    found = error.value.collision
+    assert found.joint == 0 and abs(found.torque) > 10.0 and error.value.history
+    assert found in met and rt.client.collision is not None
+    assert arm.wait_for_rest() is not None
+    with arm.fri("position", period_ms=10) as rt:  # outside of the block, nothing is watched
+        assert rt.wait(0.05)
 
 
 def test_a_guard_with_a_margin_is_watched_here(arm: ha.Arm) -> None:
