@@ -9,12 +9,10 @@ points with the velocity of the stream, and settles at the last one when the str
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
-from heptarm.ros.trajectory.send_times import SendTimes
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -32,23 +30,10 @@ _HISTORY, _MARGIN, _LONGEST_GAP = 1.0, 1.5, 0.15
 _LARGEST_JUMP = 0.5
 #: Age of the points that position and velocity are estimated from [s], and the pause that begins a new stream [s].
 _WINDOW, _PAUSE = 0.06, 0.3
-#: How much the newest error of a straight line counts in the average.
-_RECENT = 0.1
-#: How much straighter the points must be by the other times to change to those, as a factor.
-_BETTER = 0.5
 #: Least time to settle at the last point [s].
 _LEAST_SETTLING = 0.1
 #: Largest velocity that counts as rest [rad/s].
 _REST = 1e-6
-
-
-@dataclass(frozen=True, slots=True)
-class _Point:
-    """A point, the time of its arrival, and that when it was sent by the clock [s]."""
-
-    arrived: float
-    sent: float
-    q: Array
 
 
 def is_streamed(goal: TrajectoryGoal, now: float) -> bool:
@@ -70,11 +55,7 @@ class PointStream:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
-        self._points: deque[_Point] = deque()
-        self._clock = SendTimes()
-        self._speed = np.zeros(7)
-        self._errors = np.zeros(2)  # of straight lines by arrivals and by the clock, averaged
-        self._by_clock = 1  # which of them counts
+        self._points: deque[tuple[float, Array]] = deque()
 
     def add_point(
         self,
@@ -107,22 +88,18 @@ class PointStream:
             GoalRefused: the point is too far away.
         """
         _check_distance(here, q)
-        if self._points and now - self._points[-1].arrived > _PAUSE:
+        if self._points and now - self._points[-1][0] > _PAUSE:
             self._points.clear()
-            self._clock.forget()
-            self._errors[:], self._by_clock = 0.0, 1
-            self._speed = np.zeros(7)
-        sent = self._clock.add(now, period, q, self._speed if dq is None else dq)
-        self._points.append(_Point(now, sent, q))
-        while now - self._points[0].arrived > _HISTORY:
+        self._points.append((now, q))
+        while now - self._points[0][0] > _HISTORY:
             self._points.popleft()
-        gaps = np.diff([one.arrived for one in self._points])
+        gaps = np.diff([time for time, _ in self._points])
         gap = min(float(gaps.max(initial=period)), _LONGEST_GAP)
-        time, place, self._speed = self._fit(period, max(_WINDOW, 2.0 * gap))
-        speed = self._speed if dq is None else dq
+        place, speed = self._fit(period, max(_WINDOW, 2.0 * gap))
+        speed = speed if dq is None else dq
         horizon = max(2.0 * period, _LEAST_HORIZON, _MARGIN * gap)
         while True:
-            aim, velocity = self._ahead(q, place, speed, begin - time + horizon - period)
+            aim, velocity = self._ahead(q, place, speed, begin - now + horizon - period)
             excess = (_acceleration(here, aim, velocity, horizon) > acceleration).any()
             if not excess or horizon > _LONGEST_HORIZON:
                 break
@@ -196,30 +173,17 @@ class PointStream:
         inside = (there >= self._robot.q_min) & (there <= self._robot.q_max)
         return np.where(inside, there, q), np.where(inside, speed, 0.0)
 
-    def _fit(self, period: float, window: float) -> tuple[float, Array, Array]:
-        """Time of the newest point [s], position [rad] and velocity [rad/s] of the stream then, shape (7,).
-
-        A straight line through the points, by those of both times by which they have been straighter of late: points of
-        a program that samples something lie on it when they are sent, those of a steady one by the clock.
-        """
-        newest = self._points[-1]
-        recent = [one for one in self._points if newest.arrived - one.arrived <= window]
-        if newest.arrived - recent[0].arrived < period / 2.0:
-            return newest.arrived, newest.q, np.zeros(7)
-        times = np.array([(one.arrived, one.sent) for one in recent]) - (newest.arrived, newest.sent)
-        places = np.array([one.q for one in recent])
-        mean = places.mean(axis=0)
-        lines = []
-        for which in (0, 1):
-            centred = times[:, which] - times[:, which].mean()
-            slope = centred @ places / max(float(centred @ centred), 1e-12)
-            error = float(((places - mean - np.outer(centred, slope)) ** 2).mean())
-            self._errors[which] += _RECENT * (error - self._errors[which])
-            lines.append((mean - slope * times[:, which].mean(), slope))
-        which = self._by_clock
-        if self._errors[1 - which] < _BETTER * self._errors[which]:
-            which = self._by_clock = 1 - which
-        return (newest.arrived, newest.sent)[which], *lines[which]
+    def _fit(self, period: float, window: float) -> tuple[Array, Array]:
+        """Present position [rad] and velocity [rad/s] of the stream, shape (7,): a straight line through its points."""
+        end, last = self._points[-1]
+        recent = [one for one in self._points if end - one[0] <= window]
+        times = np.array([time for time, _ in recent]) - end
+        if times[0] > -period / 2.0:
+            return last, np.zeros(7)
+        places = np.array([place for _, place in recent])
+        centred = times - times.mean()
+        slope = centred @ places / (centred @ centred)
+        return places.mean(axis=0) - slope * times.mean(), slope
 
 
 def _check_distance(here: KinematicState, q: Array) -> None:
