@@ -13,6 +13,7 @@ from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal
 from tests.conformance.case import REST, TOUCH, goal, last, point, rests, step, succeeds, swing
 from tests.conformance.client import Client, SentGoal
 from tests.conformance.refusals import REFUSALS
+from tests.long import LONG
 
 #: Malformed goals that are sent before those that count, so that every code path has its memory.
 WARM_UP = 60
@@ -53,6 +54,18 @@ def preempted_often(client: Client, *, count: int = 50, seconds: float = 2.5) ->
         assert ended.text
     assert ends[-1].outcome is GoalOutcome.SUCCEEDED, ends[-1]
     assert np.abs(client.place().q - here - path / 2).max() < TOUCH
+
+
+def preempted_without_growth(client: Client, pid: int, *, count: int, seconds: float) -> None:
+    """Preemptions leave no threads behind, and with LONG=1 no memory."""
+    threads = status(pid, "Threads")
+    if LONG:
+        preempted_often(client)  # every code path has its memory then
+    before = status(pid, "VmRSS")
+    preempted_often(client, count=count, seconds=seconds)
+    assert status(pid, "Threads") <= threads + THREADS
+    grown = 1024 * (status(pid, "VmRSS") - before)
+    assert not LONG or grown < GROWTH + GROWTH_EACH * count, f"the memory has grown by {grown / 1e6:.1f} MB"
 
 
 def refused_in_flight(client: StressedClient, pid: int, *, count: int, at_once: int = 20) -> None:

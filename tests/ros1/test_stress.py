@@ -25,8 +25,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 import heptarm as ha
 from tests.conformance.case import long, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
-from tests.conformance.stress import GROWTH, GROWTH_EACH, THREADS, preempted_often, refused_in_flight, status
-from tests.long import LONG
+from tests.conformance.stress import preempted_without_growth, refused_in_flight, status
 from tests.ros1.peer import Client, NodeProcess, collect, stamp, until
 
 
@@ -38,15 +37,7 @@ def test_preemptions_one_after_the_other(
     client: Client, node: NodeProcess, count: int, seconds: float
 ) -> None:
     """Fifty in a moment; with LONG=1 ten in each second for five minutes."""
-    pid = node.process.pid
-    threads = status(pid, "Threads")
-    if LONG:
-        preempted_often(client)  # every code path has its memory then
-    before = status(pid, "VmRSS")
-    preempted_often(client, count=count, seconds=seconds)
-    assert status(pid, "Threads") <= threads + THREADS
-    grown = 1024 * (status(pid, "VmRSS") - before)
-    assert not LONG or grown < GROWTH + GROWTH_EACH * count, f"the memory has grown by {grown / 1e6:.1f} MB"
+    preempted_without_growth(client, node.process.pid, count=count, seconds=seconds)
 
 
 @pytest.mark.parametrize(

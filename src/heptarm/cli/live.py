@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Annotated
 
@@ -10,13 +9,11 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import NO_TARGET, CommandTarget, Json
 from heptarm.cli.output import emit
+from heptarm.cli.record import wait_until_over
 from heptarm.errors import require
 from heptarm.panel.model import groups_for
 from heptarm.values.arrays import within
 from heptarm.viewers.live import live as live_view
-
-#: Pause between two looks whether the time is over [s].
-_PAUSE = 0.1
 
 
 def live(
@@ -61,12 +58,7 @@ def live(
                     f"{'' if limit else '; Ctrl-C ends it'}",
                     flush=True,
                 )
-            began = time.monotonic()
-            try:
-                while view.is_running and (limit is None or time.monotonic() - began < limit):
-                    time.sleep(_PAUSE)
-            except KeyboardInterrupt:
-                pass
+            wait_until_over(view, limit)
     if as_json:
         size = None if save is None else save.stat().st_size
         emit({"states": view.states, "lost": view.lost, "file": str(save or "") or None, "bytes": size})

@@ -18,6 +18,7 @@ from heptarm.record.recorder import Recorder
 from heptarm.record.recording import load
 from heptarm.values.arrays import within
 from heptarm.values.state import GROUP_NAMES
+from heptarm.viewers.live import LiveView
 
 #: Pause between two looks whether the time is over [s].
 _PAUSE = 0.1
@@ -53,7 +54,7 @@ def record(
                 print(
                     f"recording {arm.robot.title} to {out}{'' if limit else '; Ctrl-C ends it'}", flush=True
                 )
-            _wait(recorder, limit, note)
+            wait_until_over(recorder, limit, note)
     size = out.stat().st_size
     if as_json:
         emit({"file": str(out), "states": recorder.states, "lost": recorder.lost, "bytes": size})
@@ -62,8 +63,8 @@ def record(
     return 0
 
 
-def _wait(recorder: Recorder, limit: float | None, note: str) -> None:
-    """Let a recorder run for so many seconds, None: until Ctrl-C; with a mark at the beginning."""
+def wait_until_over(recorder: Recorder | LiveView, limit: float | None, note: str = "") -> None:
+    """Let a recorder or a view run for so many seconds, None: until Ctrl-C; with a mark at the beginning."""
     if note:
         recorder.note(note)
     began = time.monotonic()
@@ -82,7 +83,7 @@ def _record_fri(out: Path, limit: float | None, note: str, settings: dict[str, A
             if not as_json:
                 ending = "" if limit else "; Ctrl-C ends it"
                 print(f"recording FRI on UDP port {client.port} to {out}{ending}", flush=True)
-            _wait(recorder, limit, note)
+            wait_until_over(recorder, limit, note)
         cycles = client.count
     size = out.stat().st_size
     if as_json:

@@ -95,12 +95,10 @@ class Tooling:
     @property
     def load(self) -> Body | None:
         """Mass, centre of mass and inertia of what is attached, in the flange frame; None: nothing that is known."""
-        attached = self.attached
-        tool = None if attached is None else self.known.get(attached.tool)
-        workpiece = None if attached is None else self._held(attached)
-        if attached is None or workpiece is None:
+        tool, workpiece, at = self._carried()
+        if workpiece is None:
             return None if tool is None else tool.body
-        held = workpiece.body.placed(self.on_flange(attached.frame))
+        held = workpiece.body.placed(at)
         return held if tool is None else tool.body.joined(held)
 
     def _carried(self) -> tuple[KnownTool | None, Workpiece | KnownTool | None, Pose]:
