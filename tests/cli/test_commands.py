@@ -8,12 +8,15 @@ import math
 import re
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from heptarm.io.plan_box import PlanBox
+from heptarm.io.plan_box import PlanBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import objects, run, sim
 from tests.retry import retry, starved
@@ -134,12 +137,33 @@ def test_dry_run_moves_nothing(target: str) -> None:
     assert after["q"] == pytest.approx(before["q"], abs=1e-6)
 
 
+@contextmanager
+def open_panel() -> Iterator[list[PlanOutline]]:
+    """The plans that an open panel takes meanwhile."""
+    panel, taken, ended = PlanBox(["iiwa14"]), list[PlanOutline](), threading.Event()
+
+    def take() -> None:
+        is_last = False
+        while not is_last:
+            is_last = ended.wait(0.5)
+            plan = panel.take()
+            taken.extend([plan] if plan else [])
+
+    panel.take()
+    looking = threading.Thread(target=take)
+    looking.start()
+    try:
+        yield taken
+    finally:
+        ended.set()
+        looking.join()
+        panel.close()
+
+
 def test_plan_reports_limits_and_collisions_and_moves_nothing(
     target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    panel = PlanBox(["iiwa14"])
-    panel.take()
     (before,) = objects("state", "--target", target)
     words = ("plan", "ptp", "0", "90", "0", "-30", "0", "60", "0", "--deg", "--speed", "0.5")
     (ahead,) = objects(*words, "--out", str(tmp_path / "plan.svg"), "--target", target)
@@ -148,10 +172,11 @@ def test_plan_reports_limits_and_collisions_and_moves_nothing(
     assert ahead["checked"] is False and ahead["end_q"] == pytest.approx(
         np.radians([0, 90, 0, -30, 0, 60, 0])
     )
-    done = run(*words, "--box", "0.6,0,0.1,0.6,0.8,0.2", "--show", "--target", target)
+    with open_panel() as ghosts:
+        done = run(*words, "--box", "0.6,0,0.1,0.6,0.8,0.2", "--show", "--target", target)
     assert done.returncode == 1 and re.search(r"collisions .*link_\d .*box 0 after", done.stdout)
-    ghost = panel.take()
-    assert ghost is not None and len(ghost.touches) == 1 and ghost.q[-1] == pytest.approx(ahead["end_q"])
+    (ghost,) = ghosts
+    assert len(ghost.touches) == 1 and ghost.q[-1] == pytest.approx(ahead["end_q"])
     refused = run("plan", "lin-rel", "--x", "3", "--target", target)
     assert refused.returncode == 1 and "Can not plan motion" in refused.stderr
     (after,) = objects("state", "--target", target)
