@@ -23,7 +23,7 @@ REAL_TIME = (
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
 #: One peg is taken from its holder, and one from the hole; more of them with LONG=1.
-ARGUMENTS = {"16_insertion.py": longer(("2",), ())}
+ARGUMENTS: dict[str, tuple[str, ...]] = {"16_insertion.py": longer(("2",), ())}
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself
