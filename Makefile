@@ -61,16 +61,17 @@ lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
+# What computes fills the time in which the others wait, and leaves them the processor when they want it.
 test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
-	@$(MAKE) --no-print-directory test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-computing.log 2>&1 & computing=$$!; \
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 \
+		> build/test-computing.log 2>&1 & computing=$$!; \
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
 	wait $$computing; computing=$$?; cat build/test-computing.log; exit $$((waiting + computing))
 	$(PY) -m pytest $(LONGEST) -m alone
 	@$(MAKE) --no-print-directory test-ros
 
-# It fills the time in which the others wait, and leaves them the processor when they want it.
-test-computing: setup  ## tests that wait for nothing: values, protocols, kinematics, simulated steps, training
-	nice -n 5 $(PY) -m pytest $(LONGEST) -m "computing and not alone"
+test-computing: setup $(STAMPS)/browser  ## tests that mostly compute: values, protocols, kinematics, simulated steps, training, compilers, the site
+	$(PY) -m pytest $(LONGEST) -m "computing and not alone"
 
 # They mostly wait for arms that move, so the parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
 ROS_JOBS ?= 3

@@ -25,7 +25,7 @@ const images = [...document.images].filter(i => !i.complete || i.naturalWidth ==
 return {wide: wide, culprits: culprits, images: images, title: document.title};
 """
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.computing]
 
 
 @pytest.fixture(scope="module")
