@@ -61,9 +61,10 @@ lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
-# What computes fills the time in which the others wait, and leaves them the processor when they want it.
-test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
-	@nice -n 5 $(MAKE) --no-print-directory --keep-going test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 \
+# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it. The one
+# goes on when the other fails; both are shown at the end.
+test: setup $(STAMPS)/browser  ## everything; what takes long begins first
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 \
 		> build/test-computing.log 2>&1 & computing=$$!; \
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
 	wait $$computing; computing=$$?; cat build/test-computing.log; exit $$((waiting + computing))
