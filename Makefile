@@ -61,23 +61,25 @@ lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
-test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
-	@$(MAKE) --no-print-directory test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-computing.log 2>&1 & computing=$$!; \
+# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it. The one
+# goes on when the other fails; both are shown at the end.
+test: setup $(STAMPS)/browser  ## everything; what takes long begins first
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 \
+		> build/test-computing.log 2>&1 & computing=$$!; \
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
 	wait $$computing; computing=$$?; cat build/test-computing.log; exit $$((waiting + computing))
 	$(PY) -m pytest $(LONGEST) -m alone
 	@$(MAKE) --no-print-directory test-ros
 
-# It fills the time in which the others wait, and leaves them the processor when they want it.
-test-computing: setup  ## tests that wait for nothing: values, protocols, kinematics, simulated steps, training
-	nice -n 5 $(PY) -m pytest $(LONGEST) -m "computing and not alone"
+test-computing: setup $(STAMPS)/browser  ## tests that mostly compute: values, protocols, kinematics, simulated steps, training, compilers, the site
+	$(PY) -m pytest $(LONGEST) -m "computing and not alone"
 
-# They mostly wait for arms that move, so the two parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
+# They mostly wait for arms that move, so the parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
 ROS_JOBS ?= 3
 SIDE_BY_SIDE = @$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target)
 
 test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, parts of both side by side; ROS_JOBS=1: one after the other
-	$(SIDE_BY_SIDE) ros2-shared ros1-shared ros2-own ros1-own
+	$(SIDE_BY_SIDE) ros1-shared ros2-shared ros2-own ros1-own ros2-surface ros1-surface
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
 	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST) -m "not alone"
@@ -91,13 +93,13 @@ test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 
 	scripts/test_pythons.sh $(PYTHONS)
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
-	$(SIDE_BY_SIDE) ros2-shared ros2-own
+	$(SIDE_BY_SIDE) ros2-shared ros2-own ros2-surface
 
 test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where there are packages of it
-	$(SIDE_BY_SIDE) ros1-shared ros1-own
+	$(SIDE_BY_SIDE) ros1-shared ros1-own ros1-surface
 
 # ros1 or ros2, and the part of its suite: see tests/conformance/parts.py
-PARTS := ros2-shared ros2-own ros1-shared ros1-own
+PARTS := ros2-shared ros2-own ros2-surface ros1-shared ros1-own ros1-surface
 .PHONY: $(PARTS)
 $(PARTS):
 	@ros=$(firstword $(subst -, ,$@)); if [ -x build/$$ros/bin/python ]; then \

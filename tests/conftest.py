@@ -2,7 +2,8 @@
 
 In one process fast tests come first, then slow ones, then those with a browser. Workers of pytest-xdist begin with the
 folders whose tests take long, and fill up with the many short files of the rest: so no worker is left alone with
-something long at the end. Tests that only compute run beside them, in the time in which those wait.
+something long at the end. Tests that mostly compute run beside them, in the time in which those wait: those of some
+folders, and modules that say so. Nothing in them may depend on its pace, for they have what the others leave.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ _LONG_FIRST = (
     "cpp",
     "record",
 )
-#: Folders whose tests wait for no other process.
+#: Folders whose tests mostly compute.
 _COMPUTING = ("fri", "house", "model", "rl", "schema", "sim", "values", "wire")
 
 # no timing assertions, above all on a busy machine

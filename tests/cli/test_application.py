@@ -1,4 +1,4 @@
-"""`heptarm sim --app`: applications of other people, and those on heptarm's core without a network."""
+"""`heptarm sim --app`: applications of other people."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from heptarm.sim.runtime.application import background, compile_application, fin
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "cabinet" / "samples"
 
+pytestmark = pytest.mark.computing  # compilers, and programs whose clock is the simulator's
 needs_javac = pytest.mark.skipif(shutil.which("javac") is None, reason="no javac here")
 
 FOREIGN = """
@@ -149,33 +150,6 @@ def test_jars_of_a_project_count_unless_they_are_kukas(lab: Path) -> None:
     found = compile_application(lab, out)
     assert found.jars == (lab / "own.jar",)
     assert found.project == lab / "RoboticsAPI.data.xml"
-
-
-@needs_javac
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        (
-            "Visit",
-            (
-                "square = FINISHED",
-                "curve = FINISHED",
-                "interrupted = CANCELLED",
-                "touched = CONDITION by condition 3",
-                "refused = items[0].motion.q[1]: A2 must be in",
-            ),
-        ),
-        (
-            "Stir",
-            ("spoon, moving its bowl", "stirred = CANCELLED", "mm to the side", "lamp 1.0", "ready = true"),
-        ),
-    ],
-)
-def test_an_application_on_heptarms_core_needs_no_network(name: str, said: tuple[str, ...]) -> None:
-    done = sim(SAMPLES, "--app-class", name)
-    assert done.returncode == 0, done.stdout + done.stderr
-    for text in said:
-        assert text in done.stderr
 
 
 WILD = """\ufeffpackage lab;

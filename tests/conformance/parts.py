@@ -1,7 +1,8 @@
-"""The two parts of a suite of a node, which run side by side: PART=shared or PART=own.
+"""The parts of a suite of a node, which run side by side: PART=shared, PART=surface or PART=own.
 
-Most tests wait for an arm that moves. Those of the shared node use one cabinet; the others start nodes of their own on
-another one, so two processes need no more cabinets than one.
+Most tests wait for an arm that moves. Those of the shared node use one cabinet; the others use another one, with one
+node for services, actions and topics, or with nodes that each test starts for itself. These are apart, so that no part
+takes much longer than another.
 """
 
 from __future__ import annotations
@@ -12,17 +13,25 @@ import pytest
 
 #: The fixture that only tests of the shared node use.
 SHARED = "stage"
+#: The module with a node of its own for all its tests.
+SURFACE = "test_surface"
+PARTS = ("shared", "surface", "own")
 
 
 def select(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests of the other part."""
+    """Leave out the tests of the other parts."""
     part = os.environ.get("PART")
     if part is None:
         return
-    assert part in ("shared", "own"), part
+    assert part in PARTS, part
     kept, left = [], []
     for item in items:
-        uses = SHARED in getattr(item, "fixturenames", ())
-        (kept if uses == (part == "shared") else left).append(item)
+        (kept if _part(item) == part else left).append(item)
     items[:] = kept
     config.hook.pytest_deselected(items=left)
+
+
+def _part(item: pytest.Item) -> str:
+    if SHARED in getattr(item, "fixturenames", ()):
+        return "shared"
+    return "surface" if item.path.stem == SURFACE else "own"

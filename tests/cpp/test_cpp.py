@@ -278,6 +278,7 @@ def test_example_runs(name: str, tmp_path: Path) -> None:
     assert {"first_motion": "refused: ", "servo": "targets followed"}[name] in done.stdout
 
 
+@pytest.mark.computing
 def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     """A block with a main is a program; the others are the body of one function, in their order."""
     blocks = re.findall(r"^```cpp\n(.*?)^```", (ROOT / "docs" / "guide" / "cpp.md").read_text(), re.S | re.M)

@@ -25,7 +25,7 @@ const images = [...document.images].filter(i => !i.complete || i.naturalWidth ==
 return {wide: wide, culprits: culprits, images: images, title: document.title};
 """
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.computing]
 
 
 @pytest.fixture(scope="module")
@@ -73,16 +73,16 @@ def test_every_link_within_the_site_has_its_target(site: Path) -> None:
 @pytest.mark.browser
 def test_every_page_fits_a_desktop_and_a_phone(site: Path, browser: Any) -> None:
     wrong = []
-    for width, height in SIZES:
-        browser.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600},
-        )
-        for page in sorted(site.rglob("*.html")):
-            name = page.relative_to(site).as_posix()
-            if name.startswith(("_modules/", "_static/")):
-                continue
-            browser.get(page.as_uri())
+    for page in sorted(site.rglob("*.html")):
+        name = page.relative_to(site).as_posix()
+        if name.startswith(("_modules/", "_static/")):
+            continue
+        browser.get(page.as_uri())
+        for width, height in SIZES:
+            browser.execute_cdp_cmd(
+                "Emulation.setDeviceMetricsOverride",
+                {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600},
+            )
             seen = browser.execute_script(LOOK)
             if seen["wide"]:
                 wrong.append(f"{name} at {width} px is too wide: {seen['culprits']}")

@@ -15,6 +15,11 @@ from heptarm.values.robot import robot
 HERE = Path(__file__).parent
 #: Cabinet seconds per second: applications mostly wait for motions.
 SPEED = 4.0
+#: The compiler, started for a short run.
+JAVAC = (
+    *("javac", "-J-XX:TieredStopAtLevel=1", "-J-XX:+UseSerialGC"),
+    *("-proc:none", "--release", "17"),
+)
 
 SAID = (
     "initialize = LBR_iiwa_14_R820_1",
@@ -63,8 +68,7 @@ def _compile(source: Path, out: Path) -> None:
     if shutil.which("javac") is None:
         pytest.skip("no javac here")
     classpath = ":".join(str(jar) for jar in _resources.jars())
-    command = ["javac", "-proc:none", "--release", "17", "-cp", classpath, "-d", str(out), str(source)]
-    subprocess.run(command, check=True)
+    subprocess.run([*JAVAC, "-cp", classpath, "-d", str(out), str(source)], check=True)
 
 
 def _command(application: str, classes: Path, *data: str, speed: float = SPEED) -> list[str]:

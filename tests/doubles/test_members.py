@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from tests.doubles.test_doubles import HERE, _compile, _run
 
+pytestmark = pytest.mark.computing  # a compiler, and a program whose clock is the simulator's
 SOURCE = HERE / "java" / "Members.java"
 
 

@@ -13,6 +13,7 @@ from heptarm import _resources
 from tests.doubles import surface
 from tests.doubles.test_doubles import HERE, _compile
 
+pytestmark = pytest.mark.computing
 ROOT = Path(__file__).parents[2]
 PARTS, _ = surface.read()
 CLASSES = tuple(one for part in PARTS for one in part.classes)

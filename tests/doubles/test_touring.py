@@ -11,7 +11,7 @@ import pytest
 
 from heptarm import _resources
 from heptarm.sim.runtime import project as templates
-from tests.doubles.test_doubles import HERE, _command
+from tests.doubles.test_doubles import HERE, JAVAC, _command
 
 SOURCES = ("Touring", "Counting", "Waiting", "ICounter", "Pen")
 
@@ -123,9 +123,7 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
         pytest.skip("no javac here")
     path = ":".join(str(jar) for jar in _resources.jars())
     sources = [str(HERE / "java" / f"{name}.java") for name in SOURCES]
-    subprocess.run(
-        ["javac", "-proc:none", "--release", "17", "-cp", path, "-d", str(tmp_path), *sources], check=True
-    )
+    subprocess.run([*JAVAC, "-cp", path, "-d", str(tmp_path), *sources], check=True)
     said = tmp_path / "said.txt"
     command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}", speed=1.0)
     command += ["--project", str(project), "--parent-pipe"]

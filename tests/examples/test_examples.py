@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.long import longer
 from tests.retry import busy, retry
 from tests.simulators import FASTER, PATIENT, PATIENT_AND_FASTER
 
@@ -21,6 +22,8 @@ REAL_TIME = (
 )
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
+#: One peg is taken from its holder, and one from the hole; more of them with LONG=1.
+ARGUMENTS: dict[str, tuple[str, ...]] = {"16_insertion.py": longer(("2",), ())}
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself
@@ -44,7 +47,7 @@ def test_example(example: Path, request: pytest.FixtureRequest) -> None:
 
     def run() -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-c", before + RUNNER, str(example)],
+            [sys.executable, "-c", before + RUNNER, str(example), *ARGUMENTS.get(example.name, ())],
             capture_output=True,
             text=True,
             timeout=140,

@@ -118,8 +118,9 @@ RULES = (
     Rule(r"\b(?:class|interface|enum|record) Desk\b", "ApplicationServices", exact=True),
     Rule(r"\b(?:class|interface|enum|record) \w*Insight\b", "SimulatorProbe", exact=True),
 )
-#: Any of the words: a quick check, since most lines have none.
-_ANY = re.compile("|".join(rule.word for rule in RULES), re.I)
+#: Any of the words, in words and in a text as it stands: a quick check, since most lines have none.
+_ANY = re.compile(rf"(?<!\w)(?:{'|'.join(rule.word for rule in RULES if not rule.exact)})(?!\w)", re.I)
+_ANY_EXACT = re.compile("|".join(rule.word for rule in RULES if rule.exact))
 _INSIDE = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_")
 
 
@@ -136,7 +137,7 @@ def files() -> Iterator[Path]:
 def found_in(line: str) -> Iterator[tuple[str, Rule]]:
     """The words of a line that are not used."""
     words = _INSIDE.sub(" ", line)
-    if not _ANY.search(line) and not _ANY.search(words):
+    if not _ANY.search(words) and not _ANY_EXACT.search(line):
         return
     for rule in RULES:
         text = line if rule.exact else words

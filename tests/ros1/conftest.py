@@ -22,7 +22,7 @@ os.environ.pop("HEPTARM_TARGET", None)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests of the other part; ROS 1 is older than what Python calls deprecated."""
+    """Leave out the tests of the other parts; ROS 1 is older than what Python calls deprecated."""
     parts.select(config, items)
     for item in items:
         if item.path.parent == Path(__file__).parent:

@@ -48,7 +48,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the tests of the other part, where the environment selects one."""
+    """Leave out the tests of the other parts, where the environment selects one."""
     parts.select(config, items)
 
 

@@ -27,7 +27,8 @@ def recode(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Bodies], list[
     classes = tmp_path_factory.mktemp("recode")
     classpath = os.pathsep.join([str(_resources.jars()[0]), str(classes)])
     source = Path(__file__).parent / "java" / "Recode.java"
-    subprocess.run(["javac", "-proc:none", "-cp", classpath, "-d", str(classes), str(source)], check=True)
+    javac = ["javac", "-J-XX:TieredStopAtLevel=1", "-J-XX:+UseSerialGC", "-proc:none"]
+    subprocess.run([*javac, "-cp", classpath, "-d", str(classes), str(source)], check=True)
 
     def run(bodies: Bodies) -> list[str]:
         lines = "".join(f"{number} {body.hex()}\n" for number, body in bodies)
