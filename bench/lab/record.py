@@ -6,6 +6,8 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,10 @@ from bench.measure.figure import Figure, benchmark
 from bench.state.push import States
 from heptarm.values.state import GROUP_NAMES
 
-#: Seconds that are recorded, and as many without a recorder, over all blocks; LONG=1: ten minutes.
-SECONDS = float(os.environ.get("BENCH_SECONDS", "600" if os.environ.get("LONG") else "60")) / 2
+#: Seconds that are recorded, and as many without a recorder, over all blocks of a placement.
+SECONDS = float(os.environ.get("BENCH_SECONDS", "60")) / 2
+#: Seconds of one more recording, without a break.
+WHOLE = 600.0 if os.environ.get("LONG") else 0.0
 RATE = 1000
 #: Largest factor on the age of the states in the user's loop.
 LIMIT = 1.05
@@ -35,7 +39,7 @@ class RecordedBlocks:
 
     def __init__(self, arm: ha.Arm, folder: Path, seconds: float) -> None:
         self._arm, self._folder = arm, folder
-        self._states = States(arm, seconds)
+        self._block_states = States(arm, seconds)
         self.files: list[Path] = []
         self.lost = 0
         self.processor = {"with": 0.0, "without": 0.0}
@@ -43,19 +47,28 @@ class RecordedBlocks:
 
     def recorded(self) -> list[float]:
         """Ages of the states of a block that is recorded [s]."""
-        self.files.append(self._folder / f"{len(self.files)}.mcap")
-        with self._arm.record(self.files[-1]) as recorder:
-            ages = self._block("with")
-        self.lost += recorder.lost
-        return ages
+        with self._recording():
+            return self._block("with")
+
+    def whole(self, seconds: float) -> list[float]:
+        """Ages of the states of a longer recording, which counts among the files but not as a block [s]."""
+        with self._recording():
+            return States(self._arm, seconds).block()
 
     def bare(self) -> list[float]:
         """Ages of the states of a block that is not [s]."""
         return self._block("without")
 
+    @contextmanager
+    def _recording(self) -> Iterator[None]:
+        self.files.append(self._folder / f"{len(self.files)}.mcap")
+        with self._arm.record(self.files[-1]) as recorder:
+            yield
+        self.lost += recorder.lost
+
     def _block(self, kind: str) -> list[float]:
         began, used = time.monotonic(), time.process_time()
-        ages = self._states.block()
+        ages = self._block_states.block()
         self.time[kind] += time.monotonic() - began
         self.processor[kind] += time.process_time() - used
         return ages
@@ -78,23 +91,29 @@ def record() -> Iterator[Figure]:
             ha.ptp(ha.deg(30, 40, 10, -70, 20, 60, 30)),
             ha.ptp(ha.deg(-30, 20, -10, -100, -20, 50, -30)),
         )
-        handle = arm.start(
-            [there, back] * min(450, int(SECONDS + 20))
-        )  # longer than the run; closing stops it
+        count = min(450, int(SECONDS + WHOLE + 20))
+        handle = arm.start([there, back] * count)  # longer than the run; closing stops it
         blocks = RecordedBlocks(arm, Path(folder), SECONDS / BLOCKS)
 
         def place(placement: Placement) -> None:
             pin(cabinet.process.pid, placement.far)
 
         found = by_turns(blocks.recorded, blocks.bare, place)
+        ages = blocks.whole(WHOLE) if WHOLE else []
         handle.cancel()
-        runs = [ha.load(one) for one in blocks.files]
+        contents = [_content(one) for one in blocks.files]
         size = sum(one.stat().st_size for one in blocks.files)
-    states = sum(map(len, runs))
-    missing = sum(len(np.setdiff1d(_ticks(run), run["stamp"] // 1_000_000)) for run in runs)
-    cut = sum(not run.complete for run in runs)
+    states = sum(one.states for one in contents)
+    missing = sum(one.missing for one in contents)
+    cut = sum(one.is_cut for one in contents)
     noisy = any(one.is_noisy for comparison in found for one in comparison.noise)
-    detail = {"states": states, "not_pushed": missing, "files_cut_off": cut}
+    detail: dict[str, object] = {"states": states, "not_pushed": missing, "files_cut_off": cut}
+    if ages:
+        p50, p99 = np.percentile(ages, (50, 99)) * 1e6
+        detail |= {
+            "without_a_break": contents[-1].states,
+            "age_us": [round(float(p50), 1), round(float(p99), 1)],
+        }
     yield Figure("record_lost", blocks.lost + cut, "count", limit=0, disturbed=noisy, detail=detail)
     for comparison in found:
         yield comparison.figure("record_age", 50, "us", limit=LIMIT, scale=1e6)
@@ -108,6 +127,23 @@ def record() -> Iterator[Figure]:
     )
 
 
-def _ticks(run: ha.Recording) -> np.ndarray:
-    """Every millisecond between the first and the last state."""
-    return np.arange(run["stamp"][0] // 1_000_000, run["stamp"][-1] // 1_000_000)
+@dataclass(frozen=True)
+class FileContent:
+    """What a file contains.
+
+    Attributes:
+        states: in it.
+        missing: milliseconds between its first and its last state that have none.
+        is_cut: it has no end.
+    """
+
+    states: int
+    missing: int
+    is_cut: bool
+
+
+def _content(file: Path) -> FileContent:
+    run = ha.load(file)
+    at = run["stamp"] // 1_000_000
+    missing = len(np.setdiff1d(np.arange(at[0], at[-1]), at))
+    return FileContent(len(run), missing, not run.complete)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,16 +17,17 @@ from heptarm.io.clock import StepClock
 FORWARD = [1.0, 0, 0, 0, 0, 0]
 
 
-def test_an_input_is_clipped_and_checked() -> None:
-    one = devices.DeviceInput.of([2.0, -3.0, 0.5, 0, 0, 0], ["LB"])
+@pytest.mark.parametrize("make", [devices.DeviceInput.of, devices.DeviceInput])
+def test_an_input_is_clipped_and_checked(make: Callable[..., devices.DeviceInput]) -> None:
+    one = make([2.0, -3.0, 0.5, 0, 0, 0], ["LB"])
     assert one.twist.tolist() == [1, -1, 0.5, 0, 0, 0] and one.buttons == {"LB"}
-    assert one == devices.DeviceInput.of([1, -1, 0.5, 0, 0, 0], {"LB"})
+    assert one == make([1, -1, 0.5, 0, 0, 0], {"LB"})
     with pytest.raises(ShapeError, match="twist"):
-        devices.DeviceInput.of([0.0] * 5)
+        make([0.0] * 5)
     with pytest.raises(LimitError, match="finite"):
-        devices.DeviceInput.of([float("nan")] * 6)
+        make([float("nan")] * 6)
     with pytest.raises(ShapeError, match="buttons"):
-        devices.DeviceInput.of([0.0] * 6, "LB")
+        make([0.0] * 6, "LB")
 
 
 def test_a_dead_zone_ends_without_a_step() -> None:

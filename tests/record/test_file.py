@@ -16,7 +16,7 @@ from heptarm.record.convert import convert
 from heptarm.record.journal import JournalEntry
 from heptarm.record.layout import STATE
 from heptarm.record.mcap_file import RecordingFile
-from heptarm.record.samples import state_rows
+from heptarm.record.samples import RestWatch, state_rows
 from heptarm.wire import messages as wire
 from tests.record.bodies import BEGIN, EPOCH, PERIOD, RECEIVED, body, fri_words, samples, to_ours
 
@@ -98,6 +98,40 @@ def test_signals_are_noted_when_they_change(tmp_path: Path) -> None:
     file.finish({})
     texts = [(round(one.t * 1e3), one.text) for one in load(tmp_path / "io.mcap").events]
     assert texts == [(0, "A.Two = 0"), (2, "A.Two = 1"), (5, "A.Two = 0")]
+
+
+def test_signals_and_mode_are_decoded_only_when_they_change() -> None:
+    mode, watch = wire.PositionMode(), RestWatch()
+
+    def change(stamp: int, signals: int | None, tool: str | None, button: float = 0.0) -> wire.State | None:
+        io = (
+            None
+            if signals is None
+            else wire.IoState(
+                stamp=stamp, values=tuple(wire.SignalValue(index=i, value=button) for i in range(signals))
+            )
+        )
+        group = None if tool is None else wire.ModeState(stamp=stamp + 1, mode=mode, tool=tool)
+        joints = wire.State.decode(body(stamp)).joints
+        return watch.change(wire.State(joints=joints, io=io, mode=group).encode())
+
+    first = change(0, 2, "drill")
+    assert first is not None and first.mode is not None and first.mode.tool == "drill"
+    assert change(1, 2, "drill") is None and change(2, 2, "drill") is None  # only their stamps differ
+    later = change(3, 2, "drill", button=1.0)
+    assert later is not None and later.io is not None and later.io.values[1].value == 1.0
+    steps = [
+        (2, "drilL"),
+        (2, "a longer name"),
+        (3, "a longer name"),
+        (3, None),
+        (None, "drill"),
+        (2, "drill"),
+    ]
+    for number, (signals, tool) in enumerate(steps):
+        assert change(10 + number, signals, tool, button=1.0) is not None
+        assert change(20 + number, signals, tool, button=1.0) is None
+    assert change(30, None, None) is None
 
 
 def test_fri_cycles_have_their_own_times(tmp_path: Path) -> None:

@@ -149,9 +149,13 @@ def test_refuses(make: object, error: type[Exception], text: str) -> None:
 
 
 def test_text() -> None:
-    assert repr(Pose.xyz_abc(0.5, 0, 0.3, *deg(180, 0, 0))) == (
-        "Pose(x=0.5000 y=0.0000 z=0.3000 m, a=180.00 b=0.00 c=0.00 deg)"
+    assert (
+        repr(Pose.of((0.5, 0, 0.3), (0, 0, 1, 0))) == "Pose(xyz=[0.5, 0.0, 0.3], quat=[0.0, 0.0, 1.0, 0.0])"
     )
+    pose = Pose.xyz_abc(1 / 3, 0.123456789, -0.2, *deg(31, 22, 13))
+    again = eval(repr(pose), {"Pose": Pose})
+    assert again.xyz.tolist() == pose.xyz.tolist(), "repr is exact"
+    np.testing.assert_allclose(again.quat, pose.quat, rtol=0, atol=3e-16)
     assert deg(180).tolist() == [math.pi]
 
 

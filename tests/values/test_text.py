@@ -9,6 +9,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.arm.motion.servo import ServoStats
+from heptarm.skills.insertion import Insertion
 from heptarm.values.state import (
     Cartesian,
     Groups,
@@ -72,6 +73,23 @@ def test_notebooks_show_the_same_and_nothing_of_it_is_markup() -> None:
     tool = ha.Tool("<b>", mass=1.0)
     assert tool._repr_html_() == "<pre>" + str(tool).replace("<b>", "&lt;b&gt;") + "</pre>"
     assert STATE._repr_html_().startswith("<pre>State at 1.000 s")
+
+
+def test_an_insertion_is_read_and_compared() -> None:
+    def found(offset: float) -> Insertion:
+        return Insertion(0.03, np.array([offset, 0.0, -0.0001]), POSE, 3.456, True)
+
+    assert str(found(0.0012)).splitlines()[:3] == [
+        "Insertion",
+        "  depth     30.0 mm",
+        "  offset    1.20 0.00 -0.10 mm",
+    ]
+    assert found(0.0012) == found(0.0012) != found(0.0013)
+
+
+@pytest.mark.parametrize("kind", [Insertion, ha.Recording, ha.Recovery])
+def test_what_a_program_gets_back_is_readable_in_a_notebook(kind: type) -> None:
+    assert callable(getattr(kind, "_repr_html_", None)) and kind.__str__ is not object.__str__
 
 
 def test_repr_stays_exact() -> None:

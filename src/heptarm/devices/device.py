@@ -21,7 +21,8 @@ class DeviceInput(Value):
     """What a device reports.
 
     Attributes:
-        twist: deflections x forward, y left, z up, and about x y z by the right-hand rule, each in [-1, 1], shape (6,).
+        twist: deflections x forward, y left, z up, and about x y z by the right-hand rule, shape (6,); each is clipped
+            to [-1, 1].
         buttons: names of the buttons that are held.
 
     Raises:
@@ -32,14 +33,19 @@ class DeviceInput(Value):
     twist: Array
     buttons: frozenset[str] = frozenset()
 
-    @staticmethod
-    def of(twist: npt.ArrayLike, buttons: Iterable[str] = ()) -> DeviceInput:
-        """An input from six numbers, clipped to [-1, 1], and names of buttons; raises as the class does."""
+    def __post_init__(self) -> None:
+        buttons: object = self.buttons
         if isinstance(buttons, str) or not isinstance(buttons, Iterable):
             raise ShapeError(
                 f"buttons must be a list of names, got {shown(buttons)}", parameter="buttons", value=buttons
             )
-        return DeviceInput(frozen(np.clip(array(twist, 6, "twist"), -1.0, 1.0)), frozenset(buttons))
+        object.__setattr__(self, "twist", frozen(np.clip(array(self.twist, 6, "twist"), -1.0, 1.0)))
+        object.__setattr__(self, "buttons", frozenset(buttons))
+
+    @staticmethod
+    def of(twist: npt.ArrayLike, buttons: Iterable[str] = ()) -> DeviceInput:
+        """An input from six numbers and names of buttons in any kind of list; raises as the class does."""
+        return DeviceInput(twist, buttons)  # type: ignore[arg-type]
 
 
 #: A device that nobody touches.

@@ -36,7 +36,7 @@ from heptarm.record.layout import (
     encode_transforms,
     transform_head,
 )
-from heptarm.record.samples import StateSample, rest_of, state_rows
+from heptarm.record.samples import RestWatch, StateSample, state_rows
 from heptarm.values.robot import ROBOTS, robot
 from heptarm.wire import messages as wire
 
@@ -111,8 +111,7 @@ class RecordingFile:
         """Write the beginning of an arm's part, which a file that is cut off still has."""
         self._prefix = f"/{arm}" if arm else ""
         self._pose_due = 0
-        self._rest = b""
-        self._last_signals = ""
+        self._rest = RestWatch()
         self._cycles: int | None = None
         self._out.add_metadata(BEGIN, {**facts, **({ARM: arm} if arm else {})})
         self._states = self._add_rows("/state", STATE)
@@ -175,11 +174,9 @@ class RecordingFile:
 
     def _write_rest(self, one: StateSample, sampled: int, names: Sequence[str]) -> None:
         """Write control mode and signals if they have changed; their stamps do not count."""
-        rest = rest_of(one.body)
-        if not rest or rest[:2] + rest[10:] == self._rest:
+        state = self._rest.change(one.body)
+        if state is None:
             return
-        self._rest = rest[:2] + rest[10:]
-        state = wire.State.decode(rest)
         content: dict[str, Any] = {}
         if state.io is not None:
             content["io"] = {
@@ -189,9 +186,7 @@ class RecordingFile:
         if state.mode is not None:
             content["mode"] = plain(state.mode) | {"stamp": 0}
         data = json.dumps(content, allow_nan=False)
-        if data != self._last_signals:
-            self._last_signals = data
-            self._out.add_message(self._signals, one.received + self._epoch, data.encode(), sampled)
+        self._out.add_message(self._signals, one.received + self._epoch, data.encode(), sampled)
 
     def cycles(self, words: npt.NDArray[np.float64]) -> None:
         """Write FRI cycles; `words` has shape (n, 123)."""

@@ -19,6 +19,7 @@ from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, instance, shown
 from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.text import as_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -235,6 +236,10 @@ class Recording:
         lines.append(f"  motions  {len(self.motions)}")
         lines.append(f"  events   {len(self.events)}, {len(self.notes)} notes")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """The text of `str` for a notebook."""
+        return as_html(str(self))
 
     def __repr__(self) -> str:
         """Short form."""

@@ -14,9 +14,12 @@ import numpy.typing as npt
 
 from heptarm.record.layout import STATE, Rows, column
 from heptarm.values.arrays import Array
+from heptarm.wire import messages as wire
 from heptarm.wire.messages import STATE_LAYOUT
 
 _FIXED = sum(bit for _, bit, _ in STATE_LAYOUT)
+#: Sizes of the mask of a state's groups, and of the stamp with which each of them begins [bytes].
+_MASK_SIZE, _STAMP_SIZE = 2, 8
 
 
 class StateSample(NamedTuple):
@@ -148,12 +151,47 @@ def state_rows(bodies: Sequence[bytes]) -> Rows:
     return rows
 
 
-def rest_of(body: bytes) -> bytes:
-    """The body of a state that has only those groups of another one whose size varies; empty: it has none."""
-    mask = _mask(body)
-    if not mask & ~_FIXED:
-        return b""
-    return (mask & ~_FIXED).to_bytes(2, "big") + body[_body_dtype(mask).itemsize :]
+class RestWatch:
+    """Watches the groups of a state whose size varies, signals and control mode, for changes besides their stamps.
+
+    They hardly ever change, and to decode them takes longer than to record the state; so their bytes are compared.
+    """
+
+    def __init__(self) -> None:
+        self._stamps: tuple[slice, ...] = ()
+        self._last = b""
+
+    def change(self, body: bytes) -> wire.State | None:
+        """Those groups of a state, if they are not the same as in the state before; None: the same, or it has none.
+
+        Raises:
+            DecodeError: bytes that are no state.
+        """
+        mask = _mask(body)
+        if not mask & ~_FIXED:
+            return None
+        rest = (mask & ~_FIXED).to_bytes(2, "big") + body[_body_dtype(mask).itemsize :]
+        if self._timeless(rest) == self._last:
+            return None
+        state = wire.State.decode(rest)
+        begin_of_mode = len(rest) - len(wire.State(mode=state.mode).encode()) + _MASK_SIZE
+        self._stamps = tuple(
+            slice(begin, begin + _STAMP_SIZE)
+            for begin, group in ((begin_of_mode, state.mode), (_MASK_SIZE, state.io))
+            if group is not None
+        )
+        self._last = self._timeless(rest)
+        return state
+
+    def _timeless(self, rest: bytes) -> bytes:
+        """Without the bytes at which the last state that was decoded had its stamps.
+
+        Equal results belong to equal places: what decides where a stamp is, the mask and the number of signals, is
+        compared as well.
+        """
+        for stamp in self._stamps:
+            rest = rest[: stamp.start] + rest[stamp.stop :]
+        return rest
 
 
 #: Labels of the entries of signals by their number of entries, and by name where that is not enough.

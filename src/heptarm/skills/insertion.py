@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.errors import InsertionFailed, MotionAborted, Timeout
-from heptarm.values.arrays import Array, instance, within
+from heptarm.values.arrays import Array, Value, instance, within
 from heptarm.values.condition.contact import axis_of
 from heptarm.values.condition.force import force as force_signal
 from heptarm.values.frames import TOOL, check_name
@@ -21,6 +21,7 @@ from heptarm.values.motion.spline import spline
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause
 from heptarm.values.state import State
+from heptarm.values.text import fixed, lines
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
@@ -46,8 +47,8 @@ _BEYOND = 2e-3
 _STRONGEST = 100.0
 
 
-@dataclass(frozen=True, slots=True)
-class Insertion:
+@dataclass(frozen=True, slots=True, eq=False)
+class Insertion(Value):
     """How a part went into its hole.
 
     Attributes:
@@ -64,6 +65,17 @@ class Insertion:
     pose: Pose
     duration: float
     searched: bool
+
+    def __str__(self) -> str:
+        """A few lines with units."""
+        rows = {
+            "depth": f"{fixed(self.depth * 1e3, 1)} mm",
+            "offset": f"{' '.join(fixed(one * 1e3, 2) for one in self.offset)} mm",
+            "pose": str(self.pose),
+            "duration": f"{fixed(self.duration, 2)} s",
+            "searched": "yes" if self.searched else "no",
+        }
+        return lines("Insertion", rows)
 
 
 def insert(

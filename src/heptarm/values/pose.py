@@ -335,9 +335,8 @@ class Pose(Value):
         return f"x {x}  y {y}  z {z} mm   a {a}  b {b}  c {c} deg   ({si} m, xyzw {quat})"
 
     def __repr__(self) -> str:
-        """Short form in KUKA's notation, degrees."""
-        a, b, c = np.degrees(self.abc)
-        return f"Pose(x={self.x:.4f} y={self.y:.4f} z={self.z:.4f} m, a={a:.2f} b={b:.2f} c={c:.2f} deg)"
+        """Exact: the expression that makes this pose; `str` is the readable form."""
+        return f"Pose(xyz={self.xyz.tolist()}, quat={self.quat.tolist()})"
 
 
 def check_pose(pose: Pose, parameter: str = "pose") -> None:

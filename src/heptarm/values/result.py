@@ -124,8 +124,8 @@ class MotionEvent(Value):
         return action.label if isinstance(action, Notify) else ""
 
 
-@dataclass(frozen=True, slots=True)
-class Recovery:
+@dataclass(frozen=True, slots=True, eq=False)
+class Recovery(Value):
     """What the software did to recover, and what is left to the operator.
 
     Attributes:
