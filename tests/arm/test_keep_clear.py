@@ -156,7 +156,7 @@ def test_poses_stop_above_a_box(arm: ha.Arm, box: ha.CollisionModel, kind: Any) 
         assert arm.state.pose.distance_to(last) < 2e-3
         gap = min(one.distance for one in box.carrying(pen).clearances(arm.state.q))
         sv.set(start)  # it may leave
-    assert sv.stats.slowdowns[0].reason == "pen near box" and sv.stats.refused == 0
+    assert sv.stats.slowdowns[0].reason.startswith("pen near box") and sv.stats.refused == 0
     assert 0.017 < gap < 0.033
 
 
