@@ -15,7 +15,7 @@
     │   │   ├── Unreachable                 no joint position reaches the pose
     │   │   └── OutsideWorkspace            a command leaves `arm.workspace`
     │   ├── ModeConflict                    conflicts with what is running
-    │   ├── CollisionForeseen               `arm.collision_check` found bodies that would touch
+    │   ├── CollisionForeseen               a collision model found bodies that would touch
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result
     │   ├── MotionAborted                   it was stopped early
@@ -158,7 +158,7 @@ class ModeConflict(CommandRejected):
 
 
 class CollisionForeseen(CommandRejected):
-    """The collision check of the arm found that bodies would touch on the path; nothing was sent.
+    """Bodies would touch, by the collision check of the arm or `keep_clear_of` of a servo stream; it was not sent.
 
     Attributes:
         touch: the bodies, and where on the path.

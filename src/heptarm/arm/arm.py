@@ -689,6 +689,7 @@ class Arm:
         ends, parts = condition_message(self._until(request.until, breaks), self._connection.signals)
         self._tooling.check_until(parts)
         message, boundary = replace(message, until=ends), self._foresight.boundary()
+        clear = None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of)
         period, watchdog = request.period, request.watchdog_time
         if kind == "joint":
             return JointServo(
@@ -697,6 +698,7 @@ class Arm:
                 period=period,
                 watchdog=watchdog,
                 boundary=boundary,
+                clear=clear,
                 until=parts,
                 breaks=breaks,
             )
@@ -709,11 +711,11 @@ class Arm:
                 watchdog=watchdog,
                 moving=moving,
                 boundary=boundary,
+                clear=clear,
                 until=parts,
                 breaks=breaks,
             )
         speed, acceleration = request.joint_fractions(self._speed)
-        clear = None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of)
         limits = JogLimits(speed, acceleration, request.silence, boundary, clear)
         if kind == "velocity":
             return VelocityServo(

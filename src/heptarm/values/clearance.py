@@ -70,7 +70,7 @@ class CollisionCheck(Protocol):
 
 
 class ClearanceModel(Protocol):
-    """What `keep_clear_of` of a stream of velocities needs; `heptarm.CollisionModel` is one."""
+    """What `keep_clear_of` of a servo stream needs; `heptarm.CollisionModel` is one."""
 
     @property
     def margin(self) -> float:

@@ -14,10 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
+from heptarm.arm.motion.clear import ClearTargets
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
 from heptarm.errors import (
+    CollisionForeseen,
     CommandRejected,
     HeptarmError,
     LocalProtocolError,
@@ -120,9 +122,9 @@ class ServoRequest:
             is the velocity of its origin.
         frame: of "twist": its axes: "tool", "flange", "base", a name, or a pose in the base; None: "tool".
         timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
-        keep_clear_of: of velocities: bodies to brake before, such as a `heptarm.CollisionModel`, which has the shapes
-            of the attached tool and workpiece as well; None: none. It is no safety function: it knows only its own
-            model of the scene.
+        keep_clear_of: model of bodies to keep clear of, such as a `heptarm.CollisionModel`, which has the shapes of the
+            attached tool and workpiece as well: velocities brake before them, targets that are nearer than its margin
+            are refused; None: none. It is no safety function: it knows only its own model of the scene.
         until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
             robot answers. See `move`.
 
@@ -302,14 +304,12 @@ class ServoRequest:
                 parameter="engine",
                 hint="leave it out",
             )
-        if self.kind not in VELOCITIES:
-            for name in ("timeout", "keep_clear_of"):
-                if getattr(self, name) is not None:
-                    raise CommandRejected(
-                        f'{name} applies to arm.servo("velocity") and arm.servo("twist") only',
-                        parameter=name,
-                        hint="leave it out",
-                    )
+        if self.kind not in VELOCITIES and self.timeout is not None:
+            raise CommandRejected(
+                'timeout applies to arm.servo("velocity") and arm.servo("twist") only',
+                parameter="timeout",
+                hint="leave it out",
+            )
         if self.frame is not None and self.kind != "twist":
             raise CommandRejected(
                 'frame applies to arm.servo("twist") only', parameter="frame", hint="leave it out"
@@ -358,8 +358,10 @@ class ServoStats:
         age_median: median age of the targets when they were applied [s]; NaN: not reported yet.
         age_p99: its 99th percentile [s].
         text: why the last refused target was refused.
-        slowdown: of a stream of velocities: why it is slower than commanded now, and by which factor.
+        slowdown: of a stream of velocities: why it is slower than commanded now, and by which factor. Of targets: why
+            the newest one was held, by the factor 0.
         slowdowns: for each reason so far, the smallest factor.
+        held: targets that were not sent because bodies of `keep_clear_of` are near them; the last good one was.
     """
 
     sent: int
@@ -376,6 +378,7 @@ class ServoStats:
     text: str = ""
     slowdown: Slowdown = FREE
     slowdowns: tuple[Slowdown, ...] = ()
+    held: int = 0
 
     def __str__(self) -> str:
         """A few aligned lines with units."""
@@ -385,6 +388,7 @@ class ServoStats:
             "cabinet": f"{self.received} received, {self.applied} applied, {self.refused} refused, {self.late} gaps",
             "age": f"{fixed(self.age_median * 1e3, 2)} ms median, {fixed(self.age_p99 * 1e3, 2)} ms p99 when applied",
             "refused": self.text,
+            "held": f"{self.held} targets at the last good one" if self.held else "",
             "slowed": "; ".join(map(str, self.slowdowns)),
         }
         return lines("Servo", rows)
@@ -415,6 +419,7 @@ class Servo(Block):
         period: float,
         watchdog: float,
         boundary: Boundary | None = None,
+        clear: ClearanceModel | None = None,
         until: tuple[Condition, ...] = (),
         breaks: tuple[BreakRule, ...] = (),
     ) -> None:
@@ -425,6 +430,8 @@ class Servo(Block):
         self._clock = connection.clock
         self._message = message
         self._boundary = boundary
+        self._clear_of = clear
+        self._clear: ClearTargets | None = None
         self._until = until
         self._breaks = breaks
         self._handle: MotionHandle | None = None
@@ -467,6 +474,12 @@ class Servo(Block):
         self._start = self._connection.wait_for(
             lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
         )
+        if self._clear_of is not None:
+            try:
+                self._clear = ClearTargets(self._clear_of, self._start.q)
+            except BaseException:  # of the model: there will be no targets
+                handle.cancel()
+                raise
         self._warm_up_socket = WarmUpConnection()
         self._began = self._due = self._last = self._clock.nanos()
         self._number, self._active = handle.id, True
@@ -543,6 +556,8 @@ class Servo(Block):
 
     def _warm_up(self) -> None:
         """Encode and send the last target to nowhere: between two ticks the code falls out of the caches."""
+        if self._clear is not None:
+            self._clear.warm_up()
         if self._last_target is not None and self._warm_up_socket is not None:
             with suppress(HeptarmError):  # the link has ended: sending the next target raises
                 self._warm_up_socket.send(self._link.pack_target(*self._last_target, now=self._clock.nanos()))
@@ -577,6 +592,9 @@ class Servo(Block):
         median, p99 = np.percentile(self._costs, [50, 99]) * 1e-9 if self._costs else (nan, nan)
         rate = (self._sent - 1) / seconds if self._sent > 1 and seconds > 0 else nan
         stats = ServoStats(self._sent, rate, self._late_ticks, float(median), float(p99))
+        if self._clear is not None:
+            clear = self._clear
+            stats = replace(stats, slowdown=clear.slowdown, slowdowns=clear.slowdowns, held=clear.held)
         report = None if self._handle is None else self._connection.events.servo_status(self._handle.id)
         if report is None:
             return stats
@@ -603,6 +621,7 @@ class JointServo(Servo):
         period: float,
         watchdog: float,
         boundary: Boundary | None = None,
+        clear: ClearanceModel | None = None,
         until: tuple[Condition, ...] = (),
         breaks: tuple[BreakRule, ...] = (),
     ) -> None:
@@ -612,6 +631,7 @@ class JointServo(Servo):
             period=period,
             watchdog=watchdog,
             boundary=boundary,
+            clear=clear,
             until=until,
             breaks=breaks,
         )
@@ -636,6 +656,7 @@ class JointServo(Servo):
         Raises:
             ShapeError: not seven numbers.
             LimitError: one is not finite; OutsideWorkspace if `arm.workspace` refuses the target.
+            CollisionForeseen: bodies of `keep_clear_of` are too near; the last good target was sent again, to rest at.
             CommandRejected: a velocity for the engine "direct", which takes none.
         """
         began = self._clock.nanos()
@@ -651,11 +672,16 @@ class JointServo(Servo):
             if dq is not None and sent.tolist() != target:
                 dq = np.zeros(7)  # it comes to rest at the wall
             target = sent.tolist()
+        velocity = [] if dq is None else array(dq, 7, "dq").tolist()
+        if self._clear is not None and self._active:
+            try:
+                self._clear.check(sent, parameter="q")
+            except CollisionForeseen:
+                self._newest = self._clear.q
+                self._send(began, wire.ServoJoints, self._newest.tolist())
+                raise
         self._newest = sent
-        if dq is None:
-            self._send(began, wire.ServoJoints, target)
-        else:
-            self._send(began, wire.ServoJointsVelocity, target + array(dq, 7, "dq").tolist())
+        self._send(began, wire.ServoJoints if dq is None else wire.ServoJointsVelocity, target + velocity)
         return sent
 
     def _clip(self, q: npt.ArrayLike) -> tuple[Array, list[float]]:
@@ -699,6 +725,7 @@ class PoseServo(Servo):
         watchdog: float,
         moving: Pose,
         boundary: Boundary | None = None,
+        clear: ClearanceModel | None = None,
         until: tuple[Condition, ...] = (),
         breaks: tuple[BreakRule, ...] = (),
     ) -> None:
@@ -708,12 +735,14 @@ class PoseServo(Servo):
             period=period,
             watchdog=watchdog,
             boundary=boundary,
+            clear=clear,
             until=until,
             breaks=breaks,
         )
         self._to_flange = moving.inverse()  # moving: pose of the motion frame in the flange frame
         self._newest: Pose | None = None
         self._near: Array | None = None
+        self._good: Pose | None = None  # the last target that kept clear of bodies
 
     def __enter__(self) -> PoseServo:
         """Begin; see `Servo.__enter__`."""
@@ -732,13 +761,34 @@ class PoseServo(Servo):
         Raises:
             ShapeError: not a Pose.
             OutsideWorkspace: `arm.workspace` refuses the target.
+            CollisionForeseen: bodies of `keep_clear_of` are too near; the last good target was sent again.
         """
         began = self._clock.nanos()
         check_pose(pose)
         if self._boundary is not None:
             pose = self._inside(pose, self._boundary)
+        if self._clear is not None and self._active:
+            try:
+                self._check_clear(pose, self._clear)
+            except CollisionForeseen:
+                good = self._newest = self._here if self._good is None else self._good
+                self._send(began, wire.ServoPose, good.xyz.tolist() + good.quat.tolist())
+                raise
         self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
         return pose
+
+    def _check_clear(self, pose: Pose, clear: ClearTargets) -> None:
+        """Check the joint positions nearest to the last good ones, which the cabinet will choose as well.
+
+        Raises:
+            CollisionForeseen: bodies are too near.
+        """
+        try:
+            q = solve(self._connection.robot, pose @ self._to_flange, near=clear.q.tolist())
+        except Unreachable:
+            return  # the cabinet refuses it
+        clear.check(q, parameter="pose")
+        self._good = pose
 
     def _inside(self, pose: Pose, boundary: Boundary) -> Pose:
         """The target inside the workspace.

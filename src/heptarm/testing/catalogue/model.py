@@ -70,21 +70,21 @@ def inverse(arm: Arm) -> None:
 def in_bulk(arm: Arm) -> None:
     """Kinematics of a thousand poses at once equal those of one pose, and keep arm angle and Status."""
     here = arm.wait_for_rest().q
-    q = here + np.random.default_rng(1).uniform(-0.1, 0.1, (1000, 7))
+    q = HOME + np.random.default_rng(1).uniform(
+        -0.1, 0.1, (1000, 7)
+    )  # away from singularities, where `here` may be
     q[0] = here
     poses, jacobians = model.forward_batch(arm.robot, q), model.jacobian_batch(arm.robot, q)
     near(poses[0][:3, 3], arm.pose("flange").xyz, 2e-4, "place of the flange, of the first pose", unit="m")
     for row in (0, 1, 999):
         near(poses[row], model.forward(arm.robot, q[row]), 1e-12, f"pose {row}")
         near(jacobians[row], model.jacobian(arm.robot, q[row]), 1e-12, f"Jacobian {row}")
-    own = model.redundancy_batch(arm.robot, q)
-    found = model.solve_batch(arm.robot, poses, e1=own.e1, status=own.status)
-    inside = ((q >= arm.robot.q_min) & (q <= arm.robot.q_max)).all(axis=1)
-    above(float(inside.sum()), 500.0, "poses within the joint limits")
-    near(found[inside], q[inside], 1e-6, "joints from poses, E1 and Status", unit="rad")
-    again = model.redundancy_batch(arm.robot, found[inside])
-    near(np.angle(np.exp(1j * (again.e1 - own.e1[inside]))), 0.0, 1e-6, "E1 changes by", unit="rad")
-    holds(bool((again.status == own.status[inside]).all()), "and Status does not")
+    own = model.redundancy_batch(arm.robot, q[1:])
+    found = model.solve_batch(arm.robot, poses[1:], e1=own.e1, status=own.status)
+    near(found, q[1:], 1e-6, "joints from poses, E1 and Status", unit="rad")
+    again = model.redundancy_batch(arm.robot, found)
+    near(np.angle(np.exp(1j * (again.e1 - own.e1))), 0.0, 1e-6, "E1 changes by", unit="rad")
+    holds(bool((again.status == own.status).all()), "and Status does not")
 
 
 @scenario(line=11, rows="K2 K3 K6 G2", space=0.15, needs=("ptp",))

@@ -8,7 +8,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.motion.servo import JointServo, PoseServo, Servo
-from heptarm.errors import HeptarmError, MotionAborted, Starved
+from heptarm.errors import CollisionForeseen, HeptarmError, MissingExtra, MotionAborted, Starved
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.values.arrays import Array
@@ -182,6 +182,34 @@ def twist(arm: Arm) -> None:
     near(last.pose.y - first.pose.y, speed * seconds, 0.35 * speed, "distance along y", unit="m")
     near(last.pose.angle_to(first.pose), turn * seconds, 0.35 * turn, "turned", unit="rad")
     near(last.pose.xyz[[0, 2]], start.xyz[[0, 2]], 5e-3, "x and z", unit="m")
+
+
+@scenario(line=5, rows="C28", space=0.1, needs=("servo_pose",))
+def kept_clear(arm: Arm) -> None:
+    """Targets too near to a body that the model foresees are refused; the arm is held at the last good one."""
+    try:
+        from heptarm.sim.collision import CollisionModel
+
+        above_it = arm.wait_for_rest().pose.xyz - [0.0, 0.0, 0.08]
+        box = ",".join(f"{number:.4f}" for number in [*above_it[:2], above_it[2] - 0.01, 0.1, 0.1, 0.02])
+        model = CollisionModel(arm.robot.name, boxes=[box], margin=0.02)
+    except MissingExtra as error:
+        raise Unfit(error.text) from None
+    reason, depth = "", 0.0
+    with arm.servo("pose", rate=_RATE, speed=0.3, keep_clear_of=model, watchdog=_PATIENT) as servo:
+        start = last = servo.start.pose
+        while servo.tick() and not reason and depth < 0.1:
+            depth += 0.004
+            try:
+                last = servo.set(Pose.of(start.xyz - [0.0, 0.0, depth], start.quat))
+            except CollisionForeseen as error:
+                reason = error.text
+        while servo.tick() and arm.state.pose.distance_to(last) > 2e-3 and servo.t < _ANSWER:
+            servo.set(last)
+        gap = min(one.distance for one in model.clearances(arm.state.q))
+        held = servo.stats.held
+    holds(held == 1, f"{held} target was refused: {reason}")
+    near(gap, 0.022, 0.005, "distance that is left", unit="m")
 
 
 @scenario(line=5, rows="E14 E15 F10", space=0.15, needs=("servo",))

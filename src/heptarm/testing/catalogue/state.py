@@ -94,6 +94,7 @@ def stream(arm: Arm) -> None:
 def every(arm: Arm) -> None:
     """A loop that is slower than the states, and begins late, has every state of a motion to its end."""
     handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 15), speed=0.2))
+    arm.wait_until(lambda _: handle.started, timeout=20.0)  # one opened before has earlier states as well
     live = arm.states(until=handle).to_numpy()
     late = handle.states()
     slow = []
