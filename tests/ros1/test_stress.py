@@ -163,7 +163,7 @@ def test_a_node_that_is_killed_in_mid_goal_and_its_successor(ros: None, spare: S
 @pytest.fixture
 def simulated(ros: None, spare: Stage) -> Iterator[list[float]]:
     """A simulated clock [s] in the first entry of a list, published at 50 Hz, and a node that lives by it."""
-    now, over = [1000.0], threading.Event()
+    now, over = [1e6], threading.Event()  # jumps go further back than forth
     publisher = rospy.Publisher("/clock", Clock, queue_size=1)
 
     def run() -> None:
