@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heptarm.rl import kinematics
+from heptarm.model.batch import jacobian_batch
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 
@@ -58,8 +58,7 @@ class Oracle:
         q = random.uniform(low, high, (_STARTS, 7))
         q[::2] = np.where(random.random((_STARTS // 2, 7)) < 0.5, low, high)
         for _ in range(_ROUNDS):
-            rows, _, tip = kinematics.jacobian(model, q)
-            jacobian, error = rows[..., :3, :], target - tip
+            jacobian, error = jacobian_batch(model, q)[:, :3], target - task.tip(q)
             pull = np.einsum("sji,sj->si", jacobian, error)
             free = ~(((q <= low + 1e-12) & (pull < 0)) | ((q >= high - 1e-12) & (pull > 0)))
             jacobian = jacobian * free[:, None, :]

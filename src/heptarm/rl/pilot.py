@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError
-from heptarm.rl import kinematics
+from heptarm.model.kinematics import forward
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array, array, within
 from heptarm.values.robot import RobotModel
@@ -104,7 +104,7 @@ class Watch:
 
     def _outside(self, q: Array) -> float:
         """Distance of the flange from the box [m]; 0 inside."""
-        tip = kinematics.tip(self._robot, q)
+        tip = forward(self._robot, q)[:3, 3]
         return float(np.maximum(np.maximum(self._guard.low - tip, tip - self._guard.high), 0.0).max())
 
 

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.rl import kinematics
+from heptarm.model.batch import forward_batch
+from heptarm.rl.cartesian import step_towards
 from heptarm.values.arrays import Array, array, integer, within, word
 from heptarm.values.robot import RobotModel, robot
 
@@ -112,12 +113,19 @@ class ReachTask:
     # ------------------------------------------------------------------------------ what a decision is
 
     def tip(self, q: Array) -> Array:
-        """Positions of the flange, shape (..., 7) [rad] to (..., 3) [m]."""
-        return kinematics.tip(self.model, q)
+        """Positions of the flange, shape (..., 7) [rad] to (..., 3) [m].
+
+        That is 35 mm past the origin of the seventh link, which libiiwa's environments (`iiwa_link_7`) measure.
+        """
+        return self._poses(q)[..., :3, 3]
 
     def hold(self, q: Array) -> Array:
         """The rotation that a Cartesian episode keeps, that of its start; (..., 7) to (..., 3, 3)."""
-        return kinematics.rotation(self.model, q)
+        return self._poses(q)[..., :3, :3]
+
+    def _poses(self, q: Array) -> Array:
+        given = np.asarray(q)
+        return forward_batch(self.model, given.reshape(-1, 7)).reshape(*given.shape[:-1], 4, 4)
 
     def observe(self, q: Array, dq: Array, target: Array) -> Array:
         """The observation.
@@ -168,7 +176,13 @@ class ReachTask:
                 "held must be the rotation of the flange for a Cartesian action, got None", parameter="held"
             )
         else:
-            wanted = kinematics.step_towards(model, command, self.cartesian_step * bounded, held)
+            moved = step_towards(
+                model,
+                np.reshape(command, (-1, 7)),
+                np.reshape(self.cartesian_step * bounded, (-1, 3)),
+                np.reshape(held, (-1, 3, 3)),
+            )
+            wanted = moved.reshape(np.shape(command))
             # a Cartesian step may not turn a joint faster than a joint action could twice over
             wanted = command + np.clip(wanted - command, -2 * self.joint_step, 2 * self.joint_step)
         wanted = np.minimum(np.maximum(wanted, q - self.leash), q + self.leash)
