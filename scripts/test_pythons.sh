@@ -1,7 +1,8 @@
 #!/bin/sh
 # Tests the package with each Python that this machine has. Usage: scripts/test_pythons.sh [3.10 3.11 ...]
 #
-# Each gets a virtual environment in build/python with the package, its simulator and pytest, and nothing else of the developers'.
+# Each gets a virtual environment in build/python with the package, its simulator, its recordings and pytest, and nothing else of
+# the developers'.
 set -eu
 cd "$(dirname "$0")/.."
 TESTS="tests/values tests/wire tests/model tests/schema/test_golden.py tests/arm/test_arm.py tests/arm/test_errors_advise.py
@@ -26,7 +27,7 @@ for version in ${*:-3.10 3.11 3.12 3.13}; do
     found=$((found + 1))
     venv=build/python/$version
     [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
-    "$venv/bin/python" -m pip install -q --disable-pip-version-check -e ".[sim]" "matplotlib>=3.6" "pytest>=8" "pytest-timeout>=2.3" \
+    "$venv/bin/python" -m pip install -q --disable-pip-version-check -e ".[sim,record]" "pytest>=8" "pytest-timeout>=2.3" \
         "hypothesis>=6.100"
     echo "Python $version: $("$venv/bin/python" --version)"
     # shellcheck disable=SC2086

@@ -91,6 +91,10 @@ def test_ports_follow_each_other_and_a_port_in_use_ends_both() -> None:
     [
         (("--count", "0"), "--count must be in [1, 64], got 0"),
         (("--count", "3", "--port", "65534"), "--count must be in [1, 2], got 3"),
+        (("--port", "99999"), "--port must be in [0, 65535], got 99999"),
+        (("--view", "--view-port", "-1"), "--view-port must be in [0, 65535], got -1"),
+        (("--speed", "-1"), "--speed must be 0 or in [0.01, 1000], got -1"),
+        (("extra",), "unexpected: extra (heptarm sim --help)"),
         (("--count", "2", "--view"), "--view cannot be used with --count"),
         (("--count", "2", "--fri", "1.15"), "--count cannot be used with --fri"),
     ],

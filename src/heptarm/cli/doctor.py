@@ -253,6 +253,12 @@ def _target(target: CommandTarget, text: str) -> Iterator[CheckResult]:
         try:
             socket.create_connection((parsed.host, parsed.port), timeout=3).close()
             yield CheckResult("network", "ok", f"{parsed.host}:{parsed.port} accepts connections")
+        except socket.gaierror:
+            remedy = (
+                "check the spelling, or use the IP address; heptarm targets lists the names of saved robots"
+            )
+            yield CheckResult("network", "bad", f"no host is named {parsed.host}", remedy)
+            return
         except OSError as error:
             remedy = (
                 "start the cabinet application or heptarm sim, and check that this machine is in its network"

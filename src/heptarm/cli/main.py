@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 
 from heptarm import __version__
 from heptarm.errors import HeptarmError, missing_extra
@@ -99,8 +99,10 @@ def main() -> None:
     """Run the command line: an error is one sentence on standard error and exit code 1."""
     try:
         code = app(print_error=False, exit_on_error=False)
+    except UnusedCliTokensError as error:
+        _fail(f"unexpected: {' '.join(error.unused_tokens or ())} ({_help()})")
     except CycloptsError as error:
-        _fail(f"{' '.join(str(error).split())} (heptarm {' '.join([*_words[:1], '--help'])})")
+        _fail(f"{' '.join(str(error).split())} ({_help()})")
     except HeptarmError as error:
         from heptarm.arm.translate.text import printable
 
@@ -122,6 +124,11 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _help() -> str:
+    """What to type for the help of the command on the command line."""
+    return " ".join(["heptarm", *_words[:1], "--help"])
 
 
 def _fail(sentence: str) -> NoReturn:

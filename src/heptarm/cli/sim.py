@@ -32,6 +32,9 @@ _APP = Group("Your own application")
 
 #: Most cabinets that one command runs.
 _MOST = 64
+_LAST_PORT = 65535
+#: Simulated seconds per second of real time.
+_SLOWEST, _FASTEST = 0.01, 1000.0
 #: The error of Java for an address that this machine does not have.
 _NOT_HERE = "Cannot assign requested address"
 _NOT_HERE_HINT = (
@@ -52,7 +55,9 @@ def sim(
             "for one after its number, as in `2 emergency_stop`."
         ),
     ] = 1,
-    speed: Annotated[float, Parameter(help="Simulated seconds per second of real time.")] = 1.0,
+    speed: Annotated[
+        float, Parameter(help="Simulated seconds per second of real time; 0: as fast as possible.")
+    ] = 1.0,
     real_time: Annotated[
         RealTime,
         Parameter(help="Real-time priority: while an FRI session is open (fri), always (on), never (off)."),
@@ -231,6 +236,14 @@ def sim(
             parameter="key",
             hint="put the key into a file of mode 0600 and use --key-file, or set HEPTARM_KEY",
         )
+    if speed != 0.0 and not _SLOWEST <= speed <= _FASTEST:
+        raise CommandRejected(
+            f"--speed must be 0 or in [{_SLOWEST:g}, {_FASTEST:g}], got {speed:g}",
+            parameter="speed",
+            value=speed,
+            allowed=f"0, [{_SLOWEST:g}, {_FASTEST:g}]",
+            hint="0 simulates as fast as possible",
+        )
     if application is not None:
         defaults = {
             "--view": (view, False),
@@ -329,6 +342,8 @@ def sim(
             "--view and --panel show the same cabinet", parameter="view", hint="leave out --view"
         )
     page = "panel" if panel else "view" if view else ""
+    _check_port(port, "port")
+    _check_port(view_port, "view-port")
     _check_count(count, port, page=page)
     _check_meshes(meshes, page=page)
     cabinet = SimulatorOptions(
@@ -371,13 +386,29 @@ def _check_meshes(folder: str, *, page: str) -> None:
         raise CommandRejected(str(error), parameter="meshes", value=folder) from None
 
 
+def _check_port(port: int, name: str) -> None:
+    """Check a port to listen on.
+
+    Raises:
+        CommandRejected: there is no such port.
+    """
+    if not 0 <= port <= _LAST_PORT:
+        raise CommandRejected(
+            f"--{name} must be in [0, {_LAST_PORT}], got {port}",
+            parameter=name,
+            value=port,
+            allowed=f"[0, {_LAST_PORT}]",
+            hint="0 takes a free one",
+        )
+
+
 def _check_count(count: int, port: int, *, page: str) -> None:
     """Check the number of cabinets.
 
     Raises:
         CommandRejected: it is out of range, or there is a view or a panel, which shows one cabinet.
     """
-    most = _MOST if port == 0 else min(_MOST, 65536 - port)
+    most = _MOST if port == 0 else min(_MOST, _LAST_PORT + 1 - port)
     if not 1 <= count <= most:
         raise CommandRejected(
             f"--count must be in [1, {most}], got {count}",
@@ -800,8 +831,11 @@ def _first(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
 def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
     ready = _first(child, otherwise)
     if not ready.get("ready"):
-        raise ConnectFailed(
-            f"{otherwise}: {ready.get('error')}",
-            hint="" if ready.get("host") else "choose another port with --port, or 0 for any",
-        )
+        if ready.get("host") or ready.get("options"):
+            hint = ""
+        elif _NOT_HERE in str(ready.get("error")):
+            hint = "choose an address of this machine with --host"
+        else:
+            hint = "choose another port with --port, or 0 for any"
+        raise ConnectFailed(f"{otherwise}: {ready.get('error')}", hint=hint)
     return ready

@@ -217,5 +217,5 @@ def _advice(error: OSError) -> str:
     if isinstance(error, ConnectionRefusedError):
         return "start the heptarm application on the cabinet, or `heptarm sim`, and check the port"
     if isinstance(error, socket.gaierror):
-        return "check the spelling, or use the IP address"
+        return "check the spelling, or use the IP address; `heptarm targets` lists the names of saved robots"
     return "check the cable, the cabinet's address and this machine's own address in its network"

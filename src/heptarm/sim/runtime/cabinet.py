@@ -344,7 +344,7 @@ def main(argv: list[str] | None = None) -> int:
         if options.project is not None:
             project.read_project(options.project)
     except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
-        print(json.dumps({"ready": False, "error": str(error)}), flush=True)
+        print(json.dumps({"ready": False, "error": str(error), "options": True}), flush=True)
         return 2
     share_memory_pools()
     try:
