@@ -27,8 +27,13 @@ SPEED = 4.0
 SEED = 7
 
 
-#: FRI sessions, which need answers within milliseconds of this machine's time.
-IN_REAL_TIME = [one.name for one in testing.scenarios() if one.group == "laws"]
+#: FRI sessions, which need answers within milliseconds of this machine's time; and streams of velocities, which a
+#: thread integrates by this machine's clock: if it is late, the arm moves later, and in a fast simulator farther.
+IN_REAL_TIME = [
+    one.name
+    for one in testing.scenarios()
+    if one.group == "laws" or one.name in ("servo.joint_velocities", "servo.twist")
+]
 #: All others: the cabinet runs faster than time.
 FAST = [one.name for one in testing.scenarios() if one.name not in IN_REAL_TIME]
 #: What every run shows with ideal sensors as well, since their thresholds decide when the arm touches something: noise
@@ -72,7 +77,7 @@ def shows(arm: ha.Arm, name: str) -> None:
 
 
 def shows_in_real_time(arm: ha.Arm, name: str) -> None:
-    """Run a scenario with an FRI session, and require that it is shown."""
+    """Run a scenario in real time, again if answers of this machine came late, and require that it is shown."""
 
     def late(report: object) -> str:
         failed = isinstance(report, Report) and not report.ok
@@ -88,7 +93,9 @@ def _check(report: Report, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", IN_REAL_TIME)
-def test_it_shows_the_ready_laws_with_noisy_sensors_in_real_time(noisy_slower_arm: ha.Arm, name: str) -> None:
+def test_the_virtual_cabinet_shows_with_noisy_sensors_in_real_time(
+    noisy_slower_arm: ha.Arm, name: str
+) -> None:
     shows_in_real_time(noisy_slower_arm, name)
 
 
@@ -104,7 +111,7 @@ def test_the_virtual_cabinet_shows(arm: ha.Arm, name: str) -> None:
 
 @pytest.mark.parametrize("name", IN_REAL_TIME)
 @pytest.mark.long
-def test_it_shows_the_ready_laws_in_real_time(slower_arm: ha.Arm, name: str) -> None:
+def test_the_virtual_cabinet_shows_in_real_time(slower_arm: ha.Arm, name: str) -> None:
     shows_in_real_time(slower_arm, name)
 
 
