@@ -10,7 +10,6 @@ import pytest
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.stream import PointStream, is_streamed
 from heptarm.ros.trajectory.trajectory import KinematicState
-from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
 
 ARM = robot("iiwa14")
@@ -66,43 +65,6 @@ def test_jitter_of_arrivals_hardly_shows() -> None:
     assert np.abs(np.array(speeds[50:]) / 0.3 - 1.0).max() < 0.15
     smooth = np.convolve(speeds, np.ones(20) / 20.0, "valid")
     assert np.abs(smooth[50:] / 0.3 - 1.0).max() < 0.03
-
-
-@pytest.mark.parametrize("pause", [0.2, 0.25, 0.5])
-def test_a_pause_in_which_the_arm_settles_is_no_jitter_of_the_next_stream(pause: float) -> None:
-    """The arm follows a swing after a pause as it does after none: a gap would make the estimates slow for a second."""
-    period, swing, duration = 0.01, 0.3, 3.0
-
-    def fraction(time: float) -> float:
-        return float(0.5 - 0.5 * np.cos(np.pi * np.clip(time / duration, 0.0, 1.0)))
-
-    def speeds(stream: PointStream, begin: float) -> Array:
-        here, found = HERE, []
-        for k in range(round(duration / period)):
-            now = begin + k * period
-            q = swing * fraction((k + 1) * period) * np.eye(7)[6]
-            here = stream.add_point(now, now, here, period, q, None, ACCELERATION).sample(period)
-            found.append(here.dq[6])
-        return np.array(found)
-
-    first, after_a_pause = PointStream(ARM), PointStream(ARM)
-    for k in range(100):
-        after_a_pause.add_point(
-            10.0 + k * period, 10.0 + k * period, HERE, period, HERE.q, None, ACCELERATION
-        )
-    begin = 10.0 + 99 * period + pause
-    np.testing.assert_allclose(speeds(after_a_pause, begin), speeds(first, begin), atol=1e-6)
-
-
-@pytest.mark.parametrize("rate", [6.0, 10.0])
-def test_a_slow_stream_that_declares_a_short_period_does_not_stop_at_its_points(rate: float) -> None:
-    stream, speed, here, slowest = PointStream(ARM), 0.2 * np.eye(7)[6], HERE, []
-    for k in range(12):
-        now = 10.0 + k / rate
-        path = stream.add_point(now, now, here, 0.01, (k + 1) / rate * speed, None, np.full(7, 10.0))
-        slowest.append(min(path.sample(time).dq[6] for time in np.linspace(0.0, 1.0 / rate, 20)))
-        here = path.sample(1.0 / rate)
-    assert min(slowest[6:]) > 0.02
 
 
 def test_a_joint_at_its_limit_stays_inside() -> None:

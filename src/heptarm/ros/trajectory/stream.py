@@ -28,8 +28,7 @@ _LEAST_HORIZON, _GROWTH, _LONGEST_HORIZON = 0.06, 1.25, 2.0
 _HISTORY, _MARGIN, _LONGEST_GAP = 1.0, 1.5, 0.15
 #: Largest distance from the arm to a point [rad]; the stream goes on while the motion that follows it opens.
 _LARGEST_JUMP = 0.5
-#: Age of the points that position and velocity are estimated from [s], and the pause that begins a new stream [s]: a
-#: shorter one does where the arm has settled. Counted as a gap of the new stream it would make its estimates slow.
+#: Age of the points that position and velocity are estimated from [s], and the pause that begins a new stream [s].
 _WINDOW, _PAUSE = 0.06, 0.3
 #: Least time to settle at the last point [s].
 _LEAST_SETTLING = 0.1
@@ -57,7 +56,6 @@ class PointStream:
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
         self._points: deque[tuple[float, Array]] = deque()
-        self._settling = 0.0  # time from the arrival of the newest point until the arm has settled at it [s]
 
     def add_point(
         self,
@@ -90,7 +88,7 @@ class PointStream:
             GoalRefused: the point is too far away.
         """
         _check_distance(here, q)
-        if self._points and self._is_over(now - self._points[-1][0], here):
+        if self._points and now - self._points[-1][0] > _PAUSE:
             self._points.clear()
         self._points.append((now, q))
         while now - self._points[0][0] > _HISTORY:
@@ -106,9 +104,7 @@ class PointStream:
             if not excess or horizon > _LONGEST_HORIZON:
                 break
             horizon *= _GROWTH
-        path = self._settled(here, np.array([horizon]), aim[None], velocity[None], q, acceleration)
-        self._settling = path.duration + begin - now if len(self._points) > 1 else _PAUSE
-        return path
+        return self._settled(here, np.array([horizon]), aim[None], velocity[None], q, acceleration)
 
     def add_window(
         self, here: KinematicState, times: Array, q: Array, dq: Array | None, acceleration: Array
@@ -155,10 +151,6 @@ class PointStream:
                 break
             horizon *= _GROWTH
         return self._settled(here, np.array([horizon]), aim[None], velocity[None], q[-1], acceleration)
-
-    def _is_over(self, pause: float, here: KinematicState) -> bool:
-        """Whether a pause [s] has ended the stream; one whose period is not known yet may be slow."""
-        return pause > _PAUSE or (pause > self._settling and bool(np.abs(here.dq).max() < _REST))
 
     def _settled(
         self, here: KinematicState, times: Array, q: Array, dq: Array, rest: Array, acceleration: Array
