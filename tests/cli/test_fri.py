@@ -127,6 +127,9 @@ def test_a_bare_controller_has_a_posture_an_impedance_a_force_and_faults() -> No
         reported.say("clear")
         client.wait("COMMANDING_ACTIVE", timeout=30.0)
     ends = [one["text"] for one in reported if one.get("event") == "OverlayEnded"]
+    ends = [
+        text for text in ends if "connection quality" not in text
+    ]  # a busy machine answers late, and it begins again
     assert len(ends) == 2 and "safety stop" in ends[0]
 
 
@@ -137,7 +140,7 @@ def test_torques_begin_on_an_impedance_that_holds_the_arm() -> None:
     ):
         begin = client.wait("COMMANDING_ACTIVE", timeout=60.0).q.copy()
         for s in client:
-            assert np.abs(s.q - begin).max() < 0.2
+            assert np.abs(s.q - begin).max() < 0.35  # swings to 0.2 under the force; without stiffness to 0.6
             if s.t > 0.5:
                 break
 

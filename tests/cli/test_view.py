@@ -72,4 +72,7 @@ def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) 
             arm.move(ha.ptp(ha.deg(60, 50, 0, -60, 0, 60, 0)))
         second = _settled(browser)
         assert np.abs(second - first).mean() > 5e-3, "the picture did not change after a motion"
-        assert "60.0" in browser.find_element("tag name", "body").text
+        deadline = time.monotonic() + 60.0
+        while "60.0" not in (text := browser.find_element("tag name", "body").text):
+            assert time.monotonic() < deadline, text
+            time.sleep(0.2)
