@@ -61,15 +61,14 @@ lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
-# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it. The one
-# goes on when the other fails; both are shown at the end.
+# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it; then come
+# the ROS nodes. The one goes on when the other fails; both are shown at the end.
 test: setup $(STAMPS)/browser  ## everything; what takes long begins first
-	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 \
-		> build/test-computing.log 2>&1 & computing=$$!; \
+	@{ nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing $(STAMPS)/ros2 $(STAMPS)/ros1; first=$$?; \
+		$(MAKE) --no-print-directory test-ros ROS_JOBS=2 && exit $$first; } > build/test-beside.log 2>&1 & beside=$$!; \
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
-	wait $$computing; computing=$$?; cat build/test-computing.log; exit $$((waiting + computing))
+	wait $$beside; beside=$$?; cat build/test-beside.log; exit $$((waiting + beside))
 	$(PY) -m pytest $(LONGEST) -m alone
-	@$(MAKE) --no-print-directory test-ros
 
 test-computing: setup $(STAMPS)/browser  ## tests that mostly compute: values, protocols, kinematics, simulated steps, training, compilers, the site
 	$(PY) -m pytest $(LONGEST) -m "computing and not alone"

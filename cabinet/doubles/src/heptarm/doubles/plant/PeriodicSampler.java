@@ -5,7 +5,10 @@ import java.util.function.LongConsumer;
 import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.Seam;
 
-/** Samples the plant at a fixed period of simulation time; each sample reads the state of exactly the tick that is due. */
+/**
+ * Samples the plant at a fixed period of simulation time, whole ticks; each sample reads the state of exactly the tick that is due.
+ * A thread that is later than the plant's record leaves samples out.
+ */
 public final class PeriodicSampler {
     private final Station station;
     private final long period;
@@ -35,8 +38,10 @@ public final class PeriodicSampler {
         long next = first;
         try {
             while (!stopped) {
-                clock.hold(clock.sleepUntil(next));
-                sample.accept(clock.stamp() - first);
+                if (clock.sleepUntil(next) == next) { // else this thread is so late that the plant no longer has the tick's state
+                    clock.hold(next);
+                    sample.accept(next - first);
+                }
                 next += period;
             }
         } catch (InterruptedException e) {
