@@ -138,7 +138,8 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
         assert '"error": ""' in _do("press 2 tour second", process)
         _until(said, "ASK ME", process)
         for _ in range(200):  # the dialog comes a moment later
-            if '"error": ""' in _do("answer 1", process):
+            reply = _do("answer 1", process)
+            if not reply or '"error": ""' in reply:  # none: the application ends with its last answer
                 break
             time.sleep(0.05)
         assert process.wait(timeout=60) == 0
