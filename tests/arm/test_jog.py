@@ -15,7 +15,6 @@ import pytest
 
 import heptarm as ha
 from heptarm.model import forward
-from heptarm.values.clearance import Clearance
 from tests.conftest import RunningCabinet
 
 pytestmark = pytest.mark.slow
@@ -214,24 +213,6 @@ def test_the_attached_tool_is_kept_clear_as_well(arm: ha.Arm) -> None:
     gap = min(one.distance for one in model.carrying(pen).clearances(seen[-1].q))
     assert 0.015 < gap < 0.06
     assert min(one.distance for one in model.clearances(seen[-1].q, below=0.5)) > 0.1
-
-
-def test_a_model_that_fails_stops_the_arm_and_its_error_is_raised(arm: ha.Arm) -> None:
-    class Fails:
-        margin, allowed = 0.0, frozenset[frozenset[str]]()
-
-        def clearances(self, q: np.ndarray, *, below: float) -> tuple[Clearance, ...]:
-            if q[6] > HOME[6] + 0.05:
-                raise ZeroDivisionError("of the model")
-            return ()
-
-    with (
-        pytest.raises(ZeroDivisionError, match="of the model"),
-        arm.servo("velocity", keep_clear_of=Fails(), watchdog=2.0) as sv,
-    ):
-        while sv.tick() is not None:
-            sv.set(0.3 * A7)
-    assert rests(arm.wait_for_rest())
 
 
 def test_a_stop_ends_the_stream(arm: ha.Arm) -> None:

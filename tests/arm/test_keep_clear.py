@@ -167,7 +167,8 @@ def test_a_pose_out_of_reach_is_left_to_the_cabinet(arm: ha.Arm, box: ha.Collisi
     assert sv.stats.refused and not sv.stats.held
 
 
-def test_a_model_that_fails_ends_the_block_and_the_arm_rests(arm: ha.Arm) -> None:
+@pytest.mark.parametrize("kind", ["joint", "velocity"])
+def test_a_model_that_fails_ends_the_block_and_the_arm_rests(arm: ha.Arm, kind: Any) -> None:
     class Fails(Wall):
         def clearances(self, q: np.ndarray, *, below: float) -> tuple[Clearance, ...]:
             if q[6] > HOME[6] + 0.05:
@@ -176,9 +177,10 @@ def test_a_model_that_fails_ends_the_block_and_the_arm_rests(arm: ha.Arm) -> Non
 
     with (
         pytest.raises(ZeroDivisionError, match="of the model"),
-        arm.servo("joint", keep_clear_of=Fails(), watchdog=2.0) as sv,
+        arm.servo(kind, keep_clear_of=Fails(), watchdog=2.0) as sv,
     ):
-        sv.set(sv.start.q + 0.1 * A7)
+        while sv.tick() is not None:
+            sv.set(sv.start.q + 0.1 * A7 if kind == "joint" else 0.3 * A7)
     assert np.abs(arm.wait_for_rest().dq).max() < 0.01
     sv.set(HOME + A7)  # after the end it has no effect
 
