@@ -51,7 +51,7 @@ class SendTimes:
         self._last = None
         self._arrivals.clear()
 
-    def add(self, now: float, period: float, sent: Sent | None) -> float:
+    def add(self, now: float, period: float, sent: Sent | None) -> tuple[float, float]:
         """Estimate when a point was sent.
 
         Args:
@@ -60,12 +60,13 @@ class SendTimes:
             sent: what its message says; None: nothing.
 
         Returns:
-            The time [s]; that of the arrival if the sender does not count.
+            The time [s], that of the arrival if the sender does not count; and how much later that is than by the count
+            [s], after a pause in which nothing was counted: 0 without one.
         """
         step = None if sent is None else self._step(sent, period)
         self._last = sent
         if step is None:
-            return self._begin(now)
+            return self._begin(now), 0.0
         self._count += step
         self._arrivals.append((self._count, now))
         while now - self._arrivals[0][1] > _HISTORY:
@@ -74,12 +75,12 @@ class SendTimes:
         period = _measured(counts, times, period)
         expected = self._newest + step * period
         if abs(now - expected) > _LOST:
-            return self._begin(now)
+            return self._begin(now), now - expected
         # when the newest point would have arrived had it been delayed as little as another one
         arrivals = (times + (self._count - counts) * period)[times > now - _MEMORY]
         share = max(step * period / _LOCK, 1.0 / len(times))
         self._newest = expected + min(1.0, share) * (float(arrivals.min()) - expected)
-        return self._newest
+        return self._newest, 0.0
 
     def _begin(self, now: float) -> float:
         self._arrivals.clear()
