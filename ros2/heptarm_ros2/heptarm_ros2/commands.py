@@ -15,7 +15,7 @@ from heptarm.ros.interface.messages import class_of
 from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
-from heptarm.ros.trajectory.send_times import Sent
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm_ros2.topic_thread import LeftAlone, TopicThread
 
 
@@ -84,6 +84,6 @@ class Commands:
         return callback
 
 
-def _sent(info: Any) -> Sent:
+def _sent(info: Any) -> PublishInfo:
     """What the middleware knows of the sending of a message: not all number them."""
-    return Sent(number=info.get("publication_sequence_number"), time=1e-9 * info["source_timestamp"])
+    return PublishInfo(number=info.get("publication_sequence_number"), time=1e-9 * info["source_timestamp"])

@@ -24,7 +24,7 @@ from heptarm.ros.interface.motions import (
     velocities,
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
-from heptarm.ros.trajectory.send_times import Sent
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.values.arrays import Array, array
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
@@ -44,7 +44,7 @@ class Topic:
         type: "package/Type".
         handler: handles a message; raises HeptarmError to refuse it.
         at_once: never waits for another topic.
-        counted: its handler takes a `Sent` after the message.
+        counted: its handler takes a `PublishInfo` after the message.
     """
 
     name: str
@@ -65,7 +65,7 @@ class TopicDispatcher:
         self._context = context
         self._lock = threading.Lock()
 
-    def handle(self, topic: Topic, message: Any, sent: Sent) -> None:
+    def handle(self, topic: Topic, message: Any, sent: PublishInfo) -> None:
         """Handle a message.
 
         Args:
@@ -106,7 +106,7 @@ def command_lin(context: NodeContext, message: Any) -> None:
     context.driver.start(lin(stamped_pose(message, context.driver)))
 
 
-def joint_trajectory(context: NodeContext, message: Any, sent: Sent) -> None:
+def joint_trajectory(context: NodeContext, message: Any, sent: PublishInfo) -> None:
     """Execute a trajectory_msgs/JointTrajectory, or follow a stream; in ROS 1 one without points stops the arm."""
     if not message.points and context.ros.empty_stops:
         context.driver.end_trajectory()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from heptarm.errors import CommandRejected
-from heptarm.ros.trajectory.send_times import Sent
+from heptarm.ros.trajectory.send_times import PublishInfo
 
 
 class ErrorCode(IntEnum):
@@ -103,7 +103,7 @@ class TrajectoryGoal:
     goal_time: float = 0.0
     extras: tuple[str, ...] = ()
     from_topic: bool = False
-    sent: Sent | None = None
+    sent: PublishInfo | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ _LOST = 0.06
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class PublishInfo:
     """What a message says of its sending.
 
     Attributes:
@@ -41,7 +41,7 @@ class SendTimes:
     """Estimates when the points of one stream were sent."""
 
     def __init__(self) -> None:
-        self._last: Sent | None = None
+        self._last: PublishInfo | None = None
         self._count = 0
         self._newest = 0.0  # when the newest point was sent [s]
         self._arrivals: deque[tuple[int, float]] = deque()
@@ -51,7 +51,7 @@ class SendTimes:
         self._last = None
         self._arrivals.clear()
 
-    def add(self, now: float, period: float, sent: Sent | None) -> tuple[float, float]:
+    def add(self, now: float, period: float, sent: PublishInfo | None) -> tuple[float, float]:
         """Estimate when a point was sent.
 
         Args:
@@ -88,7 +88,7 @@ class SendTimes:
         self._newest = now
         return now
 
-    def _step(self, sent: Sent, period: float) -> int | None:
+    def _step(self, sent: PublishInfo, period: float) -> int | None:
         """Periods from the last point to this one; None: it is the first of a stream."""
         last = self._last
         if last is None:

@@ -14,7 +14,7 @@ from collections.abc import Collection
 import numpy as np
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
-from heptarm.ros.trajectory.send_times import SendTimes, Sent
+from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -70,7 +70,7 @@ class PointStream:
         q: Array,
         dq: Array | None,
         acceleration: Array,
-        sent: Sent | None = None,
+        sent: PublishInfo | None = None,
     ) -> JointTrajectory:
         """Continue through a point that the arm is to reach a period after it was sent.
 
