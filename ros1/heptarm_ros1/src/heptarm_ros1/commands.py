@@ -48,7 +48,7 @@ def _subscriber(topics: TopicDispatcher, row: Topic) -> rospy.Subscriber:
 
 
 def _sent(message: Any) -> PublishInfo:
-    """What a message says of its sending: ROS 1 numbers those with a header."""
+    """As which message of its publisher it was published: ROS 1 numbers those with a header."""
     header = getattr(message, "header", None)
     return PublishInfo() if header is None else PublishInfo(number=header.seq)
 

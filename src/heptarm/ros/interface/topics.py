@@ -31,7 +31,7 @@ from heptarm.values.motion.ptp import ptp
 
 #: Frames of a twist.
 _FRAMES: tuple[Literal["base", "flange", "tool"], ...] = ("base", "flange", "tool")
-#: Handles a message of a topic; that of one that is `counted` takes what the message says of its sending as well.
+#: Handles a message of a topic; that of one that is `counted` takes when or as which the message was published as well.
 Handler = Callable[..., None]
 
 
@@ -71,7 +71,7 @@ class TopicDispatcher:
         Args:
             topic: its row.
             message: of its type.
-            sent: what it says of its sending.
+            sent: when or as which it was published.
 
         Raises:
             HeptarmError: refused; the text gives the reason.

@@ -26,7 +26,7 @@ _LOST = 0.06
 
 @dataclass(frozen=True, slots=True)
 class PublishInfo:
-    """What a message says of its sending.
+    """When, or as which message of its publisher, a message was published.
 
     Attributes:
         number: of the message, as its publisher counts; None: unknown.
@@ -57,7 +57,7 @@ class SendTimes:
         Args:
             now: time of its arrival [s].
             period: of the stream, as the point declares it [s].
-            sent: what its message says; None: nothing.
+            sent: when or as which its message was published; None: unknown.
 
         Returns:
             The time [s], that of the arrival if the sender does not count; and how much later that is than by the count
@@ -78,8 +78,8 @@ class SendTimes:
             return self._begin(now), now - expected
         # when the newest point would have arrived had it been delayed as little as another one
         arrivals = (times + (self._count - counts) * period)[times > now - _MEMORY]
-        share = max(step * period / _LOCK, 1.0 / len(times))
-        self._newest = expected + min(1.0, share) * (float(arrivals.min()) - expected)
+        fraction = max(step * period / _LOCK, 1.0 / len(times))
+        self._newest = expected + min(1.0, fraction) * (float(arrivals.min()) - expected)
         return self._newest, 0.0
 
     def _begin(self, now: float) -> float:

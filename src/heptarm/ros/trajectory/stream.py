@@ -85,7 +85,7 @@ class PointStream:
             q: its positions, shape (7,) [rad].
             dq: its velocities, shape (7,) [rad/s]; None: estimate them from the stream.
             acceleration: largest one to reach the stream and to settle, shape (7,) [rad/s²].
-            sent: what its message says of its sending; None: points count from their arrival.
+            sent: when or as which its message was published; None: points count from their arrival.
 
         Returns:
             From `here` to the stream, then back to rest at the point.
