@@ -146,7 +146,7 @@ def _limits(arm: _Arm) -> None:
     arm.set("configuration/setEndpointFrame", "SetEndpointFrame", frame_id="iiwa_link_ee")
     arm.set("configuration/setEndpointFrame", "SetEndpointFrame", frame_id="")
     arm.set("configuration/setWorkpiece", "SetWorkpiece", workpiece_id="")
-    arm.refused("configuration/setWorkpiece", "SetWorkpiece", "not supported", workpiece_id="Box")
+    arm.refused("configuration/setWorkpiece", "SetWorkpiece", "no workpiece template Box", workpiece_id="Box")
     arm.refused(
         "configuration/setPTPJointLimits",
         "SetPTPJointSpeedLimits",
