@@ -46,9 +46,8 @@ def stage() -> Iterator[Stage]:
 def spare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     """A second one, with a workpiece template, for tests that start a node of their own; they release its control."""
     project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
-    project.write_text(
-        '<objectTemplates><workpieceTemplate class="" name="Box"><loadData mass="0.3"/></workpieceTemplate></objectTemplates>'
-    )
+    box = '<workpieceTemplate class="" name="Box"><loadData mass="0.3"/></workpieceTemplate>'
+    project.write_text(f"<objectTemplates>{box}</objectTemplates>")
     running = Stage("--project", str(project))
     yield running
     running.close()
