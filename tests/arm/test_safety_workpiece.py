@@ -16,6 +16,7 @@ from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import robot as find_robot
 from tests.arm.test_tools import fresh
 from tests.doubles.test_tools import PROJECT
 from tests.simulators import FASTER
@@ -55,7 +56,7 @@ def lifting(cell: Arm) -> Iterator[Arm]:
 
 def test_the_loads_decide_as_the_limit_is_chosen() -> None:
     """The casting alone is beyond the limit."""
-    robot = ha.robot("iiwa14")
+    robot = find_robot("iiwa14")
     bare = dynamics.gravity(robot, HOME)
     casting = np.abs(dynamics.gravity(robot, HOME, load=CASTING.body) - bare).max()
     assert casting > 1.2 * TORQUE
