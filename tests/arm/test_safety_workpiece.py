@@ -62,6 +62,12 @@ def test_the_loads_decide_as_the_limit_is_chosen() -> None:
     assert casting > 1.2 * TORQUE
 
 
+def test_a_wrong_limit_is_the_targets_fault() -> None:
+    with pytest.raises(ha.HeptarmError, match="safety must be TORQUE") as error:
+        ha.connect("sim://iiwa14?safety=heavy")
+    assert 'correct the target "sim://iiwa14?safety=heavy"' in str(error.value)
+
+
 def test_a_safety_workpiece_is_lifted_and_the_state_names_it(lifting: Arm) -> None:
     with lifting.tool(GRIPPER):
         assert fresh(lifting).safety_workpiece == ""
