@@ -115,7 +115,6 @@ def test_what_the_safety_configuration_does_not_allow_is_not_attached(lifting: A
     assert error.value.parameter == "safety"
     state = fresh(lifting)
     assert (state.workpiece, state.safety_workpiece) == ("", "")
-    assert lifting.load is None
     assert lifting.move([DOWN, UP]).arrived
     with lifting.attached(anvil):  # as an ordinary one it may be
         assert fresh(lifting).workpiece == "anvil"
@@ -127,8 +126,6 @@ def test_the_workpiece_of_a_template(lifting: Arm) -> None:
         assert (state.tool, state.workpiece, state.safety_workpiece) == ("Gripper", "Cube", "Cube")
         top = lifting.pose("Cube/Top", reference="flange")
         assert top.distance_to(Pose.at(0.0, 0.0, 0.2)) < 1e-4  # of the gripper's tip, 120 mm
-        load = lifting.load
-        assert load is not None and load.mass == pytest.approx(7.0)
         lifting.move(hold(0.2))
         assert np.abs(fresh(lifting).tau_ext).max() < 0.1
         assert lifting.move([DOWN, UP]).arrived

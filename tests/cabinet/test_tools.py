@@ -177,7 +177,7 @@ def test_a_safety_workpiece_is_one_until_it_or_its_tool_is_detached(peer: Peer) 
 def test_a_robot_that_does_not_take_a_safety_workpiece_holds_none(peer: Peer) -> None:
     heavy = replace(EMPTY, mass=12.0)
     refused = peer.ask(wire.AttachLoad(load=heavy, attached=True, safety=True))
-    assert (refused.code, refused.parameter, refused.allowed) == (Code.EXECUTION_FAILED, "safety", "false")
+    assert (refused.code, refused.parameter, refused.allowed) == (Code.OUT_OF_RANGE, "safety", "false")
     assert held(peer) == ("", "")
     assert isinstance(peer.ask(wire.AttachLoad(load=heavy, attached=True)), wire.Accepted)
     assert held(peer) == ("part", "")

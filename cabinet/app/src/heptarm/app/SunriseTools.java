@@ -258,7 +258,7 @@ final class SunriseTools implements ToolPort {
                     + " attach the workpiece without it");
         } catch (RuntimeException e) {
             detach(next);
-            throw new CommandRejected(Code.EXECUTION_FAILED, "safety", "true", "false", "the cabinet refuses " + next.getName()
+            throw new CommandRejected(Code.OUT_OF_RANGE, "safety", "true", "false", "the cabinet refuses " + next.getName()
                     + " as the safety workpiece: " + e.getMessage() + "; check its load and the safety configuration, or attach it without safety");
         }
     }

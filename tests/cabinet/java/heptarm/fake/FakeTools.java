@@ -49,7 +49,7 @@ final class FakeTools implements ToolPort {
             throw new CommandRejected(Code.EXECUTION_FAILED, "the mass of 13 kg is refused");
         }
         if (isSafety && workpiece.mass > LARGEST_SAFE_MASS) {
-            throw new CommandRejected(Code.EXECUTION_FAILED, "safety", "true", "false", "more than 10 kg");
+            throw new CommandRejected(Code.OUT_OF_RANGE, "safety", "true", "false", "more than 10 kg");
         }
     }
 
