@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -129,7 +130,8 @@ def main() -> None:
 
 def _help() -> str:
     """What to type for the help of the command on the command line, as far as there is one."""
-    known, below = ["heptarm"], {**COMMANDS, **_GROUPS}
+    known = ["heptarm"]
+    below: Mapping[str, object] = {**COMMANDS, **_GROUPS}
     for word in _words:
         if word not in below:
             break
