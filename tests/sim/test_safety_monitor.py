@@ -11,7 +11,13 @@ from heptarm.model import dynamics
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.safety_monitor import LASTING, UNLIMITED, SafetyLimits, SafetyMonitor, parse_safety
+from heptarm.sim.plant.safety_monitor import (
+    LASTING,
+    UNLIMITED,
+    ExternalTorqueMonitor,
+    SafetyLimits,
+    parse_safety,
+)
 from heptarm.values.robot import Body, robot
 from tests.sim.driving import READY
 
@@ -85,7 +91,7 @@ def test_a_push_counts_like_a_weight_and_the_stop_stays_until_it_is_withdrawn() 
 def test_a_short_torque_does_not_stop() -> None:
     plant = Plant("iiwa14", q=READY)
     plant.step(1)
-    monitor = SafetyMonitor(plant.model, SafetyLimits(10.0))
+    monitor = ExternalTorqueMonitor(plant.model, SafetyLimits(10.0))
     monitor.follow(plant.data)
     load = np.array((0.0, 11.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     own = (monitor._counted.mass, monitor._counted.bias, np.zeros(7))

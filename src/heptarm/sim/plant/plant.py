@@ -27,7 +27,7 @@ from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.native import NativeTick
 from heptarm.sim.plant.payload import PayloadModel
-from heptarm.sim.plant.safety_monitor import UNLIMITED, SafetyLimits, SafetyMonitor
+from heptarm.sim.plant.safety_monitor import UNLIMITED, ExternalTorqueMonitor, SafetyLimits
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
@@ -181,9 +181,9 @@ class Plant:
         self._load = ExternalLoad(self.model, self.data)
         bare = compiled(model) if is_mounted(self.model) else None
         self._limits = limits
-        self._safety_monitor: SafetyMonitor | None = None
+        self._safety_monitor: ExternalTorqueMonitor | None = None
         if limits.torque < inf:
-            self._safety_monitor = SafetyMonitor(copy(self.model if bare is None else bare), limits)
+            self._safety_monitor = ExternalTorqueMonitor(copy(self.model if bare is None else bare), limits)
         self._payload = PayloadModel(self.model, self.data, self._mass, bare)
         self._mounted = FlangeShapes(self.model)
         self._changes: deque[Callable[[], None]] = deque()  # of what is carried; made before the next tick
@@ -484,7 +484,7 @@ class Plant:
             self._close_brakes()
             log.warning("%s", reason)
 
-    def _watch(self, monitor: SafetyMonitor) -> None:
+    def _watch(self, monitor: ExternalTorqueMonitor) -> None:
         """Let a safety function stop the arm on its path."""
         reason = monitor.check(self._load.torque, self._sensed.mass, self._sensed.bias, self._acc)
         if reason:

@@ -57,7 +57,7 @@ def parse_safety(text: str) -> SafetyLimits:
     return SafetyLimits(*numbers)
 
 
-class SafetyMonitor:
+class ExternalTorqueMonitor:
     """Monitors the external torques that the safety controller computes.
 
     Args:
