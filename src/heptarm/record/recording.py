@@ -19,7 +19,8 @@ from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, instance, shown
 from heptarm.values.robot import ROBOTS, RobotModel
-from heptarm.values.text import as_html
+from heptarm.values.notebook import as_html
+from heptarm.values.text import lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -227,18 +228,17 @@ class Recording:
         """A few lines: what is in it."""
         rate = (len(self) - 1) / self.duration if self.duration else 0.0
         ending = "" if self.complete else ", cut off at its end"
-        lines = [
-            f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}",
-            f"  states   {len(self)} at {rate:.0f} Hz, {self.lost} lost",
-        ]
-        if f"{FRI}t" in self.signals:
-            lines.append(f"  FRI      {len(self.signals[f'{FRI}t'])} cycles")
-        lines.append(f"  motions  {len(self.motions)}")
-        lines.append(f"  events   {len(self.events)}, {len(self.notes)} notes")
-        return "\n".join(lines)
+        title = f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}"
+        rows = {
+            "states": f"{len(self)} at {rate:.0f} Hz, {self.lost} lost",
+            "FRI": f"{len(self.signals[f'{FRI}t'])} cycles" if f"{FRI}t" in self.signals else "",
+            "motions": str(len(self.motions)),
+            "events": f"{len(self.events)}, {len(self.notes)} notes",
+        }
+        return lines(title, rows)
 
     def _repr_html_(self) -> str:
-        """The text of `str` for a notebook."""
+        """The same as a table for a notebook."""
         return as_html(str(self))
 
     def __repr__(self) -> str:
