@@ -18,8 +18,8 @@ from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout
 from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, instance, shown
-from heptarm.values.robot import ROBOTS, RobotModel
 from heptarm.values.notebook import as_html
+from heptarm.values.robot import ROBOTS, RobotModel
 from heptarm.values.text import lines
 
 if TYPE_CHECKING:

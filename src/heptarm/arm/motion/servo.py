@@ -37,10 +37,10 @@ from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode
+from heptarm.values.notebook import as_html
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
 from heptarm.values.state import State
-from heptarm.values.notebook import as_html
 from heptarm.values.text import fixed, lines
 from heptarm.wire import messages as wire
 

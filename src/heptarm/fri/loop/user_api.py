@@ -34,8 +34,8 @@ from heptarm.fri.session.statistics import Counters, Histogram
 from heptarm.values.arrays import instance, numbers, scalar, shown
 from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
-from heptarm.values.pose import Pose
 from heptarm.values.notebook import as_html
+from heptarm.values.pose import Pose
 from heptarm.values.text import lines
 
 Ints = npt.NDArray[np.int64]
