@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.values.arrays import Array, finite, frozen, instance, integer
+from heptarm.values.arrays import Array, finite, frozen, instance, integer, scalar
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,13 @@ class Pictures:
         return self._decoded(int(np.abs(self.t - moment).argmin()))
 
     def between(self, begin: float, end: float) -> Pictures:
-        """Those of a time of the recording [s]."""
-        inside = (self.t >= begin) & (self.t <= end)
+        """Those of a time of the recording [s].
+
+        Raises:
+            ShapeError: not a number.
+        """
+        first, last = scalar(begin, "begin", unit="s"), scalar(end, "end", unit="s")
+        inside = (self.t >= first) & (self.t <= last)
         files = tuple(file for file, is_in in zip(self.files, inside.tolist(), strict=True) if is_in)
         return Pictures(self.t[inside], files, self.dropped)
 
