@@ -251,6 +251,7 @@ class CameraFeed:
     def _read(self, process: subprocess.Popen[bytes], first: queue.SimpleQueue[dict[str, Any]]) -> None:
         """Hand on the process's first answer, then take over pictures until it ends."""
         assert process.stdout is not None
+        answer: dict[str, Any] = {}
         with process.stdout as answers, contextlib.suppress(ValueError):  # it was killed within an answer
             answer = _first_answer(answers)
             first.put(answer)
@@ -278,7 +279,7 @@ def _first_answer(answers: IO[bytes]) -> dict[str, Any]:
     last = b""
     for line in answers:
         last = line
-        if line.startswith(b"{"):
+        if line.startswith(b"{") and line.endswith(b"}\n"):
             return dict(json.loads(line))
     return {"error": last.decode(errors="replace").strip()[-_LONGEST_REASON:] or "no reason given"}
 
