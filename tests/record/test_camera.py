@@ -259,8 +259,8 @@ def test_a_private_simulator_shows_its_scene(tmp_path: Path) -> None:
         assert cabinet.positions.exists()
         with arm.record(tmp_path / "run.mcap", camera=camera) as rec:
             until(lambda: rec.pictures >= 2)
-            arm.io["OutputX3Pin1"] = True  # opens the gripper
-            until(lambda: bool(arm.io["InputX3Pin3"]))
+            arm.io["OutputX3Pin2"] = True  # closes the gripper
+            until(lambda: bool(arm.io["InputX3Pin4"]))
             shown = rec.pictures
             until(lambda: rec.pictures >= shown + 3)
     assert not folder.exists()

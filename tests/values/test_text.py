@@ -137,7 +137,7 @@ def test_a_notebook_shows_a_table_with_the_numbers_of_the_text(value: Any) -> No
     assert len(set(table.widths)) <= 1, "all rows reach to the edge"
     names = [line.split("  ")[1].strip() for line in text.splitlines()[1:] if line[2] != " "]
     assert [row[0] for row in table.rows] == names
-    assert "inherit" in table.styles and not re.search(r"#[0-9a-f]{3}|white\b|black", table.styles)
+    assert "inherit" in table.styles and not re.search(r"#[0-9a-f]{3}|white(?!-space)|black", table.styles)
 
 
 def test_joints_have_columns_of_degrees_and_of_radians() -> None:
@@ -152,7 +152,7 @@ def test_joints_have_columns_of_degrees_and_of_radians() -> None:
 
 
 def test_nothing_of_a_value_is_markup_in_a_notebook() -> None:
-    name = "<script>alert('a&b')</script>"
+    name = "<script>alert('a&b')"
     for value in (ha.Tool(name, mass=1.0), ha.Workpiece("part", frames={name: POSE})):
         shown = value._repr_html_()
         assert "<script" not in shown and html.escape(name) in shown

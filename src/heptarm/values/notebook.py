@@ -21,11 +21,11 @@ class Listing(str):
     """A title and aligned rows as one text, which still has them apart; made by `heptarm.values.text.lines`.
 
     Attributes:
-        title: the first line.
+        heading: the first line.
         rows: the other lines by their names.
     """
 
-    title: str
+    heading: str
     rows: Mapping[str, str]
 
 
@@ -49,7 +49,7 @@ def as_html(text: str) -> str:
         f"{_columns(row, width)}</tr>"
         for name, row in text.rows.items()
     )
-    title = f'<caption style="{_STYLES["caption"]}">{html.escape(text.title)}</caption>'
+    title = f'<caption style="{_STYLES["caption"]}">{html.escape(text.heading)}</caption>'
     return f'<table style="{_STYLES["table"]}">{title}<tbody>{rows}</tbody></table>'
 
 

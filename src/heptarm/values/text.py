@@ -77,7 +77,7 @@ def lines(title: str, rows: Mapping[str, str]) -> Listing:
     indent = " " * (width + 4)
     below = (f"  {name:{width}}  " + text.replace("\n", f"\n{indent}") for name, text in shown.items())
     found = Listing("\n".join([title, *below]))
-    found.title, found.rows = title, shown
+    found.heading, found.rows = title, shown
     return found
 
 
