@@ -42,7 +42,7 @@ CameraFrame = Annotated[
 CameraScene = Annotated[
     str | None,
     Parameter(
-        help="What is around the arm: table, peg-in-hole, bins, or a file in MuJoCo's format; it stands still."
+        help="What is around the arm: table, peg-in-hole, bins, or a file in MuJoCo's format; nothing of it moves."
     ),
 ]
 #: Pause between two looks whether the time is over [s].

@@ -31,8 +31,8 @@ _log = logging.getLogger("heptarm.record")
 
 #: Longest time for the process to begin, for a last picture, and for the process to end [s].
 _START, _SETTLE, _END = 60.0, 2.0, 5.0
-#: MuJoCo's ways to draw, the first that works is taken, and the variables of the environment that choose it.
-_WAYS, _WAY = ("egl", "osmesa"), "MUJOCO_GL"
+#: MuJoCo's drivers of OpenGL without a display, the first that works is taken, and the variable that chooses one.
+_DRIVERS, _DRIVER = ("egl", "osmesa"), "MUJOCO_GL"
 #: Mesa's threads: without a graphics card one is enough, and leaves the other cores to the robot.
 _THREADS = "LP_NUM_THREADS"
 #: Longest reason of a process that cannot draw [characters].
@@ -103,31 +103,31 @@ class CameraFeed:
 
         Raises:
             MissingExtra: MuJoCo or Pillow is not installed.
-            CommandRejected: there is no such scene, or this machine has no way to draw.
+            CommandRejected: there is no such scene, or this machine cannot draw.
         """
         require("PIL.Image", extra="record")
         if find_spec("mujoco") is None:  # imported in the process alone
             require("mujoco", extra="sim")
         failures: list[str] = []
-        for way in _ways():
-            reason = self._begin(way)
+        for driver in _drivers():
+            reason = self._begin(driver)
             if not reason:
                 return
-            failures.append(reason if not way else f"{way}: {reason}")
+            failures.append(reason if not driver else f"{driver}: {reason}")
         raise CommandRejected(
             f"this machine cannot draw the pictures of a camera: {'; '.join(failures)}",
             parameter="camera",
-            hint="install Mesa's EGL, as in apt install libegl1 libgl1-mesa-dri, or name a way to draw that works here "
+            hint="install Mesa's EGL, as in apt install libegl1 libgl1-mesa-dri, or name a driver that works here "
             "by MUJOCO_GL=egl, osmesa or glfw; without a camera all else is recorded",
         )
 
-    def _begin(self, way: str) -> str:
-        """Start the process with a way to draw; the reason why it cannot, "" if it can.
+    def _begin(self, driver: str) -> str:
+        """Start the process with a driver; the reason why it cannot, "" if it can.
 
         Raises:
             CommandRejected: there is no such scene.
         """
-        process = self._process = self._spawned(way)
+        process = self._process = self._spawned(driver)
         first: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._is_over = False
         self._reader = threading.Thread(
@@ -148,7 +148,7 @@ class CameraFeed:
             raise CommandRejected(answer["refused"], parameter="camera")
         return str(answer["error"])
 
-    def _spawned(self, way: str) -> subprocess.Popen[bytes]:
+    def _spawned(self, driver: str) -> subprocess.Popen[bytes]:
         camera, subject = self.camera, self._subject
         is_its_scene = camera.scene in ("", subject.scene)
         settings = {
@@ -164,7 +164,7 @@ class CameraFeed:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,  # why it cannot begin
             start_new_session=True,
-            env={_THREADS: "1"} | environment(None) | ({_WAY: way} if way else {}),
+            env={_THREADS: "1"} | environment(None) | ({_DRIVER: driver} if driver else {}),
         )
 
     @property
@@ -284,8 +284,8 @@ def _first_answer(answers: IO[bytes]) -> dict[str, Any]:
     return {"error": last.decode(errors="replace").strip()[-_LONGEST_REASON:] or "no reason given"}
 
 
-def _ways() -> tuple[str, ...]:
-    """MuJoCo's ways to draw that are tried; "": its own choice, or the user's."""
-    if os.environ.get(_WAY) or sys.platform != "linux":
+def _drivers() -> tuple[str, ...]:
+    """MuJoCo's drivers that are tried; "": its own choice, or the user's."""
+    if os.environ.get(_DRIVER) or sys.platform != "linux":
         return ("",)
-    return (*_WAYS, "glfw") if os.environ.get("DISPLAY") else _WAYS
+    return (*_DRIVERS, "glfw") if os.environ.get("DISPLAY") else _DRIVERS

@@ -11,7 +11,7 @@ from heptarm.errors import LimitError, ShapeError
 from heptarm.values.arrays import Array, array, instance, integer, shown, within, word
 from heptarm.values.pose import Pose
 
-#: Farthest place of a camera from its frame's origin along each axis, shortest way from there to what it looks at [m].
+#: Farthest place of a camera from its frame's origin along each axis, shortest distance to what it looks at [m].
 FARTHEST, NEAREST = 20.0, 0.001
 #: Least and greatest vertical field of view [rad], width and height [pixels], and pictures per second.
 FIELDS, SIZES, FASTEST = (0.02, 2.8), (16, 4096), 60.0
