@@ -30,7 +30,7 @@ from heptarm.values.shape import Shape
 _log = logging.getLogger("heptarm.record")
 
 #: Longest time for the process to begin, for a last picture, and for the process to end [s].
-_START, _SETTLE, _END = 60.0, 2.0, 5.0
+_START, _SETTLE, _END = 60.0, 5.0, 5.0
 #: MuJoCo's drivers of OpenGL without a display, the first that works is taken, and the variable that chooses one.
 _DRIVERS, _DRIVER = ("egl", "osmesa"), "MUJOCO_GL"
 #: Mesa's threads: without a graphics card one is enough, and leaves the other cores to the robot.

@@ -83,6 +83,7 @@ class RecordingFile:
 
     Attributes:
         path: the file.
+        sampled: our clock at the sampling of the last state that was written [ns].
 
     Raises:
         CommandRejected: the file cannot be written.
@@ -117,6 +118,7 @@ class RecordingFile:
     def _begin(self, facts: Mapping[str, str], arm: str) -> None:
         """Write the beginning of an arm's part, which a file that is cut off still has."""
         self._prefix = f"/{arm}" if arm else ""
+        self.sampled = 0
         self._pose_due = 0
         self._rest = RestWatch()
         self._cycles: int | None = None
@@ -168,6 +170,7 @@ class RecordingFile:
             if one.received >= self._pose_due:
                 self._write_pose(rows[index], one.received, at)
             self._write_rest(one, at, signals)
+        self.sampled = at - self._epoch
 
     def _write_pose(self, row: Any, received: int, sampled: int) -> None:
         """Write what is three-dimensional: the pose of the motion frame, and the frames of the links."""

@@ -163,7 +163,6 @@ class _Film:
     """The pictures of one source in the file.
 
     Args:
-        source: whose states are shown.
         feed: draws them.
         file: where to.
 
@@ -171,17 +170,15 @@ class _Film:
         pictures: number of those that were written.
     """
 
-    def __init__(self, source: RecordSource, feed: CameraFeed, file: RecordingFile) -> None:
-        self._source, self._feed, self._file = source, feed, file
+    def __init__(self, feed: CameraFeed, file: RecordingFile) -> None:
+        self._feed, self._file = feed, file
         self.pictures = 0
 
     def offer(self, sample: StateSample) -> None:
-        """Show a state, if a picture is due."""
-        if not self._feed.is_due(sample.received):
-            return
-        row = state_rows([sample.body])[0]
-        sampled = self._source.to_ours(int(row["stamp"]))
-        self._feed.offer(sample.number, sample.received, sampled, row["q"].tolist())
+        """Show the state that was written last, if a picture is due."""
+        if self._feed.is_due(sample.received):
+            q = state_rows([sample.body])["q"][0].tolist()
+            self._feed.offer(sample.number, sample.received, self._file.sampled, q)
 
     def write(self) -> None:
         """Write what is finished."""
@@ -321,9 +318,9 @@ class Recorder:
         size = chunk_size(sum(source.state_rate for source in sources.values()))
         file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
         files = [file, *(file.beside(source.facts, name) for name, source in others)]
-        for (name, source), one in zip(sources.items(), files, strict=True):
+        for name, one in zip(sources, files, strict=True):
             if name in self._cameras:
-                self._films[name] = _Film(source, self._cameras[name], one)
+                self._films[name] = _Film(self._cameras[name], one)
         return files
 
     def note(self, text: str) -> None:
