@@ -161,6 +161,9 @@ from .fri.loop.compiled import (
 from .record.fri_client import (
     record_client as record_client,
 )
+from .record.pictures import (
+    Pictures as Pictures,
+)
 from .record.recorder import (
     Recorder as Recorder,
 )
@@ -184,6 +187,9 @@ from .skills.insertion import (
 )
 from .skills.replay import (
     Replay as Replay,
+)
+from .values.camera import (
+    Camera as Camera,
 )
 from .values.clearance import (
     Clearance as Clearance,

@@ -223,7 +223,7 @@ def test_as_text_and_as_a_figure(arm: ha.Arm, tmp_path: Path) -> None:
         "collisions",
     }
     assert sum("blended" in line for line in lines) == 2 and lines[-1].endswith("not checked")
-    assert preview._repr_html_().startswith("<pre>Preview")
+    assert "Preview of 3 motions" in preview._repr_html_() and "<table" in preview._repr_html_()
     figure = preview.plot()
     assert len(figure.axes) == 4
     figure.savefig(tmp_path / "plan.png", dpi=40)

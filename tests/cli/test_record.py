@@ -63,8 +63,15 @@ def test_plotted_and_converted(recorded: Path, tmp_path: Path) -> None:
 
 
 def test_for_some_seconds(cabinet: RunningCabinet, tmp_path: Path) -> None:
-    (done,) = objects("record", str(tmp_path / "a.mcap"), "--for", "0.5", "--target", cabinet.target)
+    path = tmp_path / "a.mcap"
+    (done,) = objects(
+        "record", str(path), "--for", "0.5", "--camera-size", "160x120", "--target", cabinet.target
+    )
     assert done["states"] > 10 and done["lost"] == 0 and done["bytes"] > 1000
+    pictures = ha.load(path).pictures
+    assert len(pictures) == done["pictures"] and done["pictures"] + done["pictures_dropped"] > 0
+    out = run("convert", str(path), str(tmp_path / "a.npz"))
+    assert f"{len(pictures)} pictures were left out" in out.stdout or not len(pictures)
 
 
 @pytest.mark.parametrize(
@@ -74,6 +81,8 @@ def test_for_some_seconds(cabinet: RunningCabinet, tmp_path: Path) -> None:
         (("convert", __file__, "a.npz"), "must be a recording of heptarm"),
         (("plot", "{recorded}", "--signals", "speed"), "name must be one of t, "),
         (("convert", "{recorded}", "a.xls"), "suffix must be one of .parquet, .csv, .npz"),
+        (("record", "a.mcap", "--camera-size", "640", "--target", "sim://127.0.0.1:1"), "such as 640x480"),
+        (("record", "a.mcap", "--listen", "--camera"), "--listen records FRI messages alone"),
         (("record", "a.mcap", "--for", "-1", "--target", "sim://127.0.0.1:1"), "for must be in (0, 1e+07] s"),
     ],
 )

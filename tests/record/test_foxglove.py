@@ -14,14 +14,16 @@ from mcap.reader import make_reader
 
 import heptarm as ha
 from heptarm.model.kinematics import forward
+from heptarm.record.camera import Picture
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.values.robot import robot
 from heptarm.wire import messages as wire
-from tests.record.bodies import EPOCH, body, fri_words, samples, to_ours
+from tests.record.bodies import BEGIN, EPOCH, body, fri_words, samples, to_ours
 from tests.record.test_file import FACTS, written
 
 pytest.importorskip("foxglove_schemas_protobuf")
 
+CAMERA = ha.Camera((0.1, 0.0, 0.05), (0.0, 0.0, 0.3), frame="flange", size=(320, 200))
 #: Pairs of the encoding of a schema and that of its messages, of the registry in MCAP's specification.
 ENCODINGS = {("protobuf", "protobuf"), ("jsonschema", "json")}
 
@@ -34,6 +36,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, Any, A
     (pressed,) = samples(1)
     with_fri.states([pressed._replace(body=body(0, button=1.0))], to_ours=to_ours, signals=("A.One", "A.Two"))
     with_fri.cycles(fri_words(20))
+    with_fri.picture(CAMERA, Picture(1, pressed.received, to_ours(BEGIN), b"jpeg"))
     with_fri.finish({})
     found: list[tuple[Any, Any, Any]] = []
     for one in (path, with_fri.path):
@@ -73,6 +76,7 @@ def shape(message: Any) -> dict[str, Any]:
 def test_every_channel_has_a_schema_in_an_encoding_that_foxglove_reads(recorded: list[Any]) -> None:
     topics = {channel.topic for _, channel, _ in recorded}
     assert topics >= {"/state", "/fri", "/tcp", "/tf", "/log", "/journal", "/signals"}
+    assert topics >= {"/camera/image", "/camera/calibration"}
     for schema, channel, message in recorded:
         assert (schema.encoding, channel.message_encoding) in ENCODINGS, channel.topic
         if schema.encoding == "protobuf":
@@ -98,7 +102,30 @@ def test_foxgloves_messages_are_those_that_it_publishes(recorded: list[Any]) -> 
         assert str(parsed) == str(same) and parsed.ByteSize() == same.ByteSize() > 0, channel.topic
         stamped = parsed.transforms if schema.name == "foxglove.FrameTransforms" else [parsed]
         assert all(one.timestamp.ToNanoseconds() == message.publish_time for one in stamped)
-    assert names == {"foxglove.Log", "foxglove.PoseInFrame", "foxglove.FrameTransforms"}
+    assert names == {
+        "foxglove.Log",
+        "foxglove.PoseInFrame",
+        "foxglove.FrameTransforms",
+        "foxglove.CompressedImage",
+        "foxglove.CameraCalibration",
+    }
+
+
+def test_a_camera_is_where_foxglove_expects_it(recorded: list[Any]) -> None:
+    found = {channel.topic: (schema, message) for schema, channel, message in recorded}
+    parsed = {
+        topic: published(found[f"/{topic}"][0].name).FromString(found[f"/{topic}"][1].data)
+        for topic in ("camera/image", "camera/calibration", "tf")
+    }
+    image, calibration = parsed["camera/image"], parsed["camera/calibration"]
+    assert (image.frame_id, image.format, image.data) == ("camera", "jpeg", b"jpeg")
+    assert (calibration.frame_id, calibration.width, calibration.height) == ("camera", 320, 200)
+    np.testing.assert_array_equal(np.reshape(calibration.K, (3, 3)), CAMERA.matrix)
+    np.testing.assert_array_equal(np.reshape(calibration.P, (3, 4))[:, :3], CAMERA.matrix)
+    assert list(calibration.D) == [0.0] * 5 and list(calibration.R) == np.eye(3).reshape(-1).tolist()
+    (frame,) = parsed["tf"].transforms
+    assert (frame.parent_frame_id, frame.child_frame_id) == ("flange", "camera")
+    assert (frame.translation.x, frame.translation.y, frame.translation.z) == CAMERA.place
 
 
 def test_the_frames_are_a_chain_from_the_base_to_the_flange(tmp_path: Path) -> None:

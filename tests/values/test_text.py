@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import math
+import pickle
+import re
+from html.parser import HTMLParser
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,10 +74,95 @@ def test_results_tools_motions_and_statistics() -> None:
     assert "20 us median" in stats and "- ms median" in stats
 
 
-def test_notebooks_show_the_same_and_nothing_of_it_is_markup() -> None:
-    tool = ha.Tool("<b>", mass=1.0)
-    assert tool._repr_html_() == "<pre>" + str(tool).replace("<b>", "&lt;b&gt;") + "</pre>"
-    assert STATE._repr_html_().startswith("<pre>State at 1.000 s")
+class _Table(HTMLParser):
+    """A table as a browser reads it; fails on tags that are not closed, or not in their order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.rows: list[list[str]] = []
+        self.widths: list[int] = []
+        self.caption, self.texts, self.styles = "", "", ""
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        inside = {"table": [], "caption": ["table"], "tbody": ["table"], "tr": ["table", "tbody"]}
+        assert self.open == inside.get(tag, ["table", "tbody", "tr"]), tag
+        self.open.append(tag)
+        self.styles += str(dict(attrs).get("style"))
+        if tag == "tr":
+            self.rows.append([])
+            self.widths.append(0)
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+            self.widths[-1] += int(dict(attrs).get("colspan") or 1)
+        else:
+            assert tag in inside
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts += f" {data}"
+        if self.open[-1] == "caption":
+            self.caption = data
+        else:
+            self.rows[-1][-1] += data
+
+
+def _numbers(text: str) -> list[str]:
+    return sorted(re.findall(r"-?\d+(?:\.\d+)?", text))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        STATE,
+        ha.State(),
+        ha.Result(ha.Cause.CONDITION, STATE, residual=1e-4, duration=2.0, peak_force=11.0, rest_force=2.0),
+        ha.Tool("gripper", mass=1.2, com=(0, 0, 0.06), tcp=ha.Pose.at(0, 0, 0.12)),
+        ServoStats(10, 99.5, 1, 20e-6, 50e-6),
+        ha.ptp(ha.deg(0, 35, 0, -80, 0, 60, 0), speed=0.5),
+        ha.lin(POSE, speed_mps=0.1, blend_m=0.02),
+        ha.spline([POSE.shifted(x=0.01 * i) for i in range(10)]),
+    ],
+    ids=lambda one: type(one).__name__,
+)
+def test_a_notebook_shows_a_table_with_the_numbers_of_the_text(value: Any) -> None:
+    table, text = _Table(value._repr_html_()), str(value)
+    assert table.caption == text.splitlines()[0]
+    assert _numbers(table.texts) == _numbers(text)
+    assert len(set(table.widths)) <= 1, "all rows reach to the edge"
+    names = [line.split("  ")[1].strip() for line in text.splitlines()[1:] if line[2] != " "]
+    assert [row[0] for row in table.rows] == names
+    assert "inherit" in table.styles and not re.search(r"#[0-9a-f]{3}|white(?!-space)|black", table.styles)
+
+
+def test_joints_have_columns_of_degrees_and_of_radians() -> None:
+    rows = {name: cells for name, *cells in _Table(STATE._repr_html_()).rows}
+    assert rows["joint"] == [f"A{i}" for i in range(1, 8)]
+    turned, same = (np.array(rows[name], float) for name in ("q [deg]", "q [rad]"))
+    np.testing.assert_allclose(np.radians(turned), same, atol=1e-4)
+    (target,) = [cells for name, *cells in _Table(ha.ptp(STATE.q)._repr_html_()).rows if name == "q"]
+    assert [cell.split("\n") for cell in target] == [
+        [f"{a} deg", f"{b} rad"] for a, b in zip(rows["q [deg]"], rows["q [rad]"], strict=True)
+    ]
+
+
+def test_nothing_of_a_value_is_markup_in_a_notebook() -> None:
+    name = "<script>alert('a&b')"
+    for value in (ha.Tool(name, mass=1.0), ha.Workpiece("part", frames={name: POSE})):
+        shown = value._repr_html_()
+        assert "<script" not in shown and html.escape(name) in shown
+        assert name in _Table(shown).texts
+    assert ha.Recovery(False, remaining=(name,))._repr_html_() == f"<pre>not ready: {html.escape(name)}</pre>"
+
+
+def test_a_text_with_rows_is_a_text() -> None:
+    text = str(STATE)
+    assert isinstance(text, str) and pickle.loads(pickle.dumps(text)) == text and f"{text}" == text
 
 
 def test_an_insertion_is_read_and_compared() -> None:

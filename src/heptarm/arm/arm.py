@@ -39,12 +39,14 @@ from heptarm.arm.motion.servo import (
 )
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
+from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.skills import collision_guard as guarding
 from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
 from heptarm.values.arrays import array, callback, instance, integer, shown, within, word
+from heptarm.values.camera import Camera
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -331,7 +333,9 @@ class Arm:
             size=integer(_STREAM_SIZE if size is None else size, "size", 1, LONGEST_STREAM),
         )
 
-    def record(self, path: str | Path, *, rate: float | None = None) -> Recorder:
+    def record(
+        self, path: str | Path, *, rate: float | None = None, camera: Camera | None = None
+    ) -> Recorder:
         """A recording of everything that happens while the `with` block runs; `heptarm.load` reads it.
 
         Pushed states, FRI cycles at their own rate, requests, events and errors go to the file in a thread of its own.
@@ -340,13 +344,18 @@ class Arm:
         Args:
             path: the file, MCAP; it is replaced.
             rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
+            camera: a simulated camera whose pictures are in the file, too: of a model of the arm, not of the robot. It
+                needs the group "joints". A process of its own draws them, so that they never hold up the states; when
+                it is too slow it drops pictures, which `Recorder.pictures_dropped` counts. None: no pictures.
 
         Raises:
             LimitError: a rate outside its range.
-            CommandRejected: the file cannot be written (when the block begins).
-            MissingExtra: the package mcap is not installed (when the block begins).
+            CommandRejected: the file cannot be written, or this machine cannot draw (when the block begins).
+            MissingExtra: the package mcap is not installed, or those of a camera (when the block begins).
         """
-        return Recorder({"": self._connection}, Path(instance(path, (str, Path), "path")), rate=rate)
+        cameras = {} if camera is None else {"": camera_feed(self, camera)}
+        where = Path(instance(path, (str, Path), "path"))
+        return Recorder({"": self._connection}, where, rate=rate, cameras=cameras)
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -976,3 +985,19 @@ class Arm:
     guide_precisely = teaching.guide_precisely
     teach = teaching.teach
     replay = replaying.replay
+
+
+def camera_feed(arm: Arm, camera: Camera) -> CameraFeed:
+    """What draws pictures of an arm for a recording; a private simulator's scene is in them.
+
+    Raises:
+        ShapeError: it is no camera.
+    """
+    cabinet = arm.connection.cabinet
+    subject = CameraSubject(
+        arm.robot.name,
+        lambda: arm.shapes,
+        scene="" if cabinet is None else cabinet.scene,
+        positions=None if cabinet is None else cabinet.positions,
+    )
+    return CameraFeed(instance(camera, Camera, "camera"), subject)

@@ -23,12 +23,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, TypeVar
 
-from heptarm.arm.arm import Arm
+from heptarm.arm.arm import Arm, camera_feed
 from heptarm.arm.connect import connect
 from heptarm.arm.motion.handle import MotionHandle, check_timeout
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
 from heptarm.values.arrays import flag, instance, shown, within
+from heptarm.values.camera import Camera
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
@@ -105,7 +106,9 @@ class Arms:
         """Short form."""
         return f"<Arms {', '.join(f'{name}: {arm!r}' for name, arm in self._arms.items())}>"
 
-    def record(self, path: str | Path, *, rate: float | None = None) -> Recorder:
+    def record(
+        self, path: str | Path, *, rate: float | None = None, camera: Camera | None = None
+    ) -> Recorder:
         """A recording of all arms in one file, with one time line; see `Arm.record`.
 
         `heptarm.load(path, arm="left")` reads the part of one of them.
@@ -113,14 +116,18 @@ class Arms:
         Args:
             path: the file, MCAP; it is replaced.
             rate: have at least so many states of each pushed per second meanwhile [Hz]; None: as many as are.
+            camera: a simulated camera in front of each of them, see `Arm.record`; None: no pictures.
 
         Raises:
             LimitError: a rate outside its range.
-            CommandRejected: the file cannot be written (when the block begins).
-            MissingExtra: the package mcap is not installed (when the block begins).
+            CommandRejected: the file cannot be written, or this machine cannot draw (when the block begins).
+            MissingExtra: the package mcap is not installed, or those of a camera (when the block begins).
         """
         sources = {name: arm.connection for name, arm in self._arms.items()}
-        return Recorder(sources, Path(instance(path, (str, Path), "path")), rate=rate)
+        cameras = (
+            {} if camera is None else {name: camera_feed(arm, camera) for name, arm in self._arms.items()}
+        )
+        return Recorder(sources, Path(instance(path, (str, Path), "path")), rate=rate, cameras=cameras)
 
     def close(self) -> None:
         """Stop all arms, then leave each at rest and disconnect it; calling it again has no effect."""

@@ -4,22 +4,47 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from cyclopts import Parameter
 
 from heptarm.arm.fri.settings import PORTS
 from heptarm.cli.options import NO_TARGET, CommandTarget, FriListen, FriPort, FriVersion, Json
 from heptarm.cli.output import emit
+from heptarm.errors import CommandRejected
 from heptarm.fri.loop.client import Client
 from heptarm.record.convert import convert as convert_recording
 from heptarm.record.fri_client import record_client
 from heptarm.record.recorder import Recorder
 from heptarm.record.recording import load
 from heptarm.values.arrays import within
+from heptarm.values.camera import Camera
 from heptarm.values.state import GROUP_NAMES
 from heptarm.viewers.live import LiveView
 
+_Number = TypeVar("_Number", int, float)
+CameraAsked = Annotated[
+    bool,
+    Parameter(negative="", help="Also record pictures of a simulated camera: of a model, no photographs."),
+]
+CameraSize = Annotated[str | None, Parameter(help="WIDTHxHEIGHT of its pictures [pixels]. Default: 640x480.")]
+CameraRate = Annotated[float | None, Parameter(help="Pictures per second, at most 60. Default: 10.")]
+CameraPlace = Annotated[
+    str | None,
+    Parameter(
+        help="X,Y,Z of the camera [m]. Default: 1.5,-1.3,1.1. Write a negative X as --camera-place=-1,0,1."
+    ),
+]
+CameraTarget = Annotated[str | None, Parameter(help="X,Y,Z that it looks at [m]. Default: 0.2,0,0.5.")]
+CameraFrame = Annotated[
+    str | None, Parameter(help="Frame of both: base, or flange, with which the camera moves. Default: base.")
+]
+CameraScene = Annotated[
+    str | None,
+    Parameter(
+        help="What is around the arm: table, peg-in-hole, bins, or a file in MuJoCo's format; nothing of it moves."
+    ),
+]
 #: Pause between two looks whether the time is over [s].
 _PAUSE = 0.1
 
@@ -33,6 +58,13 @@ def record(
         float | None, Parameter(name="--for", help="How long [s]. Default: until Ctrl-C.")
     ] = None,
     note: Annotated[str, Parameter(help="A mark at the beginning.")] = "",
+    camera: CameraAsked = False,
+    camera_size: CameraSize = None,
+    camera_rate: CameraRate = None,
+    camera_place: CameraPlace = None,
+    camera_target: CameraTarget = None,
+    camera_frame: CameraFrame = None,
+    camera_scene: CameraScene = None,
     listen: FriListen = False,
     fri_port: FriPort = None,
     fri_version: FriVersion = None,
@@ -42,14 +74,32 @@ def record(
     """Record everything that a robot reports to a file, beside the program that controls it.
 
     With --listen it records every FRI message of the application that runs on the cabinet, and mirrors its positions.
+
+    With --camera, or any other option of the camera, it also records pictures of a model of the arm.
     """
     limit = None if seconds is None else within(seconds, "for", 0.0, 1e7, above=True, unit="s")
+    settings: dict[str, Any] = {
+        "size": None if camera_size is None else _numbers(camera_size, "camera-size", "x", 2, int),
+        "rate": camera_rate,
+        "place": None if camera_place is None else _numbers(camera_place, "camera-place", ",", 3, float),
+        "target": None if camera_target is None else _numbers(camera_target, "camera-target", ",", 3, float),
+        "frame": camera_frame,
+        "scene": camera_scene,
+    }
+    given = {name: value for name, value in settings.items() if value is not None}
+    lens = Camera(**given) if camera or given else None
     if listen:
+        if lens is not None:
+            raise CommandRejected(
+                "a camera shows pushed states, and --listen records FRI messages alone",
+                parameter="camera",
+                hint="leave out --listen or the options of the camera",
+            )
         return _record_fri(out, limit, note, {"port": fri_port, "version": fri_version}, as_json=as_json)
     with target.connect(control=False, state_rate=rate) as arm:
         offered = arm.connection.welcome.groups
         arm.subscribe(rate=rate, groups=[name for name in GROUP_NAMES if name.upper() in _names(offered)])
-        with arm.record(out) as recorder:
+        with arm.record(out, camera=lens) as recorder:
             if not as_json:
                 print(
                     f"recording {arm.robot.title} to {out}{'' if limit else '; Ctrl-C ends it'}", flush=True
@@ -57,10 +107,34 @@ def record(
             wait_until_over(recorder, limit, note)
     size = out.stat().st_size
     if as_json:
-        emit({"file": str(out), "states": recorder.states, "lost": recorder.lost, "bytes": size})
+        counts = {"states": recorder.states, "lost": recorder.lost}
+        if lens is not None:
+            counts |= {"pictures": recorder.pictures, "pictures_dropped": recorder.pictures_dropped}
+        emit({"file": str(out), **counts, "bytes": size})
     else:
-        print(f"{recorder.states} states, {recorder.lost} lost, {size / 1e6:.1f} MB in {out}")
+        drawn = f"{recorder.pictures} pictures, {recorder.pictures_dropped} dropped, " if lens else ""
+        print(f"{recorder.states} states, {recorder.lost} lost, {drawn}{size / 1e6:.1f} MB in {out}")
     return 0
+
+
+def _numbers(text: str, name: str, between: str, count: int, kind: type[_Number]) -> tuple[_Number, ...]:
+    """Numbers of an option's text.
+
+    Raises:
+        CommandRejected: it has others.
+    """
+    try:
+        found = tuple(kind(part) for part in text.split(between))
+    except ValueError:
+        found = ()
+    if len(found) != count:
+        form = (
+            "WIDTHxHEIGHT in pixels, such as 640x480"
+            if count == 2
+            else "X,Y,Z in metres, such as 1.5,-1.3,1.1"
+        )
+        raise CommandRejected(f"{name} must be {form}, got {text!r}", parameter=name, value=text)
+    return found
 
 
 def wait_until_over(recorder: Recorder | LiveView, limit: float | None, note: str = "") -> None:
@@ -101,19 +175,25 @@ def _names(groups: object) -> set[str]:
 
 def convert(
     file: Annotated[Path, Parameter(help="Recording, MCAP.")],
-    out: Annotated[Path, Parameter(help="File to write: .parquet, .csv or .npz.")],
+    out: Annotated[Path, Parameter(help="File to write: .parquet, .csv or .npz; or a folder for pictures.")],
     /,
     *,
     arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
     as_json: Json = False,
 ) -> int:
-    """Convert a recording to Parquet, CSV or NumPy."""
+    """Convert a recording to Parquet, CSV or NumPy, or its pictures to a folder of JPEG files."""
     run = load(file, arm=arm)
     files = convert_recording(run, out)
+    count = len(run.pictures)
     if as_json:
-        emit({"files": [str(one) for one in files], "states": len(run), "complete": run.complete})
+        found = {"files": [str(one) for one in files], "states": len(run), "pictures": count}
+        emit(found | {"complete": run.complete})
+    elif not out.suffix:
+        print(f"{count} pictures in {out}")
     else:
         print(f"{len(run)} states in {', '.join(map(str, files))}")
-        if not run.complete:
-            print(f"{file} was cut off at its end; everything before was converted")
+        if count:
+            print(f"{count} pictures were left out; a path without a suffix is a folder for them")
+    if not as_json and not run.complete:
+        print(f"{file} was cut off at its end; everything before was converted")
     return 0

@@ -1,4 +1,4 @@
-"""Recordings as files of other programs: Parquet, CSV, NumPy."""
+"""Recordings as files of other programs: Parquet, CSV, NumPy, and pictures as a folder of JPEG files."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ def convert(recording: Recording, out: str | Path) -> list[Path]:
     """Write the signals of a recording to a file; its suffix chooses the format: .parquet, .csv or .npz.
 
     A table has a column per number; FRI cycles, which have times of their own, go to a second file beside it. A .npz
-    has all arrays by name.
+    has all arrays by name. None of them has the pictures of a camera; a path without a suffix is a folder for these.
 
     Returns:
         The files.
 
     Raises:
-        CommandRejected: another suffix, or the file cannot be written.
+        CommandRejected: another suffix, the file cannot be written, or there are no pictures for a folder.
         MissingExtra: pandas or pyarrow is not installed.
     """
     path = Path(out)
+    if not path.suffix:
+        return _pictures(recording, path)
     write = _WRITERS.get(path.suffix.lower())
     if write is None:
         allowed = ", ".join(_WRITERS)
@@ -33,6 +35,7 @@ def convert(recording: Recording, out: str | Path) -> list[Path]:
             parameter="out",
             value=str(out),
             allowed=allowed,
+            hint="a folder for the pictures of a camera has none",
         )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -41,6 +44,18 @@ def convert(recording: Recording, out: str | Path) -> list[Path]:
         raise CommandRejected(
             f"{path} cannot be written: {error.strerror}", parameter="out", value=str(out)
         ) from error
+
+
+def _pictures(recording: Recording, folder: Path) -> list[Path]:
+    if not len(recording.pictures):
+        allowed = ", ".join(_WRITERS)
+        raise CommandRejected(
+            f"out must end in {allowed}, got {str(folder)!r}: the recording has no pictures for a folder",
+            parameter="out",
+            value=str(folder),
+            allowed=allowed,
+        )
+    return recording.pictures.save(folder)
 
 
 def _npz(recording: Recording, path: Path) -> list[Path]:

@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.protocol.protobuf import BYTES, FIXED32, FIXED64, key, put_bytes, put_varint, varint
+from heptarm.fri.protocol.protobuf import BYTES, FIXED32, FIXED64, fields, key, put_bytes, put_varint, varint
+from heptarm.values.arrays import Array
 from heptarm.wire.messages import STATE_LAYOUT
 
 Rows = npt.NDArray[Any]
@@ -187,7 +188,7 @@ def cycle_rows(words: npt.NDArray[np.float64]) -> Rows:
 
 # ----------------------------------------------------------------------- schemas of foxglove, for other tools
 
-_DOUBLE, _STRING, _MESSAGE, _ENUM, _FIXED32 = 1, 9, 11, 14, 7
+_DOUBLE, _STRING, _MESSAGE, _BYTES, _ENUM, _FIXED32 = 1, 9, 11, 12, 14, 7
 _INT64, _INT32 = 3, 5
 #: Levels of a log message.
 LEVELS = {"unknown": 0, "debug": 1, "info": 2, "warning": 3, "error": 4, "fatal": 5}
@@ -283,10 +284,37 @@ def _transforms_descriptor() -> bytes:
     return _file_set(_TIMESTAMP, content)
 
 
+def _image_descriptor() -> bytes:
+    image = _message(
+        "CompressedImage",
+        _STAMPED,
+        _field("frame_id", 4, _STRING),
+        _field("data", 2, _BYTES),
+        _field("format", 3, _STRING),
+    )
+    return _file_set(_TIMESTAMP, _file("foxglove/CompressedImage.proto", "foxglove", [image], [_TIME]))
+
+
+def _calibration_descriptor() -> bytes:
+    calibration = _message(
+        "CameraCalibration",
+        _STAMPED,
+        _field("frame_id", 9, _STRING),
+        _field("width", 2, _FIXED32),
+        _field("height", 3, _FIXED32),
+        _field("distortion_model", 4, _STRING),
+        *(_field(name, number, _DOUBLE, is_repeated=True) for number, name in enumerate("DKRP", 5)),
+    )
+    content = _file("foxglove/CameraCalibration.proto", "foxglove", [calibration], [_TIME])
+    return _file_set(_TIMESTAMP, content)
+
+
 #: Name and descriptor of the messages that are written one by one.
 LOG = ("foxglove.Log", _log_descriptor())
 POSE_IN_FRAME = ("foxglove.PoseInFrame", _pose_descriptor())
 FRAME_TRANSFORMS = ("foxglove.FrameTransforms", _transforms_descriptor())
+COMPRESSED_IMAGE = ("foxglove.CompressedImage", _image_descriptor())
+CAMERA_CALIBRATION = ("foxglove.CameraCalibration", _calibration_descriptor())
 
 
 def encode_log(nanos: int, level: str, text: str, name: str) -> bytes:
@@ -309,6 +337,29 @@ def encode_transforms(nanos: int, transforms: Sequence[tuple[bytes, Sequence[flo
     """Transforms of frames; `nanos` since 1970, each with its `transform_head` and its quaternion x y z w."""
     stamp = put_bytes(1, _timestamp(nanos))
     return b"".join(put_bytes(1, stamp + head + put_bytes(5, _numbers(quat))) for head, quat in transforms)
+
+
+def encode_image(nanos: int, frame: str, data: bytes) -> bytes:
+    """A picture, the bytes of a JPEG file, of a camera with this frame; `nanos` since 1970."""
+    head = put_bytes(1, _timestamp(nanos)) + put_bytes(4, frame.encode())
+    return head + put_bytes(3, b"jpeg") + put_bytes(2, data)
+
+
+def image_data(message: bytes) -> bytes:
+    """The bytes of the file in such a message; empty: there are none."""
+    return next((value for tag, _, value in fields(message) if tag == 2 and isinstance(value, bytes)), b"")
+
+
+def encode_calibration(nanos: int, frame: str, size: tuple[int, int], matrix: Array) -> bytes:
+    """How a camera without distortion projects; `nanos` since 1970, its intrinsic matrix, shape (3, 3) [pixels]."""
+    content = put_bytes(1, _timestamp(nanos)) + put_bytes(9, frame.encode())
+    for number, length in enumerate(size, 2):
+        content += key(number, FIXED32) + struct.pack("<I", length)
+    content += put_bytes(4, b"plumb_bob")
+    projection = np.column_stack([matrix, np.zeros(3)])
+    for number, values in enumerate((np.zeros(5), matrix, np.eye(3), projection), 5):
+        content += put_bytes(number, values.astype("<f8").tobytes())
+    return content
 
 
 def transform_head(parent: str, child: str, xyz: Sequence[float]) -> bytes:

@@ -2,8 +2,9 @@
 
 Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp and /tf (the motion frame, and the frames
 of the links with the names of the URDF, for a 3D view, at most 30 per second), /log (what happened, as text), /journal
-(the same with all its data), /signals (IO and control mode, when they change). The log time of a message is its
-receipt, the publish time of a state the moment of its sampling. In a recording of several arms the topics begin with
+(the same with all its data), /signals (IO and control mode, when they change), /camera/image and /camera/calibration
+(pictures of a simulated camera). The log time of a message is its receipt, the publish time of a state the moment of
+its sampling; a picture has those of the state that it shows. In a recording of several arms the topics begin with
 the arm's name, as in /left/state, and so do the frames: left_base.
 """
 
@@ -22,8 +23,11 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
+from heptarm.record.camera import Picture
 from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
 from heptarm.record.layout import (
+    CAMERA_CALIBRATION,
+    COMPRESSED_IMAGE,
     FRAME_TRANSFORMS,
     FRI_CYCLE,
     LOG,
@@ -31,12 +35,15 @@ from heptarm.record.layout import (
     STATE,
     RowLayout,
     cycle_rows,
+    encode_calibration,
+    encode_image,
     encode_log,
     encode_pose,
     encode_transforms,
     transform_head,
 )
 from heptarm.record.samples import RestWatch, StateSample, state_rows
+from heptarm.values.camera import Camera
 from heptarm.values.robot import ROBOTS, robot
 from heptarm.wire import messages as wire
 
@@ -76,6 +83,7 @@ class RecordingFile:
 
     Attributes:
         path: the file.
+        sampled: our clock at the sampling of the last state that was written [ns].
 
     Raises:
         CommandRejected: the file cannot be written.
@@ -110,14 +118,17 @@ class RecordingFile:
     def _begin(self, facts: Mapping[str, str], arm: str) -> None:
         """Write the beginning of an arm's part, which a file that is cut off still has."""
         self._prefix = f"/{arm}" if arm else ""
+        self.sampled = 0
         self._pose_due = 0
         self._rest = RestWatch()
         self._cycles: int | None = None
+        self._camera: tuple[int, int] | None = None
+        self._names = f"{arm}_" if arm else ""
         self._out.add_metadata(BEGIN, {**facts, **({ARM: arm} if arm else {})})
         self._states = self._add_rows("/state", STATE)
         self._pose = self._add("/tcp", *POSE_IN_FRAME)
         self._frames = self._add("/tf", *FRAME_TRANSFORMS)
-        self._links = _LinkFrames(facts.get("robot", ""), f"{arm}_" if arm else "")
+        self._links = _LinkFrames(facts.get("robot", ""), self._names)
         self._log = self._add("/log", *LOG)
         self._journal = self._add_json("/journal", "heptarm.JournalEntry", _JOURNAL_SCHEMA)
         self._signals = self._add_json("/signals", "heptarm.Signals", _SIGNALS_SCHEMA)
@@ -159,6 +170,7 @@ class RecordingFile:
             if one.received >= self._pose_due:
                 self._write_pose(rows[index], one.received, at)
             self._write_rest(one, at, signals)
+        self.sampled = at - self._epoch
 
     def _write_pose(self, row: Any, received: int, sampled: int) -> None:
         """Write what is three-dimensional: the pose of the motion frame, and the frames of the links."""
@@ -197,6 +209,22 @@ class RecordingFile:
         for index, received in enumerate(rows["received"].tolist()):
             at = received + self._epoch
             self._out.add_message(self._cycles, at, data[index * size : (index + 1) * size], at)
+
+    def picture(self, camera: Camera, picture: Picture) -> None:
+        """Write a picture, how the camera projects, and the camera's frame: z ahead, x to the right, y down."""
+        if self._camera is None:
+            image = self._add("/camera/image", *COMPRESSED_IMAGE)
+            self._camera = image, self._add("/camera/calibration", *CAMERA_CALIBRATION)
+        received, at = picture.received + self._epoch, picture.sampled + self._epoch
+        frame, pose, number = f"{self._names}camera", camera.pose, picture.number & 0xFFFFFFFF
+        head = transform_head(self._names + camera.frame, frame, pose.xyz.tolist())
+        image, calibration = self._camera
+        for channel, data in (
+            (self._frames, encode_transforms(at, [(head, pose.quat.tolist())])),
+            (calibration, encode_calibration(at, frame, camera.size, camera.matrix)),
+            (image, encode_image(at, frame, picture.data)),
+        ):
+            self._out.add_message(channel, received, data, at, number)
 
     def entry(self, entry: JournalEntry) -> None:
         """Write what happened."""

@@ -16,10 +16,11 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError
 from heptarm.fri.loop.telemetry import Reader
+from heptarm.record.camera import CameraFeed
 from heptarm.record.journal import NOTE, Journal, JournalEntry
 from heptarm.record.layout import STATE
 from heptarm.record.mcap_file import RecordingFile
-from heptarm.record.samples import SampleQueue, StateSample
+from heptarm.record.samples import SampleQueue, StateSample, state_rows
 from heptarm.values.arrays import instance, within
 
 _log = logging.getLogger("heptarm.record")
@@ -158,16 +159,51 @@ class CycleTap:
             del self._next[reader]
 
 
+class _Film:
+    """The pictures of one source in the file.
+
+    Args:
+        feed: draws them.
+        file: where to.
+
+    Attributes:
+        pictures: number of those that were written.
+    """
+
+    def __init__(self, feed: CameraFeed, file: RecordingFile) -> None:
+        self._feed, self._file = feed, file
+        self.pictures = 0
+
+    def offer(self, sample: StateSample) -> None:
+        """Show the state that was written last, if a picture is due."""
+        if self._feed.is_due(sample.received):
+            q = state_rows([sample.body])["q"][0].tolist()
+            self._feed.offer(sample.number, sample.received, self._file.sampled, q)
+
+    def write(self) -> None:
+        """Write what is finished."""
+        for one in self._feed.take():
+            self._file.picture(self._feed.camera, one)
+            self.pictures += 1
+
+    def close(self) -> None:
+        """Write the last picture, and end the camera."""
+        self._feed.settle()
+        self.write()
+        self._feed.close()
+
+
 class _Tap:
-    """What is recorded of one source: its states, its journal, its FRI cycles.
+    """What is recorded of one source: its states, its journal, its FRI cycles, its pictures.
 
     Args:
         source: what is recorded.
         file: where to.
+        film: its pictures; None: there are none.
     """
 
-    def __init__(self, source: RecordSource, file: RecordSink) -> None:
-        self._source, self._file = source, file
+    def __init__(self, source: RecordSource, file: RecordSink, film: _Film | None) -> None:
+        self._source, self._file, self._film = source, file, film
         self._entries: deque[JournalEntry] = source.journal.open()
         self._samples = source.open_samples(_WAITING)
         self._cycles = CycleTap()
@@ -184,9 +220,13 @@ class _Tap:
         while batch := self._samples.take(_BATCH):
             self._file.states(batch, to_ours=source.to_ours, signals=source.signal_names)
             count += len(batch)
+            if self._film is not None:
+                self._film.offer(batch[-1])
         while self._entries:
             self._file.entry(self._entries.popleft())
         self._cycles.write(journal.sessions, self._file)
+        if self._film is not None:
+            self._film.write()
         return count
 
     def close(self) -> None:
@@ -204,6 +244,7 @@ class Recorder:
         rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
         sinks: makes what is written to, one for each arm in their order; None: the file.
         period: time between two looks at what has arrived [s].
+        cameras: what draws pictures for the file, by the name of the arm.
 
     Attributes:
         path: the file.
@@ -221,6 +262,7 @@ class Recorder:
         rate: float | None = None,
         sinks: Callable[[Mapping[str, RecordSource]], Sequence[RecordSink]] | None = None,
         period: float = _PERIOD,
+        cameras: Mapping[str, CameraFeed] | None = None,
     ) -> None:
         self._sources = dict(sources)
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
@@ -228,6 +270,8 @@ class Recorder:
         self.states = 0
         self._open_sinks = self._open_files if sinks is None else sinks
         self._period = period
+        self._cameras = dict(cameras or {})
+        self._films: dict[str, _Film] = {}
         self._file: RecordSink | None = None
         self._taps: list[_Tap] = []
         self._failure: OSError | None = None
@@ -242,7 +286,8 @@ class Recorder:
         Raises:
             CommandRejected: the file cannot be written.
             LimitError: the cabinet does not push so many states.
-            MissingExtra: the package mcap is not installed.
+            CommandRejected: this machine cannot draw the pictures of a camera, or there is no such scene.
+            MissingExtra: the package mcap is not installed, or those that a camera needs.
         """
         if self._file is not None:
             raise LocalProtocolError("a recorder is used once", hint="make another one with arm.record(...)")
@@ -250,13 +295,20 @@ class Recorder:
             if self._rate is not None:
                 for source in self._sources.values():
                     self._restore.append(source.raise_rate(self._rate))
+            for camera in self._cameras.values():
+                camera.start()
             sinks = self._open_sinks(self._sources)
         except BaseException:
+            for camera in self._cameras.values():
+                camera.close()
             for restore in self._restore:
                 restore()
             raise
         self._file = sinks[0]
-        self._taps = [_Tap(source, sink) for source, sink in zip(self._sources.values(), sinks, strict=True)]
+        self._taps = [
+            _Tap(source, sink, self._films.get(name))
+            for (name, source), sink in zip(self._sources.items(), sinks, strict=True)
+        ]
         self._thread.start()
         return self
 
@@ -265,7 +317,11 @@ class Recorder:
         (name, first), *others = sources.items()
         size = chunk_size(sum(source.state_rate for source in sources.values()))
         file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
-        return [file, *(file.beside(source.facts, name) for name, source in others)]
+        files = [file, *(file.beside(source.facts, name) for name, source in others)]
+        for name, one in zip(sources, files, strict=True):
+            if name in self._cameras:
+                self._films[name] = _Film(self._cameras[name], one)
+        return files
 
     def note(self, text: str) -> None:
         """Put a mark on the time line; `Recording.between` finds it by its text.
@@ -287,6 +343,16 @@ class Recorder:
     def lost(self) -> int:
         """States and FRI cycles that could not be recorded, because the disk was too slow for too long."""
         return sum(tap.lost for tap in self._taps)
+
+    @property
+    def pictures(self) -> int:
+        """Pictures of the camera written so far, of all arms."""
+        return sum(film.pictures for film in self._films.values())
+
+    @property
+    def pictures_dropped(self) -> int:
+        """Pictures that were due while the camera still drew the one before: it never holds up the states."""
+        return sum(camera.dropped for camera in self._cameras.values())
 
     @property
     def is_running(self) -> bool:
@@ -348,7 +414,12 @@ class Recorder:
                 file.flush()
                 if is_last:
                     break
-            file.finish({"states": str(self.states), "lost": str(self.lost)})
+            for film in self._films.values():
+                film.close()
+            counts = {"states": self.states, "lost": self.lost}
+            if self._films:
+                counts |= {"pictures": self.pictures, "pictures_dropped": self.pictures_dropped}
+            file.finish({name: str(count) for name, count in counts.items()})
         except OSError as error:
             self._failure = error
             file.abandon()
@@ -360,3 +431,5 @@ class Recorder:
         finally:
             for tap in self._taps:
                 tap.close()
+            for camera in self._cameras.values():
+                camera.close()

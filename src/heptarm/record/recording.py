@@ -14,12 +14,14 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
 from heptarm.record.journal import NOTE
-from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout
+from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout, image_data
 from heptarm.record.mcap_file import ARM, BEGIN, END
+from heptarm.record.pictures import Pictures
 from heptarm.record.samples import signals_of, to_frame
-from heptarm.values.arrays import Array, finite, flag, instance, shown
+from heptarm.values.arrays import Array, finite, flag, frozen, instance, shown
+from heptarm.values.notebook import as_html
 from heptarm.values.robot import ROBOTS, RobotModel
-from heptarm.values.text import as_html
+from heptarm.values.text import lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,6 +100,7 @@ class Recording:
         events: what happened, in order.
         complete: the file has its end; otherwise it was cut off, and what is here is all up to its last whole chunk.
         lost: states and FRI cycles that could not be recorded; only known of a complete file.
+        pictures: of a simulated camera, if there was one.
     """
 
     path: Path
@@ -107,6 +110,7 @@ class Recording:
     events: tuple[RecordedEvent, ...]
     complete: bool
     lost: int = 0
+    pictures: Pictures = field(default_factory=Pictures)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """Array of a signal, such as "q", "fri.tau" or "t".
@@ -179,6 +183,7 @@ class Recording:
             signals=signals,
             motions=tuple(one for one in self.motions if one.begin <= last and not one.end < first),
             events=tuple(one for one in self.events if first <= one.t <= last),
+            pictures=self.pictures.between(first, last),
         )
 
     def _moment(self, when: float | str, name: str) -> float:
@@ -227,18 +232,20 @@ class Recording:
         """A few lines: what is in it."""
         rate = (len(self) - 1) / self.duration if self.duration else 0.0
         ending = "" if self.complete else ", cut off at its end"
-        lines = [
-            f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}",
-            f"  states   {len(self)} at {rate:.0f} Hz, {self.lost} lost",
-        ]
-        if f"{FRI}t" in self.signals:
-            lines.append(f"  FRI      {len(self.signals[f'{FRI}t'])} cycles")
-        lines.append(f"  motions  {len(self.motions)}")
-        lines.append(f"  events   {len(self.events)}, {len(self.notes)} notes")
-        return "\n".join(lines)
+        title = f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}"
+        rows = {
+            "states": f"{len(self)} at {rate:.0f} Hz, {self.lost} lost",
+            "FRI": f"{len(self.signals[f'{FRI}t'])} cycles" if f"{FRI}t" in self.signals else "",
+            "pictures": f"{len(self.pictures)}, {self.pictures.dropped} dropped"
+            if len(self.pictures)
+            else "",
+            "motions": str(len(self.motions)),
+            "events": f"{len(self.events)}, {len(self.notes)} notes",
+        }
+        return lines(title, rows)
 
     def _repr_html_(self) -> str:
-        """The text of `str` for a notebook."""
+        """The same as a table for a notebook."""
         return as_html(str(self))
 
     def __repr__(self) -> str:
@@ -267,6 +274,7 @@ class _Content:
     published: list[int] = field(default_factory=list)
     cycled: list[int] = field(default_factory=list)
     entries: list[tuple[int, str, bytes]] = field(default_factory=list)
+    pictures: list[tuple[int, bytes]] = field(default_factory=list)
     arm: str = ""
     arms: list[str] = field(default_factory=list)
     earliest: int | None = None
@@ -344,6 +352,8 @@ def _take(record: Any, content: _Content) -> None:
         elif topic == f"{prefix}/fri":
             content.payloads[FRI_CYCLE.full_name].append(record.data)
             content.cycled.append(record.publish_time)
+        elif topic == f"{prefix}/camera/image":
+            content.pictures.append((record.publish_time, image_data(record.data)))
         elif topic in (f"{prefix}/journal", f"{prefix}/signals"):
             content.entries.append((record.publish_time, topic.removeprefix(prefix), record.data))
     elif kind == "Channel":
@@ -408,6 +418,11 @@ def _recording(path: Path, content: _Content) -> Recording:
         events,
         complete=content.end is not None,
         lost=int((content.end or {}).get("lost", 0)),
+        pictures=Pictures(
+            line([at for at, _ in content.pictures]) if content.pictures else frozen(np.zeros(0)),
+            tuple(data for _, data in content.pictures),
+            int((content.end or {}).get("pictures_dropped", 0)),
+        ),
     )
 
 

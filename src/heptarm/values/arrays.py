@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.text import as_html
+from heptarm.values.notebook import as_html
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Value:
         return hash(self._key())
 
     def _repr_html_(self) -> str:
-        """The text of `str` for a notebook."""
+        """A table of the rows of `str` for a notebook; of a single line the line."""
         return as_html(str(self))
 
     def _key(self) -> tuple[object, ...]:

@@ -73,7 +73,7 @@ class Result(Value):
             "stopped by": fired,
             "duration": f"{self.duration:.3f} s",
             "force": "" if isnan(self.peak_force) else self._forces,
-            "residual": "" if isnan(self.residual) else f"{degrees(self.residual, 4)}",
+            "residual": "" if isnan(self.residual) else degrees(self.residual, 4),
         }
         if self.state is not None and self.state.joints is not None:
             rows["joints"] = degrees(self.state.q)

@@ -19,7 +19,7 @@ from heptarm.values.arrays import Array, Value, frozen
 from heptarm.values.io import SignalValues
 from heptarm.values.mode.mode import HandGuiding, Mode
 from heptarm.values.pose import Pose, Redundancy
-from heptarm.values.text import columns, fixed, lines
+from heptarm.values.text import aligned, columns, fixed, lines
 
 _T = TypeVar("_T")
 
@@ -314,7 +314,7 @@ class State(Value):
         groups = self.groups
         rows: dict[str, str] = {}
         if groups.joints is not None or groups.torques is not None:
-            rows["joint"] = "".join(f"{f'A{i + 1}':>8}" for i in range(7))
+            rows["joint"] = aligned(f"A{i + 1}" for i in range(7))
         if groups.joints is not None:
             rows["q [deg]"] = columns(np.degrees(self.q), 2)
             rows["q [rad]"] = columns(self.q, 4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
@@ -10,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from heptarm.values.notebook import Cells, Listing
 
 #: Units of fields whose name has them at its end, and factors for other fields by name.
 _SUFFIXES = {
@@ -43,33 +44,44 @@ def fixed(value: float, digits: int) -> str:
     return "-" if math.isnan(value) else f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
-def columns(values: Iterable[float], digits: int, width: int = 8) -> str:
+def aligned(cells: Iterable[str], width: int = 8) -> Cells:
+    """Texts in columns of the same width."""
+    parts = tuple(cells)
+    return _cells("".join(f"{part:>{width}}" for part in parts), parts)
+
+
+def columns(values: Iterable[float], digits: int, width: int = 8) -> Cells:
     """Numbers in columns of the same width."""
-    return "".join(f"{fixed(value, digits):>{width}}" for value in values)
+    return aligned((fixed(value, digits) for value in values), width)
 
 
-def degrees(values: npt.ArrayLike, digits: int = 2) -> str:
+def degrees(values: npt.ArrayLike, digits: int = 2) -> Cells:
     """Angles in degrees and in radians: "20.00 35.00 deg (0.3491 0.6109 rad)"."""
     given = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    in_degrees = " ".join(fixed(value, digits) for value in np.degrees(given))
-    return f"{in_degrees} deg ({' '.join(fixed(value, digits + 2) for value in given)} rad)"
+    turned = [fixed(value, digits) for value in np.degrees(given)]
+    same = [fixed(value, digits + 2) for value in given]
+    both = tuple(f"{one} deg\n{other} rad" for one, other in zip(turned, same, strict=True))
+    return _cells(f"{' '.join(turned)} deg ({' '.join(same)} rad)", both)
 
 
-def lines(title: str, rows: Mapping[str, str]) -> str:
+def _cells(text: str, cells: tuple[str, ...]) -> Cells:
+    found = Cells(text)
+    found.cells = cells
+    return found
+
+
+def lines(title: str, rows: Mapping[str, str]) -> Listing:
     """A title and aligned rows below it; empty ones are left out."""
     shown = {name: text for name, text in rows.items() if text}
     width = max((len(name) for name in shown), default=0)
     indent = " " * (width + 4)
     below = (f"  {name:{width}}  " + text.replace("\n", f"\n{indent}") for name, text in shown.items())
-    return "\n".join([title, *below])
+    found = Listing("\n".join([title, *below]))
+    found.heading, found.rows = title, shown
+    return found
 
 
-def as_html(text: str) -> str:
-    """The same text for a notebook."""
-    return f"<pre>{html.escape(text)}</pre>"
-
-
-def described(value: Any, title: str) -> str:
+def described(value: Any, title: str) -> Listing:
     """The fields of a value that do not have their defaults, a line each."""
     return lines(title, dict(_rows(value)))
 

@@ -12,11 +12,14 @@ import json
 import logging
 import os
 import queue
+import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import weakref
 from collections import deque
+from pathlib import Path
 
 from heptarm.arm.link.target import Target
 from heptarm.errors import ConnectFailed, ConnectionLost, refuse_windows, require_extra
@@ -38,6 +41,8 @@ class PrivateCabinet:
         host: address on which it listens.
         port: TCP port on which it listens.
         pid: its process id.
+        scene: what is around the arm; "": nothing.
+        positions: file in which it writes the positions of arm and scene; None: there is no scene.
     """
 
     host = "127.0.0.1"
@@ -48,7 +53,10 @@ class PrivateCabinet:
         port: int,
         readers: list[threading.Thread],
         replies: queue.SimpleQueue[tuple[str, str]],
+        scene: str,
+        positions: Path | None,
     ) -> None:
+        self.scene, self.positions = scene, positions
         self._replies = replies
         self._command_lock = threading.Lock()
         self.port = port
@@ -61,7 +69,7 @@ class PrivateCabinet:
     def abandon(self) -> None:
         """Give up the pipes in a fork of the process, so that only the original process keeps the simulator running."""
         atexit.unregister(self.close)
-        self._readers = []
+        self._readers, self.positions = [], None
         self._process.returncode = 0  # it is no child of this process: nothing to wait for
         self._command_lock = threading.Lock()
         nothing = os.open(os.devnull, os.O_RDWR)
@@ -103,6 +111,10 @@ class PrivateCabinet:
             command += [flag(name), value]
         if key is None:
             command += ["--data", "heptarm.key="]  # a key in a project's file is that of the real cabinet
+        scene = dict(target.options).get("scene", "")
+        positions = Path(tempfile.mkdtemp(prefix="heptarm-")) / "positions" if scene else None
+        if positions is not None:
+            command += ["--positions", str(positions)]
         command.append("--parent-pipe")
         # a session of its own: Ctrl-C in the terminal reaches only this process, which then stops the arm
         process = subprocess.Popen(
@@ -135,10 +147,10 @@ class PrivateCabinet:
         except queue.Empty:
             port, is_slow = None, True
         except BaseException:
-            _end(process, readers)
+            _end(process, readers, positions)
             raise
         if port is None:
-            _end(process, readers)
+            _end(process, readers, positions)
             if is_slow:
                 raise ConnectFailed(
                     f"the virtual cabinet did not start within {timeout:g} s",
@@ -150,7 +162,7 @@ class PrivateCabinet:
             raise ConnectFailed(
                 f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}", hint=hint
             )
-        return cls(process, port, readers, replies)
+        return cls(process, port, readers, replies, scene, positions)
 
     @property
     def is_running(self) -> bool:
@@ -182,7 +194,7 @@ class PrivateCabinet:
     def close(self) -> None:
         """End the process; calling it again has no effect."""
         atexit.unregister(self.close)
-        _end(self._process, self._readers)
+        _end(self._process, self._readers, self.positions)
 
 
 #: All private cabinets, for a fork of the process.
@@ -230,8 +242,8 @@ def _read_log(process: subprocess.Popen[str], output: deque[str]) -> None:
         _log.debug("%s", line.rstrip())
 
 
-def _end(process: subprocess.Popen[str], readers: list[threading.Thread]) -> None:
-    """Close the pipe and wait; kill the process if it does not end."""
+def _end(process: subprocess.Popen[str], readers: list[threading.Thread], positions: Path | None) -> None:
+    """Close the pipe and wait; kill the process if it does not end; remove its file of positions."""
     with contextlib.suppress(OSError):  # the process may have ended already
         if process.stdin is not None:
             process.stdin.close()
@@ -247,3 +259,5 @@ def _end(process: subprocess.Popen[str], readers: list[threading.Thread]) -> Non
         reader.join(1.0)
         if pipe is not None and not reader.is_alive():
             pipe.close()
+    if positions is not None:
+        shutil.rmtree(positions.parent, ignore_errors=True)

@@ -37,10 +37,11 @@ from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode
+from heptarm.values.notebook import as_html
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
 from heptarm.values.state import State
-from heptarm.values.text import as_html, fixed, lines
+from heptarm.values.text import fixed, lines
 from heptarm.wire import messages as wire
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
@@ -394,7 +395,7 @@ class ServoStats:
         return lines("Servo", rows)
 
     def _repr_html_(self) -> str:
-        """The same for a notebook."""
+        """The same as a table for a notebook."""
         return as_html(str(self))
 
 

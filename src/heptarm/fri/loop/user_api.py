@@ -34,8 +34,9 @@ from heptarm.fri.session.statistics import Counters, Histogram
 from heptarm.values.arrays import instance, numbers, scalar, shown
 from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
+from heptarm.values.notebook import as_html
 from heptarm.values.pose import Pose
-from heptarm.values.text import as_html, lines
+from heptarm.values.text import lines
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -654,7 +655,7 @@ class Stats:
         return lines("FRI", rows)
 
     def _repr_html_(self) -> str:
-        """The same for a notebook."""
+        """The same as a table for a notebook."""
         return as_html(str(self))
 
     @classmethod

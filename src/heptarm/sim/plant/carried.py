@@ -20,7 +20,8 @@ from heptarm.values.shape import MOST_SHAPES, Shape, ShapeKind
 
 #: Put before the names of bodies of tools and of workpieces, so that they differ from those of arm and scene.
 TOOL_PREFIX, WORKPIECE_PREFIX = "tool/", "workpiece/"
-_COLOUR = (0.45, 0.47, 0.5, 1.0)
+#: Red, green, blue and opacity of what is on the flange.
+COLOUR = (0.45, 0.47, 0.5, 1.0)
 #: Name of the body of the running plant that has what is mounted.
 _MOUNTED = "mounted"
 #: Names of the shapes that a model has room for: those of a tool and of a workpiece.
@@ -63,7 +64,7 @@ class CarriedShapes(Value):
                 pos=one.pose.xyz,
                 quat=np.roll(one.pose.quat, 1),
                 mass=0.0,
-                rgba=_COLOUR,
+                rgba=COLOUR,
             )
 
 
@@ -78,7 +79,7 @@ def make_room(arm: mujoco.MjSpec) -> None:
             contype=0,
             conaffinity=0,
             mass=0.0,
-            rgba=_COLOUR,
+            rgba=COLOUR,
         )
 
 

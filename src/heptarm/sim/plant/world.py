@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import degrees, isfinite
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from heptarm.sim.plant.appearance import ArmMeshes, undress
 from heptarm.sim.plant.carried import CarriedShapes, make_room
 from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
+from heptarm.values.camera import Camera
+from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
 
 MODELS = Path(__file__).parents[1] / "models"
+#: Name of the camera of a model.
+CAMERA = "heptarm"
+#: MuJoCo's cameras look along -z and have y up; ours look along z and have y down.
+_UPSIDE_DOWN = Pose.of((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 _NUMBERS = 6
 #: Contact type of the world's shapes, as the floor's.
 _MEETS_ARM = 2
@@ -84,6 +91,7 @@ def compiled(
     carried: Sequence[CarriedShapes] = (),
     *,
     room: bool = False,
+    camera: Camera | None = None,
 ) -> mujoco.MjModel:
     """MuJoCo's model of a robot among boxes and in a scene, see `specification`; its first seven joints are the arm's.
 
@@ -94,6 +102,7 @@ def compiled(
         meshes: see `specification`.
         carried: what is on the flange. Where a scene has a tool, that one is there: the shapes of another are left out.
         room: whether shapes can be mounted later, see `heptarm.sim.plant.carried.FlangeShapes`.
+        camera: from which it is drawn; MuJoCo knows it as `CAMERA`. None: none.
 
     Raises:
         ValueError: the file of the scene is not in MuJoCo's format.
@@ -119,4 +128,14 @@ def compiled(
             solref=COMPLIANCE,
             rgba=[0.7, 0.6, 0.45, 1.0],
         )
+    if camera is not None:
+        _add_camera(spec, camera)
     return spec.compile()
+
+
+def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
+    body, pose = spec.worldbody, camera.pose @ _UPSIDE_DOWN
+    if camera.frame == "flange":
+        flange = spec.site("flange")
+        body, pose = flange.parent, Pose.of(flange.pos, np.roll(flange.quat, -1)) @ pose
+    body.add_camera(name=CAMERA, pos=pose.xyz, quat=np.roll(pose.quat, 1), fovy=degrees(camera.fov))

@@ -1,0 +1,68 @@
+"""A camera as a value: where its pose and its matrix put a point, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.errors import LimitError, ShapeError
+
+
+def seen(camera: ha.Camera, point: tuple[float, float, float]) -> np.ndarray:
+    """Where a point of the camera's frame is in the picture, and how far away: u v [pixels], depth [m]."""
+    u, v, depth = camera.matrix @ (camera.pose.inverse().matrix @ (*point, 1.0))[:3]
+    return np.array([u / depth, v / depth, depth])
+
+
+@pytest.mark.parametrize(
+    ("place", "target"),
+    [
+        ((1.5, -1.3, 1.1), (0.2, 0.0, 0.5)),
+        ((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)),
+        ((0.1, 0.0, 0.0), (0.1, 0.0, 0.4)),
+        ((-2.0, 0.0, 0.3), (0.0, 0.0, 0.3)),
+    ],
+)
+def test_the_target_is_in_the_middle_and_the_picture_is_upright(place: Any, target: Any) -> None:
+    camera = ha.Camera(place, target, size=(320, 200))
+    np.testing.assert_allclose(seen(camera, target)[:2], (160, 100), atol=1e-9)
+    assert seen(camera, target)[2] == pytest.approx(np.linalg.norm(np.subtract(target, place)))
+    upright = (0, 0, 0.05) if place[:2] != target[:2] else (0.05, 0, 0)
+    u, v, _ = seen(camera, tuple(np.add(target, upright)))
+    assert u == pytest.approx(160) and v < 100
+    np.testing.assert_allclose(camera.pose.rotation @ camera.pose.rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(camera.pose.rotation) == pytest.approx(1.0)
+
+
+def test_the_field_of_view_is_from_edge_to_edge() -> None:
+    camera = ha.Camera((2.0, 0.0, 0.0), (0.0, 0.0, 0.0), fov=2 * np.arctan(0.5), size=(100, 50))
+    np.testing.assert_allclose(seen(camera, (0.0, 0.0, 1.0)), (50, 0, 2.0), atol=1e-9)
+    np.testing.assert_allclose(seen(camera, (0.0, 2.0, -1.0)), (100, 50, 2.0), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"place": (0, 0, 30)}, LimitError, r"place\[2\] must be in \[-20, 20\] m, got 30 m"),
+        ({"target": (1.5, -1.3, 1.1)}, LimitError, "target must be at least 1 mm from place"),
+        ({"fov": 45.0}, LimitError, "math.radians"),
+        ({"size": (640,)}, ShapeError, "size must be width and height in pixels"),
+        ({"size": (640, 5)}, LimitError, r"size\[1\] must be in \[16, 4096\], got 5"),
+        ({"rate": 0.0}, LimitError, r"rate must be in \(0, 60\] Hz"),
+        ({"frame": "tool"}, ShapeError, "frame must be"),
+        ({"scene": 3}, ShapeError, "scene"),
+    ],
+)
+def test_what_is_no_camera_is_refused(given: dict[str, Any], error: type[Exception], words: str) -> None:
+    with pytest.raises((error, ha.CommandRejected), match=words):
+        ha.Camera(**given)
+
+
+def test_it_is_frozen_and_compared() -> None:
+    one, other = ha.Camera(), ha.Camera(place=[1.5, -1.3, 1.1], size=[640, 480])  # type: ignore[arg-type]
+    assert one == other and hash(one) == hash(other) and one != ha.Camera(rate=5)
+    with pytest.raises(AttributeError):
+        one.rate = 3.0  # type: ignore[misc]
