@@ -252,6 +252,15 @@ def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelAr
     browser.find_element("css selector", "input[type=file]").send_keys(str(file))
     until(lambda: model.points.names == ("P1",), "nothing was loaded")
 
+    # a step that is refused chooses no other point
+    model.teach("P2")
+    page.shows("2 P2")
+    model.release_control()
+    page.press("Step")
+    until(lambda: (said := model.poll().message) is not None and said.level == "error", "it was not refused")
+    page.shows("● 1 P1")
+    model.take_control()
+
     # a program's plan, through the user's folder of open panels
     plan = arm.plan(ha.lin_rel(z=-0.05, frame="base"))
     until(lambda: plan.show() is None, "the panel takes no plans")
