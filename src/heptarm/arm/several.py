@@ -61,6 +61,11 @@ class StatesOfArms:
     states: tuple[State, ...]
     spread: float
 
+    def __str__(self) -> str:
+        """The states, one below the other, and how far they are apart."""
+        head = f"{len(self.states)} arms, sampled within {self.spread * 1e3:.1f} ms"
+        return "\n".join([head, *map(str, self.states)])
+
 
 class Arms:
     """Several connected arms; made by `connect_all`.
@@ -240,6 +245,10 @@ class MotionOfArms:
             handle.add_done_callback(lambda _, arm=arm: self._ended.put(arm))  # type: ignore[misc]
         self._watcher = threading.Thread(target=self._watch, name="heptarm-together", daemon=True)
         self._watcher.start()
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<MotionOfArms {', '.join(map(repr, self.handles.values()))}, skew {self.skew * 1e3:.1f} ms>"
 
     @property
     def done(self) -> bool:

@@ -55,6 +55,12 @@ def degrees(values: npt.ArrayLike, digits: int = 2) -> str:
     return f"{in_degrees} deg ({' '.join(fixed(value, digits + 2) for value in given)} rad)"
 
 
+def listing(values: Iterable[float], unit: str = "") -> str:
+    """Numbers with their unit; one number if all are the same, "-" for NaN."""
+    texts = ["-" if math.isnan(value) else f"{float(value):g}" for value in values]
+    return f"{texts[0] if len(set(texts)) == 1 else ' '.join(texts)} {unit}".rstrip()
+
+
 def lines(title: str, rows: Mapping[str, str]) -> str:
     """A title and aligned rows below it; empty ones are left out."""
     shown = {name: text for name, text in rows.items() if text}

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.arrays import Array, Value, finite, finite_entries, frozen, instance, numbers, within
 from heptarm.values.motion.spline import JointSpline, spline_joints
+from heptarm.values.text import degrees, fixed, lines
 
 #: Marks a file as a trajectory, so that another .npz is not mistaken for one.
 FORMAT = "heptarm trajectory 1"
@@ -62,6 +63,17 @@ class Trajectory(Value):
     def __len__(self) -> int:
         """Number of points."""
         return len(self.times)
+
+    def __str__(self) -> str:
+        """A few lines: how long it is, where it begins and ends, how fast it is."""
+        rows = {
+            "robot": self.robot,
+            "duration": f"{self.duration:.2f} s, {len(self)} points",
+            "begin": degrees(self.q[0]),
+            "end": degrees(self.q[-1]),
+            "fastest": f"{' '.join(fixed(one, 1) for one in np.degrees(self.fastest))} deg/s",
+        }
+        return lines("Trajectory", rows)
 
     @property
     def duration(self) -> float:
