@@ -15,6 +15,7 @@ from heptarm.ros.interface.messages import class_of
 from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
+from heptarm.ros.trajectory.send_times import Sent
 
 
 class Commands:
@@ -58,10 +59,10 @@ class Commands:
         for service in self._services:
             self._node.destroy_service(service)
 
-    def _on_message(self, row: Topic) -> Callable[[Any], None]:
-        def callback(message: Any) -> None:
+    def _on_message(self, row: Topic) -> Callable[[Any, Any], None]:
+        def callback(message: Any, info: Any) -> None:
             try:
-                self._topics.handle(row, message)
+                self._topics.handle(row, message, _sent(info))
             except HeptarmError as error:
                 self._node.get_logger().warning(f"{row.name}: {error}", throttle_duration_sec=1.0)
 
@@ -72,3 +73,8 @@ class Commands:
             return self._requests.answer(row, request).fill(response)
 
         return callback
+
+
+def _sent(info: Any) -> Sent:
+    """What the middleware knows of the sending of a message: not all number them."""
+    return Sent(number=info.get("publication_sequence_number"), time=1e-9 * info["source_timestamp"])

@@ -29,7 +29,14 @@ from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityS
 from heptarm.arm.motion.preview import ProgramPreview
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
-from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
+from heptarm.arm.motion.servo import (
+    JointServo,
+    PoseServo,
+    ServoKeywords,
+    ServoRequest,
+    StreamTerms,
+    documented,
+)
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
@@ -701,57 +708,30 @@ class Arm:
         self._tooling.check_mode(request.mode)
         ends, parts = condition_message(self._until(request.until, breaks), self._connection.signals)
         self._tooling.check_until(parts)
-        message, boundary = replace(message, until=ends), self._foresight.boundary()
-        clear = None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of)
-        period, watchdog = request.period, request.watchdog_time
-        if kind == "joint":
-            return JointServo(
-                self._connection,
-                message,
-                period=period,
-                watchdog=watchdog,
-                boundary=boundary,
-                clear=clear,
-                until=parts,
-                breaks=breaks,
-            )
-        moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(
-                self._connection,
-                message,
-                period=period,
-                watchdog=watchdog,
-                moving=moving,
-                boundary=boundary,
-                clear=clear,
-                until=parts,
-                breaks=breaks,
-            )
-        speed, acceleration = request.joint_fractions(self._speed)
-        limits = JogLimits(speed, acceleration, request.silence, boundary, clear)
-        if kind == "velocity":
-            return VelocityServo(
-                self._connection,
-                message,
-                limits,
-                period=period,
-                watchdog=watchdog,
-                until=parts,
-                breaks=breaks,
-            )
-        along, change, turn, spin = request.line_limits()
-        return TwistServo(
-            self._connection,
-            message,
-            limits,
-            twist=TwistLimits(along, change, turn, spin),
-            moving=moving,
-            axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
-            period=period,
-            watchdog=watchdog,
+        terms = StreamTerms(
+            replace(message, until=ends),
+            period=request.period,
+            watchdog=request.watchdog_time,
+            boundary=self._foresight.boundary(),
+            clear=None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of),
             until=parts,
             breaks=breaks,
+        )
+        if kind == "joint":
+            return JointServo(self._connection, terms)
+        moving = self._tooling.on_flange(request.moving)
+        if kind in ("pose", "lin"):
+            return PoseServo(self._connection, terms, moving=moving)
+        limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
+        if kind == "velocity":
+            return VelocityServo(self._connection, terms, limits)
+        return TwistServo(
+            self._connection,
+            terms,
+            limits,
+            twist=TwistLimits(*request.line_limits()),
+            moving=moving,
+            axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 
     def fri(

@@ -5351,6 +5351,51 @@ class SegmentReached:
         self._check("")
 
 
+_StatesMissed_0 = Struct(">I")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatesMissed:
+    """States that were due and are not sent: the cabinet sampled late, or the client reads too slowly. They were due before the states that follow."""
+
+    TYPE: ClassVar[int] = 108
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    count: int
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_StatesMissed_0.pack(self.count))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[StatesMissed, int]:
+        v = codec.unpack(_StatesMissed_0, data, pos)
+        pos += _StatesMissed_0.size
+        count = v[0]
+        return cls(count=count), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> StatesMissed:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "StatesMissed")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _DialogClosed_0 = Struct(">Ii")
 
 
@@ -5525,7 +5570,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | DialogClosed | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | StatesMissed | DialogClosed | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5587,6 +5632,7 @@ MESSAGES: dict[int, type[Message]] = {
     103: Notice,
     104: ConditionFired,
     105: SegmentReached,
+    108: StatesMissed,
     107: DialogClosed,
     112: State,
 }

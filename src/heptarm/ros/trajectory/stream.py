@@ -13,6 +13,7 @@ from collections import deque
 import numpy as np
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
+from heptarm.ros.trajectory.send_times import SendTimes, Sent
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -55,7 +56,9 @@ class PointStream:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
-        self._points: deque[tuple[float, Array]] = deque()
+        self._points: deque[tuple[float, Array]] = deque()  # when they were sent, and where they are
+        self._arrivals: deque[float] = deque()
+        self._times = SendTimes()
 
     def add_point(
         self,
@@ -66,8 +69,9 @@ class PointStream:
         q: Array,
         dq: Array | None,
         acceleration: Array,
+        sent: Sent | None = None,
     ) -> JointTrajectory:
-        """Continue through a point that the arm is to reach a period after its arrival.
+        """Continue through a point that the arm is to reach a period after it was sent.
 
         The arm needs longer than a period to join the stream smoothly. So the trajectory leads to where the stream will
         be then, by its velocity: the arm follows without lag as long as that does not change.
@@ -80,6 +84,7 @@ class PointStream:
             q: its positions, shape (7,) [rad].
             dq: its velocities, shape (7,) [rad/s]; None: estimate them from the stream.
             acceleration: largest one to reach the stream and to settle, shape (7,) [rad/s²].
+            sent: what its message says of its sending; None: points count from their arrival.
 
         Returns:
             From `here` to the stream, then back to rest at the point.
@@ -88,18 +93,23 @@ class PointStream:
             GoalRefused: the point is too far away.
         """
         _check_distance(here, q)
-        if self._points and now - self._points[-1][0] > _PAUSE:
+        if self._arrivals and now - self._arrivals[-1] > _PAUSE:
             self._points.clear()
-        self._points.append((now, q))
-        while now - self._points[0][0] > _HISTORY:
-            self._points.popleft()
-        gaps = np.diff([time for time, _ in self._points])
-        gap = min(float(gaps.max(initial=period)), _LONGEST_GAP)
+            self._arrivals.clear()
+            self._times.restart()
+        self._arrivals.append(now)
+        time = self._times.add(now, period, sent)
+        if self._points and time <= self._points[-1][0]:
+            self._points.clear()  # its times begin again
+        self._points.append((time, q))
+        while now - self._arrivals[0] > _HISTORY:
+            self._arrivals.popleft()
+        gap = min(float(np.diff(self._arrivals).max(initial=period)), _LONGEST_GAP)
         place, speed = self._fit(period, max(_WINDOW, 2.0 * gap))
         speed = speed if dq is None else dq
         horizon = max(2.0 * period, _LEAST_HORIZON, _MARGIN * gap)
         while True:
-            aim, velocity = self._ahead(q, place, speed, begin - now + horizon - period)
+            aim, velocity = self._ahead(q, place, speed, begin - time + horizon - period)
             excess = (_acceleration(here, aim, velocity, horizon) > acceleration).any()
             if not excess or horizon > _LONGEST_HORIZON:
                 break
@@ -176,6 +186,8 @@ class PointStream:
     def _fit(self, period: float, window: float) -> tuple[Array, Array]:
         """Present position [rad] and velocity [rad/s] of the stream, shape (7,): a straight line through its points."""
         end, last = self._points[-1]
+        while end - self._points[0][0] > max(window, _LONGEST_GAP):
+            self._points.popleft()
         recent = [one for one in self._points if end - one[0] <= window]
         times = np.array([time for time, _ in recent]) - end
         if times[0] > -period / 2.0:
