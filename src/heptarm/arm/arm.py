@@ -38,6 +38,7 @@ from heptarm.arm.motion.servo import (
     documented,
 )
 from heptarm.arm.translate.conditions import condition_message
+from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
 from heptarm.skills import collision_guard as guarding
@@ -99,6 +100,7 @@ class Arm:
         self._speed = 1.0
         self._mode: Mode | None = None
         self._breaks: tuple[BreakRule, ...] = ()
+        self._name = ""
 
     # ------------------------------------------------------------------------------- connection
 
@@ -191,7 +193,21 @@ class Arm:
         """Short form."""
         link = self._connection
         state = "closed" if link.closed.is_set() else "connected" if link.is_connected else "lost"
-        return f"<Arm {link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
+        name = f"{self._name}: " if self._name else ""
+        return f"<Arm {name}{link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
+
+    @property
+    def name(self) -> str:
+        """Its name in `connect_all`, or that of its saved target, with which errors of several arms begin; "": none.
+
+        Raises:
+            ShapeError: not a text (when it is set).
+        """
+        return self._name
+
+    @name.setter
+    def name(self, value: str) -> None:
+        self._name = printable(instance(value, str, "name"))
 
     @property
     def connection(self) -> Connection:
