@@ -106,4 +106,5 @@ def test_signals_that_cannot_be_its_own_are_refused_before_anything_is_switched(
         ha.TwoSignalGripper(arm, **{**WIRED, **wrong})
     assert caught.value.hint and caught.value.parameter in wrong
     assert dict(arm.io.values_now) == before
+    assert repr(arm.io).startswith("<Io MediaFlange.InputX3Pin3, ")
     assert repr(ha.TwoSignalGripper(arm, **WIRED)).startswith("<TwoSignalGripper MediaFlange.OutputX3Pin1, ")

@@ -14,6 +14,7 @@ from heptarm.skills.insertion import Insertion
 from heptarm.skills.replay import Replay
 from heptarm.values.condition.contact import Contact
 from heptarm.values.io import SignalValues
+from heptarm.values.robot import ROBOTS
 from heptarm.values.state import (
     Cartesian,
     Control,
@@ -131,11 +132,12 @@ RESULT = ha.Result(ha.Cause.FINISHED, duration=1.25)
         (KnownTool("saw", 1.5, (("tip", ha.Pose.at(z=0.2)),)), ["KnownTool saw\n", "1.5 kg", "z 200.0 mm"]),
         (
             ha.MotionEvent(
-                "trigger", 1, trigger=ha.Trigger(path.distance_m(0.1), do.notify("half way")), time=0.5
+                "trigger", 1, trigger=ha.Trigger(path.after(0.1), do.notify("half way")), time=0.5
             ),
             ["trigger, motion 1: notify 'half way' when 0.1 m after the start after 0.500 s"],
         ),
         (ha.MotionEvent("segment", 0, segment=3), ["segment, motion 0, segment 3"]),
+        (ROBOTS["iiwa7"], ["LBR iiwa 7 R800 (iiwa7)\n", "340, 400, 400, 126 mm", "torque [Nm]"]),
     ],
 )
 def test_what_a_lab_prints_has_words_and_units(value: object, words: list[str]) -> None:

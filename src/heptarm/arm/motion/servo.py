@@ -521,6 +521,11 @@ class Servo(Block):
         self._connection.leave_block(handle)
         self._result = handle.wait(timeout=_PATIENCE)
 
+    def __repr__(self) -> str:
+        """Short form."""
+        state = "not begun" if self._handle is None else "active" if self._active else "ended"
+        return f"<{type(self).__name__}, {state}, {self._sent} targets sent>"
+
     def _on_end(self, _: MotionHandle) -> None:
         self._active = False
 
