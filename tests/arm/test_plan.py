@@ -160,7 +160,7 @@ def test_it_takes_what_move_takes_and_refuses_it_alike(
     for verb in (arm.plan, arm.move):
         with pytest.raises(ha.CommandRejected, match=text):
             verb(down, **keywords)
-    bad = down.trigger(path.distance_m(0.01), do.set_output("DO9", True))
+    bad = down.trigger(path.after(0.01), do.set_output("DO9", True))
     for verb in (arm.plan, arm.move):
         with pytest.raises(ha.CommandRejected, match="no signal 'DO9'"):
             verb(bad)
