@@ -124,6 +124,8 @@ class Trajectory(Value):
                 hint="teach again, or give a smaller value of still",
             )
         begin, end = max(int(away[0]) - 1, 0), min(int(before[-1]) + 1, len(self) - 1)
+        if begin >= end:  # it creeps, so that the rest at its beginning ends behind that at its end
+            return self
         return Trajectory.of(self.times[begin : end + 1], self.q[begin : end + 1], robot=self.robot)
 
     def thinned(self, *, tolerance: float = 2e-3) -> Trajectory:
