@@ -130,10 +130,10 @@ def test_a_twist_moves_the_tool_along_the_axes_of_its_frame(
             until=lambda state: (state.pose.xyz - start.xyz) @ away > 0.04,
         )
         rest(arm, sv)
-    # to a target that comes late each axis goes on its own: at most a tenth of a second of the way beside it
-    ways = [(ha.Pose.from_matrix(forward(arm.robot, one.q)), 0.5e-3, 2e-3) for one in sent]
-    ways += [(state.pose, 6e-3, 0.03) for state in seen]
-    for pose, distance, angle in ways:
+    # to a target that comes late each axis goes on its own: at most a tenth of a second of the path beside it
+    poses = [(ha.Pose.from_matrix(forward(arm.robot, one.q)), 0.5e-3, 2e-3) for one in sent]
+    poses += [(state.pose, 6e-3, 0.03) for state in seen]
+    for pose, distance, angle in poses:
         moved = pose.xyz - start.xyz
         assert np.linalg.norm(moved - (moved @ away) * away) < distance
         assert pose.angle_to(start) < angle

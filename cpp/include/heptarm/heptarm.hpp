@@ -1802,6 +1802,7 @@ struct ModeState {
     std::string tool;  ///< attached tool; empty: none
     std::string workpiece;  ///< attached workpiece; empty: none
     std::string frame;  ///< default motion frame: a frame of the tool, or flange
+    std::string safety_workpiece;  ///< workpiece whose load the safety functions of the cabinet count; empty: none
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1810,6 +1811,7 @@ struct ModeState {
         visit(self.tool, "tool");
         visit(self.workpiece, "workpiece");
         visit(self.frame, "frame");
+        visit(self.safety_workpiece, "safety_workpiece");
     }
 };
 
@@ -2177,11 +2179,15 @@ struct AttachLoad {
     static constexpr const char* NAME = "AttachLoad";
     ToolInfo load;
     bool attached = false;  ///< false: detach the workpiece of that name
+    bool template_ = false;  ///< true: the workpiece of the project's template of that name; the rest of load does not matter
+    bool safety = false;  ///< true: as the safety workpiece: the safety functions of the cabinet count its load, too, until it is detached
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
         visit(self.load, "load");
         visit(self.attached, "attached");
+        visit(self.template_, "template");
+        visit(self.safety, "safety");
     }
 };
 

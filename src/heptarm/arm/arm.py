@@ -902,16 +902,27 @@ class Arm:
         """
         self._tooling.detach()
 
-    def attach_workpiece(self, workpiece: Workpiece) -> None:
+    def attach_workpiece(self, workpiece: Workpiece | str, *, safety: bool = False) -> None:
         """Tell the cabinet what the tool holds, at the motion frame; the arm has to be at rest.
 
+        Args:
+            workpiece: the workpiece, or the name of a workpiece template of the project.
+            safety: make it the safety workpiece: the safety functions of the cabinet, which monitor external forces
+                by themselves, count its load until it is detached. Otherwise they count none, and may take the weight
+                of a heavy workpiece for a collision. See `State.safety_workpiece`.
+
         Raises:
+            CommandRejected: the project has no template of that name, or the cabinet does not take it as the safety
+                workpiece; then nothing is attached.
             ModeConflict: a motion runs, or a workpiece is attached already.
         """
-        self._tooling.attach_workpiece(workpiece)
+        self._tooling.attach_workpiece(workpiece, safety=safety)
 
-    def detach_workpiece(self, workpiece: Workpiece) -> None:
-        """Tell the cabinet that the tool does not hold the workpiece any more.
+    def detach_workpiece(self, workpiece: Workpiece | str) -> None:
+        """Tell the cabinet that the tool does not hold the workpiece any more; then there is no safety workpiece.
+
+        Args:
+            workpiece: the workpiece, or its name.
 
         Raises:
             CommandRejected: the tool does not hold it.
@@ -928,9 +939,9 @@ class Arm:
             yield
 
     @contextlib.contextmanager
-    def attached(self, workpiece: Workpiece) -> Iterator[None]:
+    def attached(self, workpiece: Workpiece | str, *, safety: bool = False) -> Iterator[None]:
         """A block in which the tool holds a workpiece. See `attach_workpiece`."""
-        self.attach_workpiece(workpiece)
+        self.attach_workpiece(workpiece, safety=safety)
         with self._undoing(lambda: self.detach_workpiece(workpiece)):
             yield
 

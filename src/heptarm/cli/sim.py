@@ -92,6 +92,14 @@ def sim(
             "Default: the controller's load data."
         ),
     ] = "",
+    safety: Annotated[
+        str,
+        Parameter(
+            help="TORQUE or TORQUE,MASS: limits of safety functions, which count the load of tool and safety "
+            "workpiece: external torque of an axis while the arm moves [Nm], mass of a safety workpiece [kg]. "
+            "Default: none."
+        ),
+    ] = "",
     sensors: Annotated[
         str,
         Parameter(
@@ -280,6 +288,7 @@ def sim(
             real_time=real_time,
             faults=fault,
             payload=payload,
+            safety=safety,
             sensors=sensors,
             scene=scene,
             project=project,
@@ -305,6 +314,7 @@ def sim(
             "--meshes": bool(meshes),
             "--key-file": key_file is not None,
             "--project": project is not None,
+            "--safety": bool(safety),
             "--scene": bool(scene),
             "--count": count != 1,
             "--real-time": real_time != "fri",
@@ -354,6 +364,7 @@ def sim(
         real_time=real_time,
         fault=fault,
         payload=payload,
+        safety=safety,
         sensors=sensors,
         scene=scene,
         project=project,
@@ -629,6 +640,7 @@ def _application(
     real_time: RealTime,
     faults: tuple[str, ...],
     payload: str,
+    safety: str,
     sensors: str,
     scene: str,
     project: Path | None,
@@ -678,6 +690,7 @@ def _application(
             answer=answers,
             fault=faults,
             payload=payload,
+            safety=safety,
             sensors=sensors,
             scene=scene,
             parent_pipe=True,

@@ -2350,6 +2350,7 @@ class ModeState:
     tool: str = ""
     workpiece: str = ""
     frame: str = ""
+    safety_workpiece: str = ""
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ModeState_0.pack(self.stamp))
@@ -2357,6 +2358,7 @@ class ModeState:
         out.append(codec.put_str(self.tool))
         out.append(codec.put_str(self.workpiece))
         out.append(codec.put_str(self.frame))
+        out.append(codec.put_str(self.safety_workpiece))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ModeState, int]:
@@ -2367,7 +2369,8 @@ class ModeState:
         tool, pos = codec.read_str(data, pos)
         workpiece, pos = codec.read_str(data, pos)
         frame, pos = codec.read_str(data, pos)
-        return cls(stamp=stamp, mode=mode, tool=tool, workpiece=workpiece, frame=frame), pos
+        safety_workpiece, pos = codec.read_str(data, pos)
+        return cls(stamp=stamp, mode=mode, tool=tool, workpiece=workpiece, frame=frame, safety_workpiece=safety_workpiece), pos
 
     def _check(self, path: str) -> None:
         self.mode._check(path + "mode.")
@@ -3646,7 +3649,7 @@ class AttachTool:
         self._check("")
 
 
-_AttachLoad_0 = Struct(">B")
+_AttachLoad_0 = Struct(">BBB")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3660,10 +3663,12 @@ class AttachLoad:
 
     load: ToolInfo
     attached: bool
+    template: bool = False
+    safety: bool = False
 
     def _write(self, out: list[bytes]) -> None:
         self.load._write(out)
-        out.append(_AttachLoad_0.pack(self.attached))
+        out.append(_AttachLoad_0.pack(self.attached, self.template, self.safety))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[AttachLoad, int]:
@@ -3671,7 +3676,9 @@ class AttachLoad:
         v = codec.unpack(_AttachLoad_0, data, pos)
         pos += _AttachLoad_0.size
         attached = codec.read_bool(v[0])
-        return cls(load=load, attached=attached), pos
+        template = codec.read_bool(v[1])
+        safety = codec.read_bool(v[2])
+        return cls(load=load, attached=attached, template=template, safety=safety), pos
 
     def _check(self, path: str) -> None:
         self.load._check(path + "load.")

@@ -12,7 +12,7 @@ from heptarm.ros.interface.messages import class_of
 from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
-from heptarm.ros.trajectory.send_times import Sent
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm_ros1 import convert
 
 
@@ -47,10 +47,10 @@ def _subscriber(topics: TopicDispatcher, row: Topic) -> rospy.Subscriber:
     return rospy.Subscriber(name, class_of(row.type, "msg"), callback, queue_size=1, tcp_nodelay=True)
 
 
-def _sent(message: Any) -> Sent:
-    """What a message says of its sending: ROS 1 numbers those with a header."""
+def _sent(message: Any) -> PublishInfo:
+    """As which message of its publisher it was published: ROS 1 numbers those with a header."""
     header = getattr(message, "header", None)
-    return Sent() if header is None else Sent(number=header.seq)
+    return PublishInfo() if header is None else PublishInfo(number=header.seq)
 
 
 def _service(requests: ServiceDispatcher, row: Service) -> rospy.Service:

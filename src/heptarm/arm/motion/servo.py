@@ -416,7 +416,7 @@ class StreamTerms:
         boundary: of the workspace; None: there is none.
         clear: model of bodies to keep clear of; None: none.
         until: conditions that end the motion, in the order of the message.
-        breaks: what becomes of the program when one of the arm's own conditions ends it.
+        breaks: conditions of the arm itself, and what follows when one of them ends the motion.
     """
 
     message: wire.ServoOpen

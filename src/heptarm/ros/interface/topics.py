@@ -24,14 +24,14 @@ from heptarm.ros.interface.motions import (
     velocities,
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
-from heptarm.ros.trajectory.send_times import Sent
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.values.arrays import Array, array
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
 
 #: Frames of a twist.
 _FRAMES: tuple[Literal["base", "flange", "tool"], ...] = ("base", "flange", "tool")
-#: Handles a message of a topic; that of one that is `counted` takes what the message says of its sending as well.
+#: Handles a message of a topic; that of one that is `counted` takes when or as which the message was published as well.
 Handler = Callable[..., None]
 
 
@@ -44,7 +44,7 @@ class Topic:
         type: "package/Type".
         handler: handles a message; raises HeptarmError to refuse it.
         at_once: never waits for another topic.
-        counted: its handler takes a `Sent` after the message.
+        counted: its handler takes a `PublishInfo` after the message.
     """
 
     name: str
@@ -65,13 +65,13 @@ class TopicDispatcher:
         self._context = context
         self._lock = threading.Lock()
 
-    def handle(self, topic: Topic, message: Any, sent: Sent) -> None:
+    def handle(self, topic: Topic, message: Any, sent: PublishInfo) -> None:
         """Handle a message.
 
         Args:
             topic: its row.
             message: of its type.
-            sent: what it says of its sending.
+            sent: when or as which it was published.
 
         Raises:
             HeptarmError: refused; the text gives the reason.
@@ -106,7 +106,7 @@ def command_lin(context: NodeContext, message: Any) -> None:
     context.driver.start(lin(stamped_pose(message, context.driver)))
 
 
-def joint_trajectory(context: NodeContext, message: Any, sent: Sent) -> None:
+def joint_trajectory(context: NodeContext, message: Any, sent: PublishInfo) -> None:
     """Execute a trajectory_msgs/JointTrajectory, or follow a stream; in ROS 1 one without points stops the arm."""
     if not message.points and context.ros.empty_stops:
         context.driver.end_trajectory()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from heptarm.errors import CommandRejected
-from heptarm.ros.trajectory.send_times import Sent
+from heptarm.ros.trajectory.send_times import PublishInfo
 
 
 class ErrorCode(IntEnum):
@@ -92,7 +92,7 @@ class TrajectoryGoal:
         goal_time: how long after its end the arm may take to reach the goal [s]; 0: the default; -1: no limit.
         extras: names of filled fields that this server does not support.
         from_topic: received by topic, so it may be a point of a stream; see `stream`.
-        sent: what its message says of its sending; None: unknown.
+        sent: when or as which its message was published; None: unknown.
     """
 
     joints: tuple[str, ...]
@@ -103,7 +103,7 @@ class TrajectoryGoal:
     goal_time: float = 0.0
     extras: tuple[str, ...] = ()
     from_topic: bool = False
-    sent: Sent | None = None
+    sent: PublishInfo | None = None
 
 
 @dataclass(frozen=True, slots=True)

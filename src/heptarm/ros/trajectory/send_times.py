@@ -25,8 +25,8 @@ _LOST = 0.06
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
-    """What a message says of its sending.
+class PublishInfo:
+    """When, or as which message of its publisher, a message was published.
 
     Attributes:
         number: of the message, as its publisher counts; None: unknown.
@@ -41,7 +41,7 @@ class SendTimes:
     """Estimates when the points of one stream were sent."""
 
     def __init__(self) -> None:
-        self._last: Sent | None = None
+        self._last: PublishInfo | None = None
         self._count = 0
         self._newest = 0.0  # when the newest point was sent [s]
         self._arrivals: deque[tuple[int, float]] = deque()
@@ -51,21 +51,22 @@ class SendTimes:
         self._last = None
         self._arrivals.clear()
 
-    def add(self, now: float, period: float, sent: Sent | None) -> float:
+    def add(self, now: float, period: float, sent: PublishInfo | None) -> tuple[float, float]:
         """Estimate when a point was sent.
 
         Args:
             now: time of its arrival [s].
             period: of the stream, as the point declares it [s].
-            sent: what its message says; None: nothing.
+            sent: when or as which its message was published; None: unknown.
 
         Returns:
-            The time [s]; that of the arrival if the sender does not count.
+            The time [s], that of the arrival if the sender does not count; and how much later that is than by the count
+            [s], after a pause in which nothing was counted: 0 without one.
         """
         step = None if sent is None else self._step(sent, period)
         self._last = sent
         if step is None:
-            return self._begin(now)
+            return self._begin(now), 0.0
         self._count += step
         self._arrivals.append((self._count, now))
         while now - self._arrivals[0][1] > _HISTORY:
@@ -74,12 +75,12 @@ class SendTimes:
         period = _measured(counts, times, period)
         expected = self._newest + step * period
         if abs(now - expected) > _LOST:
-            return self._begin(now)
+            return self._begin(now), now - expected
         # when the newest point would have arrived had it been delayed as little as another one
         arrivals = (times + (self._count - counts) * period)[times > now - _MEMORY]
-        share = max(step * period / _LOCK, 1.0 / len(times))
-        self._newest = expected + min(1.0, share) * (float(arrivals.min()) - expected)
-        return self._newest
+        fraction = max(step * period / _LOCK, 1.0 / len(times))
+        self._newest = expected + min(1.0, fraction) * (float(arrivals.min()) - expected)
+        return self._newest, 0.0
 
     def _begin(self, now: float) -> float:
         self._arrivals.clear()
@@ -87,7 +88,7 @@ class SendTimes:
         self._newest = now
         return now
 
-    def _step(self, sent: Sent, period: float) -> int | None:
+    def _step(self, sent: PublishInfo, period: float) -> int | None:
         """Periods from the last point to this one; None: it is the first of a stream."""
         last = self._last
         if last is None:

@@ -9,11 +9,12 @@ points with the velocity of the stream, and settles at the last one when the str
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 
 import numpy as np
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
-from heptarm.ros.trajectory.send_times import SendTimes, Sent
+from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -69,7 +70,7 @@ class PointStream:
         q: Array,
         dq: Array | None,
         acceleration: Array,
-        sent: Sent | None = None,
+        sent: PublishInfo | None = None,
     ) -> JointTrajectory:
         """Continue through a point that the arm is to reach a period after it was sent.
 
@@ -84,7 +85,7 @@ class PointStream:
             q: its positions, shape (7,) [rad].
             dq: its velocities, shape (7,) [rad/s]; None: estimate them from the stream.
             acceleration: largest one to reach the stream and to settle, shape (7,) [rad/s²].
-            sent: what its message says of its sending; None: points count from their arrival.
+            sent: when or as which its message was published; None: points count from their arrival.
 
         Returns:
             From `here` to the stream, then back to rest at the point.
@@ -97,15 +98,20 @@ class PointStream:
             self._points.clear()
             self._arrivals.clear()
             self._times.restart()
+        time, pause = self._times.add(now, period, sent)
+        if pause > _LONGEST_GAP or (pause > 0.0 and np.abs(here.dq).max() < _REST):
+            self._arrivals.clear()  # nothing was sent: that was no jitter
         self._arrivals.append(now)
-        time = self._times.add(now, period, sent)
-        if self._points and time <= self._points[-1][0]:
-            self._points.clear()  # its times begin again
+        self._points = deque((then + pause, place) for then, place in self._points if then + pause < time)
         self._points.append((time, q))
         while now - self._arrivals[0] > _HISTORY:
             self._arrivals.popleft()
-        gap = min(float(np.diff(self._arrivals).max(initial=period)), _LONGEST_GAP)
-        place, speed = self._fit(period, max(_WINDOW, 2.0 * gap))
+        while time - self._points[0][0] > _HISTORY:
+            self._points.popleft()
+        gap = _longest_gap(self._arrivals, period)
+        place, speed = self._fit(
+            period, max(_WINDOW, 2.0 * _longest_gap([then for then, _ in self._points], period))
+        )
         speed = speed if dq is None else dq
         horizon = max(2.0 * period, _LEAST_HORIZON, _MARGIN * gap)
         while True:
@@ -186,8 +192,6 @@ class PointStream:
     def _fit(self, period: float, window: float) -> tuple[Array, Array]:
         """Present position [rad] and velocity [rad/s] of the stream, shape (7,): a straight line through its points."""
         end, last = self._points[-1]
-        while end - self._points[0][0] > max(window, _LONGEST_GAP):
-            self._points.popleft()
         recent = [one for one in self._points if end - one[0] <= window]
         times = np.array([time for time, _ in recent]) - end
         if times[0] > -period / 2.0:
@@ -196,6 +200,11 @@ class PointStream:
         centred = times - times.mean()
         slope = centred @ places / (centred @ centred)
         return places.mean(axis=0) - slope * times.mean(), slope
+
+
+def _longest_gap(times: Collection[float], period: float) -> float:
+    """Longest time between two of several, which increase [s]."""
+    return min(float(np.diff(np.fromiter(times, float)).max(initial=period)), _LONGEST_GAP)
 
 
 def _check_distance(here: KinematicState, q: Array) -> None:

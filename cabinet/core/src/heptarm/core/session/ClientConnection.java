@@ -62,9 +62,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private long unhurried = Long.MIN_VALUE;
     private volatile boolean open;
     private volatile boolean ending;
-    /** States that were due and were not sent, and those of them that the client has been told of. */
+    /** States that were due and were not sent, and those of them that the client has received a report of. */
     private long missed;
-    private long told;
+    private long reported;
 
     private int seq;
     private int expected;
@@ -398,7 +398,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         } finally {
             synchronized (outbox) {
                 writing = false;
-                if (ending || !events.isEmpty() || !states.isEmpty() || missed > told) {
+                if (ending || !events.isEmpty() || !states.isEmpty() || missed > reported) {
                     outbox.notify(); // only then: waking the writer for nothing costs as much as the whole answer
                 }
             }
@@ -438,7 +438,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         byte[] frame = frames.frame(state, 0);
         long began = System.nanoTime();
         synchronized (outbox) {
-            if (writing || ending || gone || began < unhurried || !events.isEmpty() || !states.isEmpty() || missed > told) {
+            if (writing || ending || gone || began < unhurried || !events.isEmpty() || !states.isEmpty() || missed > reported) {
                 queue(frame);
                 return;
             }
@@ -450,7 +450,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         } finally {
             synchronized (outbox) {
                 writing = false;
-                if (ending || !events.isEmpty() || missed > told) {
+                if (ending || !events.isEmpty() || missed > reported) {
                     outbox.notify();
                 }
             }
@@ -503,16 +503,16 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             while (!gone) {
                 byte[] frame;
                 synchronized (outbox) {
-                    while (!gone && (writing || events.isEmpty() && states.isEmpty() && missed == told && !ending)) {
+                    while (!gone && (writing || events.isEmpty() && states.isEmpty() && missed == reported && !ending)) {
                         outbox.wait();
                     }
                     frame = events.poll();
                     if (frame == null && ending) {
                         break;
                     }
-                    if (frame == null && missed > told) { // one report for all, however many the client has missed
-                        frame = frames.frame(new StatesMissed(missed - told), 0);
-                        told = missed;
+                    if (frame == null && missed > reported) { // one report for all, however many the client has missed
+                        frame = frames.frame(new StatesMissed(missed - reported), 0);
+                        reported = missed;
                     } else if (frame == null) {
                         frame = states.poll();
                     }

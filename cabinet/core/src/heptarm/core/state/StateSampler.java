@@ -270,7 +270,7 @@ public final class StateSampler {
         }
         if ((groups & Groups.MODE) != 0) { // needs no reading of the robot
             String[] attached = tools.attached();
-            mode = new ModeState(now, motions.status().mode, attached[0], attached[1], attached[2]);
+            mode = new ModeState(now, motions.status().mode, attached[0], attached[1], attached[2], attached[3]);
         }
         return choose(new State(joints, torques, pose, wrench, motion, safety, io, mode), groups);
     }
