@@ -138,7 +138,7 @@ def test_it_is_refused_for_the_reasons_of_the_cabinet(arm: ha.Arm, motion: Motio
         arm.move(motion)
 
 
-SOFT = modes.CartesianImpedance(stiffness=(2000, 2000, 2000, 200, 200, 200))
+COMPLIANT = modes.CartesianImpedance(stiffness=(2000, 2000, 2000, 200, 200, 200))
 ELSEWHERE = modes.CartesianImpedance(stiffness=(500,) * 3 + (50,) * 3, frame="nowhere")
 
 
@@ -169,7 +169,7 @@ def test_it_takes_what_move_takes_and_refuses_it_alike(
 def test_modes_and_conditions_leave_the_planned_path(arm: ha.Arm) -> None:
     down = ha.lin_rel(z=-0.05, frame="base", speed_mps=0.1)
     stiff = arm.plan(down)
-    touched = arm.plan(down, mode=SOFT, until=force > 10, then="relax")
+    touched = arm.plan(down, mode=COMPLIANT, until=force > 10, then="relax")
     assert touched.duration == stiff.duration and (touched.q == stiff.q).all()
     assert stiff.until is None and touched.until == (force > 10)
     assert "force > 10" in str(touched) and "end earlier" in str(touched) and "until" not in str(stiff)
