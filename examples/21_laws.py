@@ -54,11 +54,11 @@ with (
             )
         arm.move(ha.ptp(home), speed=0.6)
     law = laws.cartesian_impedance(stiffness=(800, 800, 800, 50, 50, 50), speed=0.1)
-    with arm.fri("torque", period_ms=5, mode=COMPLIANT, law=law) as rt:
+    flange = arm.pose("flange")
+    with arm.fri("torque", period_ms=5, law=law) as rt:
         start = rt.state.q.copy()
         rt.wait(0.3)
-        goal = rt.memory.goal
-        rt.params.goal = goal + [0, 0.05, 0, 0, 0, 0, 0]
+        rt.params.goal = flange.shifted(y=0.05)
         rt.wait(1.5)
         left = 1e3 * np.linalg.norm(rt.memory.error[:3])
         print(f"{left:.1f} mm to the goal; limited in {rt.memory.saturated:.0f} cycles")

@@ -59,6 +59,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "io": ("~/signals", "~/set_signals", "see below"),
         "is_virtual": ("~/info",),
         "move": MOTIONS,
+        "name": (WORDS + "nodes of several arms have namespaces",),
         "on_taps": ("~/wait_for_taps",),
         "open": (LIFE,),
         "operator": ("~/operate", "see below"),

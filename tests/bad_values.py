@@ -243,7 +243,9 @@ def bad_values(annotation: str, parameter: str) -> Iterator[tuple[str, object]]:
     yield "matrix", np.full((2, 3), 0.1)
     yield "masked array", np.ma.masked_array(np.full(size, 0.1), mask=[True] + [False] * (size - 1))
     if any(
-        "ArrayLike" in part or part in ("Array", "Floats", "Directional") or part.startswith("tuple[float")
+        "ArrayLike" in part
+        or part in ("Array", "Floats", "Directional", "Given")
+        or part.startswith("tuple[float")
         for part in parts
     ):
         yield "nan array", [math.nan] + [0.1] * (size - 1)
@@ -262,7 +264,7 @@ def bad_values(annotation: str, parameter: str) -> Iterator[tuple[str, object]]:
 
 def is_array(part: str) -> bool:
     """Whether an annotation is that of an array of numbers."""
-    return part in ("npt.ArrayLike", "Array", "Floats", "Directional") or part.startswith(
+    return part in ("npt.ArrayLike", "Array", "Floats", "Directional", "Given") or part.startswith(
         ("tuple[float", "Sequence[float")
     )
 
@@ -296,7 +298,7 @@ def has_meaning(annotation: str, bad: str) -> bool:
             or (part == "int" and bad == "negative")
             or (head in ("Sequence", "Mapping", "Iterable", "tuple") and bad == "empty list")
             or (head == "Iterable" and bad == "generator")
-            or (head in ("npt.ArrayLike", "Directional") and bad in _REAL)
+            or (head in ("npt.ArrayLike", "Directional", "Given") and bad in _REAL)
         ):
             return True
     return False

@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm import laws
+from heptarm.arm.fri.settings import request as request_of
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
@@ -217,6 +219,21 @@ def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings:
 
 
 @patient
+def test_a_ready_law_of_torques_has_its_mode_and_needs_a_session_that_commands_them(arm: ha.Arm) -> None:
+    law = laws.cartesian_impedance()
+    alone = request_of(arm.connection, "torque", law=law).message.mode
+    assert alone == request_of(arm.connection, "torque", mode=JointImpedance(0.0), law=law).message.mode
+    stiffer = request_of(arm.connection, "torque", mode=JointImpedance(50.0), law=law).message.mode
+    assert stiffer != alone
+    for kind in ("position", "wrench"):
+        with pytest.raises(ha.ModeConflict, match="commands tau, which is not commanded") as caught:
+            arm.fri(kind, mode=COMPLIANT, law=law)
+        assert 'arm.fri("torque"' in caught.value.hint
+    arm.fri("wrench", mode=COMPLIANT, law=laws.minimum_jerk())  # moves the positions below the wrench
+    with pytest.raises(ha.ModeConflict, match="Cartesian impedance"):
+        arm.fri("wrench", law=laws.search())  # how compliant, only the program knows
+
+
 def test_only_one_thing_moves_the_arm_and_only_its_controller(arm: ha.Arm) -> None:
     handle = arm.start(ha.hold(30.0))
     with pytest.raises(ha.ModeConflict), arm.fri("position"):

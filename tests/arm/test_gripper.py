@@ -85,3 +85,26 @@ def test_refusals(arm: ha.Arm) -> None:
         ha.TwoSignalGripper(arm, **WIRED, timeout=0.0)
     with pytest.raises(ha.LimitError, match="settle"):
         ha.TwoSignalGripper(arm, **WIRED, timeout=1.0, settle=1.5)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"open": IS_OPEN}, "open must be a boolean output, got MediaFlange.InputX3Pin3"),
+        ({"is_closed": "OutputX3Pin1"}, "is_closed must be a boolean input, got MediaFlange.OutputX3Pin1"),
+        ({"close": "OutputX3Pin1"}, "close must be another signal than open, got MediaFlange.OutputX3Pin1"),
+        ({"is_closed": IS_OPEN}, "is_closed must be another signal than is_open"),
+        ({"holds": IS_CLOSED}, "holds must be another signal than is_closed"),
+        ({"holds": "LEDRed"}, "holds must be a boolean input"),
+    ],
+)
+def test_signals_that_cannot_be_its_own_are_refused_before_anything_is_switched(
+    arm: ha.Arm, wrong: dict[str, str], text: str
+) -> None:
+    before = dict(arm.io.values_now)
+    with pytest.raises(ha.CommandRejected, match=text) as caught:
+        ha.TwoSignalGripper(arm, **{**WIRED, **wrong})
+    assert caught.value.hint and caught.value.parameter in wrong
+    assert dict(arm.io.values_now) == before
+    assert repr(arm.io).startswith("<Io MediaFlange.InputX3Pin3, ")
+    assert repr(ha.TwoSignalGripper(arm, **WIRED)).startswith("<TwoSignalGripper MediaFlange.OutputX3Pin1, ")

@@ -349,12 +349,19 @@ def test_targets_of_servo_motions_are_clamped(arm: ha.Arm) -> None:
         y = forward(arm.robot, sent)[1, 3]
         assert 0.09 < y <= 0.1 + 1.5e-3 and sent[0] < HOME[0] + 0.4
         np.testing.assert_array_equal(sv.set(HOME), HOME)
+        assert sv.stats.clamped == 1 and "1 targets, to the limits of the joints or the workspace" in str(
+            sv.stats
+        )
+        sv.set(np.full(7, 3.0))  # beyond the limits of the joints as well: one target
+        assert sv.stats.clamped == 2
+        sv.set(HOME)
     for kind in ("pose", "lin"):
         with arm.servo(kind, watchdog=2.0) as poses:  # type: ignore[call-overload]
             start = poses.start.pose
             went = poses.set(start.shifted(x=0.5, y=0.02))
             np.testing.assert_allclose(went.xyz, [0.62, start.y + 0.02, start.z], atol=1e-9)
             poses.set(start)
+            assert poses.stats.clamped == 1
     arm.workspace = ha.Workspace(joints=(HOME - 0.2, HOME + 0.2))
     with arm.servo("joint", watchdog=2.0) as sv:
         np.testing.assert_allclose(sv.set(HOME + 0.5 * A7), HOME + 0.2 * A7)
@@ -363,6 +370,7 @@ def test_targets_of_servo_motions_are_clamped(arm: ha.Arm) -> None:
         near = start.shifted(y=0.02)
         assert poses.set(near).distance_to(near) < 1e-9
         assert poses.set(start.shifted(y=0.4)) == poses.set(near), "the last pose inside stays the target"
+        assert poses.stats.clamped == 1
 
 
 def test_targets_are_refused_if_the_workspace_refuses(arm: ha.Arm) -> None:

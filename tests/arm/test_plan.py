@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import model
+from heptarm import do, model, modes
 from heptarm.io.plan_box import PlanBox
 from heptarm.values.arrays import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
+from heptarm.when import force, io, path
 from tests.simulators import FASTER
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
@@ -134,6 +136,47 @@ def test_it_is_refused_for_the_reasons_of_the_cabinet(arm: ha.Arm, motion: Motio
         arm.plan(motion)
     with pytest.raises(ha.HeptarmError, match=text):
         arm.move(motion)
+
+
+COMPLIANT = modes.CartesianImpedance(stiffness=(2000, 2000, 2000, 200, 200, 200))
+ELSEWHERE = modes.CartesianImpedance(stiffness=(500,) * 3 + (50,) * 3, frame="nowhere")
+
+
+@pytest.mark.parametrize(
+    ("keywords", "text"),
+    [
+        ({"mode": ELSEWHERE}, "nowhere"),
+        ({"until": force(frame="nowhere") > 10}, "nowhere"),
+        ({"until": io["DI9"]}, "no signal 'DI9'"),
+        ({"then": "relax"}, "reaction to a break condition"),
+        ({"until": force > 10, "then": "fly"}, "then must be"),
+        ({"mode": "soft"}, "mode must be a control mode"),
+    ],
+)
+def test_it_takes_what_move_takes_and_refuses_it_alike(
+    arm: ha.Arm, keywords: dict[str, Any], text: str
+) -> None:
+    down = ha.lin_rel(z=0.05, frame="base")
+    for verb in (arm.plan, arm.move):
+        with pytest.raises(ha.CommandRejected, match=text):
+            verb(down, **keywords)
+    bad = down.trigger(path.after(0.01), do.set_output("DO9", True))
+    for verb in (arm.plan, arm.move):
+        with pytest.raises(ha.CommandRejected, match="no signal 'DO9'"):
+            verb(bad)
+
+
+def test_modes_and_conditions_leave_the_planned_path(arm: ha.Arm) -> None:
+    down = ha.lin_rel(z=-0.05, frame="base", speed_mps=0.1)
+    stiff = arm.plan(down)
+    touched = arm.plan(down, mode=COMPLIANT, until=force > 10, then="relax")
+    assert touched.duration == stiff.duration and (touched.q == stiff.q).all()
+    assert stiff.until is None and touched.until == (force > 10)
+    assert "force > 10" in str(touched) and "end earlier" in str(touched) and "until" not in str(stiff)
+    with arm.using(ELSEWHERE), pytest.raises(ha.CommandRejected, match="nowhere"):
+        arm.plan(down)
+    with arm.breaking_on(force > 20):
+        assert arm.plan(down).until == (force > 20)
 
 
 def test_limits_and_their_places(arm: ha.Arm) -> None:

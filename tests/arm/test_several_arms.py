@@ -34,6 +34,9 @@ def test_they_have_names_and_an_order(arms: ha.Arms) -> None:
     left, right = arms
     assert arms.names == ("left", "right") and len(arms) == 2
     assert arms["left"] is left and arms["right"] is right
+    assert (left.name, right.name) == arms.names
+    assert repr(left).startswith("<Arm left: LBR iiwa 14") and repr(right).startswith("<Arm right: LBR")
+    assert str(ha.states_together(left, right)).startswith("2 arms, sampled within ")
     assert (left.robot.name, right.robot.name) == ("iiwa14", "iiwa7")
     with pytest.raises(ha.CommandRejected, match="one of left, right, got 'middle'"):
         arms["middle"]
@@ -60,9 +63,9 @@ def test_they_begin_together_and_are_released_at_once(arms: ha.Arms) -> None:
 def test_a_program_that_cannot_be_planned_moves_nothing(arms: ha.Arms) -> None:
     left, right = arms
     before = [arm.wait_for_rest() for arm in arms]
-    with pytest.raises(ha.HeptarmError, match="not reachable"):
+    with pytest.raises(ha.HeptarmError, match="^right: .*not reachable"):
         ha.start_together({left: ha.lin_rel(x=0.05), right: ha.lin_rel(x=0.9, frame="base")})
-    with pytest.raises(ha.LimitError, match="A2"):
+    with pytest.raises(ha.LimitError, match="^right: .*A2"):
         ha.start_together({left: ha.lin_rel(x=0.05), right: ha.ptp(ha.deg(0, 150, 0, 0, 0, 0, 0))})
     for arm, state in zip(arms, before, strict=True):
         arm.wait_until(lambda now: not now.safety.paused)
@@ -74,7 +77,7 @@ def test_one_that_moves_already_is_not_joined(arms: ha.Arms) -> None:
     left, right = arms
     running = left.start(ha.hold(30.0))
     left.wait_until(lambda state: state.motion.active)
-    with pytest.raises(ha.ModeConflict, match="still moves"):
+    with pytest.raises(ha.ModeConflict, match="^left still moves"):
         ha.start_together({left: ha.hold(1.0), right: ha.hold(1.0)})
     running.cancel()
     running.wait()
@@ -85,8 +88,10 @@ def test_an_error_of_one_stops_the_others_where_that_is_chosen(arms: ha.Arms, st
     left, right = arms
     both = ha.start_together({arm: ha.hold(2.0 if not stops else 60.0) for arm in arms}, stop_others=stops)
     right.stop()  # a motion that somebody stops has failed
-    with pytest.raises(ha.MotionAborted, match="was stopped") as failure:
+    with pytest.raises(ha.MotionAborted, match=r"^right: motion \d+ was stopped") as failure:
         both.wait(timeout=90.0)
+    with pytest.raises(ha.MotionAborted, match=r"^right: motion \d+ was stopped"):
+        both.wait(timeout=90.0)  # the same again
     assert failure.value is both.handles[right].error
     assert (both.handles[left].error is not None) == stops
 
@@ -169,10 +174,11 @@ def test_a_lost_arm_stops_the_other_and_the_group_still_closes(arms: ha.Arms) ->
     private = right.connection.cabinet
     assert private is not None
     os.kill(private.pid, signal.SIGKILL)
-    with pytest.raises(ha.ConnectionLost):
+    with pytest.raises(ha.ConnectionLost, match="^right: the connection was lost"):
         both.wait(timeout=60.0)
     with pytest.raises(ha.MotionAborted, match="was stopped"):
         both.handles[left].wait(timeout=30.0)
-    with pytest.raises(ha.HeptarmError):
+    with pytest.raises(ha.ConnectionLost, match="^right: the arm could not be stopped") as caught:
         ha.stop_all(left, right)
+    assert "press the emergency stop" in caught.value.hint
     assert isinstance(left, Arm) and left.in_control

@@ -6,7 +6,7 @@ import pytest
 
 from heptarm.arm.link.state_stream import HISTORY, SampleQueue, StateFeed, States, StateSample
 from heptarm.arm.translate.state import read_robot, read_state
-from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
+from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
 from heptarm.io.clock import StepClock
 from heptarm.values.state import State
 from heptarm.wire.clock_sync import ClockOffset
@@ -91,6 +91,14 @@ def test_the_end_of_a_stream() -> None:
         for _ in range(100):
             clock.step(0.1)
             next(states)
+
+
+@pytest.mark.parametrize("rate", [None, 10.0])
+def test_a_stream_without_an_end_does_not_become_arrays(rate: float | None) -> None:
+    feed = StateFeed(StepClock())
+    for take in (States.to_numpy, States.to_pandas):
+        with pytest.raises(CommandRejected, match=r"without an end.*arm\.states\(duration=2\.0\)"):
+            take(streams(feed, StepClock(), rate=rate))
 
 
 @pytest.mark.parametrize("body", [b"", b"\xff\xff", b"\x00\x01" + bytes(20), b"\x00\x04" + bytes(200)])

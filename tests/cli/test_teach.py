@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import heptarm as ha
 from tests.cli.running import objects, run, sim
 
 
@@ -16,5 +17,10 @@ def test_taught_and_replayed(tmp_path: Path) -> None:
         assert taught["recorded"] > taught["points"] >= 2 and file.exists()
         (done,) = objects("replay", str(file), "--by", "spline", "--speed-scaling", "0.3", *target)
         assert done["cause"] == "finished" and done["deviation_rad"] < 0.2
+        recorded = tmp_path / "run.mcap"
+        with ha.connect(ready["target"], watchdog=5.0, timeout=30.0) as arm, arm.record(recorded):
+            arm.move(ha.ptp(arm.state.q + 0.1), speed=0.5)
+        (again,) = objects("replay", str(recorded), "--by", "spline", "--speed-scaling", "0.5", *target)
+        assert again["cause"] == "finished" and again["deviation_rad"] < 0.05
         refused = run("replay", str(tmp_path / "none.npz"), *target)
         assert refused.returncode == 1 and "none.npz" in refused.stderr

@@ -20,6 +20,7 @@ from heptarm.fri.loop.native import Native, library
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.io.compiled import Unavailable
+from heptarm.values.pose import Pose
 
 from . import laws as python_laws
 from .controller import IPO, Controller
@@ -239,6 +240,20 @@ def test_a_library_that_does_not_fit_is_refused(laws: Path, tmp_path: Path) -> N
         with pytest.raises(CommandRejected, match=words) as error:
             Client(0, law=law, realtime=False)
         assert error.value.hint
+
+
+def test_a_pose_is_its_seven_numbers() -> None:
+    pose = Pose.xyz_abc(0.5, -0.1, 0.4, 0.3, 0.2, 0.1)
+    values, schema = flat({"k": 2.0, "goal": pose}, "params")
+    params = Params(values, schema, changed=lambda: None)
+    assert params.goal == pytest.approx(pose.array)
+    params.goal = pose.shifted(z=0.1)
+    assert params.goal == pytest.approx(pose.shifted(z=0.1).array) and params.k == 2.0
+    memory = Memory(values, schema)
+    memory.goal = pose
+    assert memory.goal == pytest.approx(pose.array)
+    with pytest.raises(ShapeError, match="k must have shape"):
+        params.k = pose
 
 
 def test_memory_needs_a_law_that_takes_it() -> None:

@@ -15,6 +15,7 @@ from heptarm.errors import CommandRejected, LimitError, ModeConflict, MotionAbor
 from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import PanelOptions, model_of
+from heptarm.record.mcap_file import RecordingFile
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 from tests.cli.running import run
@@ -346,8 +347,10 @@ def test_points_of_another_tool_are_refused(model: PanelArm) -> None:
     model.teach("bare")
     with model.arm.tool(ha.Tool("stick", mass=0.1, tcp=ha.Pose.at(z=0.1))):
         until(lambda: model.arm.state.tool == "stick")
-        with pytest.raises(CommandRejected, match="taught with no tool, attached is stick"):
-            model.run("bare")
+        for verb in (model.run, model.preview):
+            with pytest.raises(CommandRejected, match="taught with no tool, attached is stick"):
+                verb("bare")
+        assert model.plan is None
 
 
 # ------------------------------------------------------------------------------- plans and the gripper
@@ -437,6 +440,21 @@ def test_a_recording_has_states(model: PanelArm) -> None:
     model.arm.wait_until(lambda state: state.stamp > seen + 100_000_000, timeout=PATIENCE)
     model.stop_recording()
     assert model.poll().recording == "" and len(ha.load(path)) > 1
+
+
+def test_a_recording_that_the_disk_ends_is_reported_and_no_longer_shown(
+    model: PanelArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def states(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(RecordingFile, "states", states)
+    path = model.start_recording()
+    until(lambda: not model.poll().recording)
+    message = model.poll().message
+    assert message is not None and message.level == "error"
+    assert f"{path} ends early: No space left" in message.what and "free some space" in message.remedy
+    model.stop_recording()  # nothing is left to stop
 
 
 def test_a_panel_that_only_shows_refuses_all_but_stop(model: PanelArm) -> None:

@@ -10,7 +10,7 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
 
-from heptarm import load
+from heptarm import Recording, load
 from heptarm.errors import CommandRejected, MissingExtra, require
 from heptarm.record.convert import convert
 from heptarm.record.journal import JournalEntry
@@ -239,3 +239,18 @@ def test_a_wrong_suffix_and_a_missing_package_are_one_sentence(
     assert "heptarm[record]" in raised.value.hint
     with pytest.raises(MissingExtra):
         require("pandas", extra="record")
+
+
+def test_a_recording_has_a_trajectory_of_its_known_positions() -> None:
+    q = np.linspace(0.0, 1.0, 6)[:, None] * np.ones(7)
+    q[2] = np.nan  # a state without joints
+    signals = {"t": np.array([0.0, 0.1, 0.2, 0.3, 0.3, 0.5]), "q": q}
+    run = Recording(Path("run.mcap"), {"robot": "iiwa14"}, signals, (), (), True)
+    found = run.trajectory()
+    assert found.robot == "iiwa14" and found.times == pytest.approx([0.0, 0.1, 0.3, 0.5])
+    assert found.q[:, 3] == pytest.approx([0.0, 0.2, 0.6, 1.0])
+    cycles = {"t": np.zeros(0), "q": np.zeros((0, 7)), "fri.t": np.array([0.0, 0.01]), "fri.q": np.eye(7)[:2]}
+    assert len(Recording(Path("fri.mcap"), {}, cycles, (), (), True).trajectory()) == 2
+    for short in ({}, {"t": np.zeros(1), "q": np.zeros((1, 7))}):
+        with pytest.raises(CommandRejected, match=r"run\.mcap has fewer than 2 joint positions"):
+            Recording(Path("run.mcap"), {}, {"t": np.zeros(0), **short}, (), (), True).trajectory()

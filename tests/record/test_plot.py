@@ -57,6 +57,25 @@ def test_the_usual_figure_shows_all_that_was_recorded() -> None:
     assert len(figure.axes[0].patches) == 2  # the bands of the motions
 
 
+def test_a_part_is_drawn_from_its_beginning_to_its_end() -> None:
+    part = recording().between("third try", 1.6)
+    assert [one.text for one in part.motions] == ["Ptp", "Lin"]  # one began before, one ends behind
+    axes, *_ = part.plot("q").axes
+    begin, end = axes.get_xlim()
+    assert 0.3 < begin <= 0.5 and 1.6 <= end < 1.8
+    assert all(begin < text.get_position()[0] < end for text in axes.texts)
+
+
+def test_a_part_whose_end_is_before_its_beginning_is_refused() -> None:
+    run = recording()
+    with pytest.raises(
+        CommandRejected, match=r"end must not be before begin at 0\.500 s, got 0\.200 s"
+    ) as caught:
+        run.between("third try", 0.2)
+    assert caught.value.parameter == "end" and "exchange" in caught.value.hint
+    assert len(run.between(0.5, 0.5)) <= 1
+
+
 def test_no_peak_is_lost_by_drawing_fewer_points() -> None:
     figure = recording().plot("wrench")
     (axes,) = figure.axes

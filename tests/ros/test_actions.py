@@ -12,6 +12,7 @@ from heptarm.errors import CommandRejected, NotReady
 from heptarm.ros.interface.action import MAX_GOALS, ActionDispatcher, ActionResult, GoalWork, RosAction
 from heptarm.ros.interface.actions import ACTIONS, ask
 from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.gripper import gripper_command
 from heptarm.ros.trajectory.goal import GoalOutcome
 
 CLIENT: Any = SimpleNamespace(publish_feedback=lambda fields: None, is_cancel_requested=lambda: False)
@@ -55,6 +56,30 @@ def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> No
 
 def test_names_of_actions_are_unique() -> None:
     assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 11
+
+
+def test_a_goal_of_the_gripper_reports_until_its_switches_confirm() -> None:
+    reported = threading.Event()
+
+    class Fingers:
+        is_open = is_closed = holds_something = False
+
+        def open(self) -> None:
+            assert reported.wait(20.0)  # longer than a period of feedback
+            self.is_open = True
+
+    values = {"gripper.width": 0.08} | {
+        f"gripper.{name}": name for name in ("open", "close", "is_open", "is_closed")
+    }
+    configuration = SimpleNamespace(configuration=SimpleNamespace(values=values))
+    context: Any = SimpleNamespace(driver=configuration, gripper=Fingers(), check_active=lambda: None)
+    goal = SimpleNamespace(command=SimpleNamespace(position=0.08))
+    client: Any = SimpleNamespace(
+        publish_feedback=lambda fields: reported.set(), is_cancel_requested=lambda: False
+    )
+    end = gripper_command(context, goal)(client)
+    assert (end.outcome, end.text) == (GoalOutcome.SUCCEEDED, "open")
+    assert end.fields["reached_goal"] and end.fields["position"] == 0.08
 
 
 def test_the_operator_answers_a_goal_unless_it_is_cancelled() -> None:

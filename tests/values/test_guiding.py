@@ -86,6 +86,8 @@ def test_trimming_and_thinning_keep_the_way() -> None:
     assert (thin.q[0] == trimmed.q[0]).all() and (thin.q[-1] == trimmed.q[-1]).all()
     with pytest.raises(ha.CommandRejected, match="nothing moves"):
         ha.Trajectory.of([0.0, 1.0], np.zeros((2, 7))).trimmed()
+    creeping = ha.Trajectory.of(np.arange(16.0), np.linspace(0.0, 1.5e-3, 16)[:, None] * np.ones(7))
+    assert creeping.trimmed() == creeping
 
 
 def test_a_spline_goes_through_points_of_it() -> None:

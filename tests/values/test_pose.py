@@ -141,6 +141,16 @@ def test_frozen() -> None:
         (lambda: Pose.of(("a", "b", "c")), ShapeError, "must be 3 numbers"),
         (lambda: Pose.of((1, 2, 3), (0, 0, 0, math.nan)), LimitError, r"quat\[3\] must .*got nan"),
         (lambda: Pose.from_matrix(np.eye(3)), ShapeError, r"matrix must have shape .*got \(3, 3\)"),
+        (
+            lambda: Pose.from_rotvec((1, 2, 3), (0, 180, 0)),
+            LimitError,
+            "rotvec must be at most one turn.* deg",
+        ),
+        (lambda: Pose.at().rotated(a=90), LimitError, "a must be in .* rad, got 90 rad"),
+        (lambda: Pose.at().shifted("0.1"), ShapeError, "x must be a number"),
+        (lambda: Pose.at().shifted(z=0.1, frame="flange"), ShapeError, "frame must be one of 'base', 'tool'"),
+        (lambda: Pose.at().interpolate(Pose.at(), 50), LimitError, r"fraction must be in \[0, 1\], got 50"),
+        (lambda: Pose.at().interpolate((1, 2, 3), 0.5), ShapeError, "other must be a Pose"),
     ],
 )
 def test_refuses(make: object, error: type[Exception], text: str) -> None:

@@ -13,10 +13,16 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm import do, modes
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.skills.insertion import Insertion
+from heptarm.skills.replay import Replay
+from heptarm.values.condition.contact import Contact
+from heptarm.values.io import SignalValues
+from heptarm.values.robot import ROBOTS
 from heptarm.values.state import (
     Cartesian,
+    Control,
     Groups,
     Joints,
     MotionStatus,
@@ -27,6 +33,8 @@ from heptarm.values.state import (
     Wrench,
 )
 from heptarm.values.text import fixed, lines
+from heptarm.values.tool import KnownTool
+from heptarm.when import path
 
 POSE = ha.Pose.xyz_abc(0.5, -0.1, 0.3, *ha.deg(10, 0, 180))
 STATE = State(
@@ -175,6 +183,68 @@ def test_an_insertion_is_read_and_compared() -> None:
         "  offset    1.20 0.00 -0.10 mm",
     ]
     assert found(0.0012) == found(0.0012) != found(0.0013)
+
+
+RESULT = ha.Result(ha.Cause.FINISHED, duration=1.25)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (STATE.wrench, ["force 1.00 2.00 -3.50 N   torque 0.10 0.20 0.30 Nm"]),
+        (
+            Wrench(0, *np.ones((2, 3)), np.full(3, 30.0), np.zeros(3)),
+            ["force 1.00 1.00 1.00 N", "inaccurate here"],
+        ),
+        (modes.Position(), ["position control"]),
+        (modes.JointImpedance(300.0), ["joint impedance, 300 Nm/rad, damping 0.7"]),
+        (
+            modes.CartesianImpedance((2000, 2000, 300, 200, 200, 200), max_force={"z": 20.0}),
+            ["2000 2000 300 N/m, 200 Nm/rad, damping 0.7", "frame tool", "max_force - - 20 - - - N, Nm"],
+        ),
+        (
+            modes.SineImpedance.sine("z", frequency=2.0, amplitude=8.0, stiffness=500.0),
+            ["Cartesian impedance, ", "; overlaid force: amplitude 0 0 8 0 0 0 N, Nm, frequency "],
+        ),
+        (
+            Contact(POSE, np.array([0.0, 0.1, -9.0]), 0.0123, ha.deg(1, 2, 3, 4, 5, 6, 7), RESULT),
+            ["Contact\n", "force   0.00 0.10 -9.00 N", "travel  12.30 mm"],
+        ),
+        (
+            ha.Trajectory.of([0.0, 2.0], [np.zeros(7), ha.deg(0, 0, 0, 0, 0, 0, 90)], robot="iiwa14"),
+            ["Trajectory\n", "2.00 s, 2 points", "0.0 0.0 0.0 0.0 0.0 0.0 45.0 deg/s"],
+        ),
+        (Replay(RESULT, 0.01, 0.034), ["Replay\n", "finished", "0.57 deg", "34 ms"]),
+        (
+            SignalValues(10**9, {"Cell.Door": True, "Cell.Level": 2.5}),
+            ["2 signals at 1.000 s of the cabinet", "Cell.Door   on", "Cell.Level  2.5"],
+        ),
+        (KnownTool("saw", 1.5, (("tip", ha.Pose.at(z=0.2)),)), ["KnownTool saw\n", "1.5 kg", "z 200.0 mm"]),
+        (
+            ha.MotionEvent(
+                "trigger", 1, trigger=ha.Trigger(path.after(0.1), do.notify("half way")), time=0.5
+            ),
+            ["trigger, motion 1: notify 'half way' when 0.1 m after the start after 0.500 s"],
+        ),
+        (ha.MotionEvent("segment", 0, segment=3), ["segment, motion 0, segment 3"]),
+        (ROBOTS["iiwa7"], ["LBR iiwa 7 R800 (iiwa7)\n", "340, 400, 400, 126 mm", "torque [Nm]"]),
+    ],
+)
+def test_what_a_lab_prints_has_words_and_units(value: object, words: list[str]) -> None:
+    text = str(value)
+    assert all(one in text for one in words) and "array(" not in text and "nan" not in text
+
+
+def test_a_state_has_its_mode_and_signals_in_lines_of_their_own() -> None:
+    control = Control(10**9, modes.JointImpedance(300.0), "gripper", "", "tcp")
+    text = str(
+        STATE.with_groups(mode=control, io=SignalValues(10**9, {"Cell.Door": True, "Cell.Hot": False}))
+    )
+    assert "joint impedance, 300 Nm/rad, damping 0.7, gripper, motion frame tcp" in text
+    assert [line.split()[-2:] for line in text.splitlines()[-2:]] == [
+        ["Cell.Door", "on"],
+        ["Cell.Hot", "off"],
+    ]
 
 
 @pytest.mark.parametrize("kind", [Insertion, ha.Recording, ha.Recovery])

@@ -38,6 +38,7 @@ from heptarm.arm.motion.servo import (
     documented,
 )
 from heptarm.arm.translate.conditions import condition_message
+from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
@@ -101,6 +102,7 @@ class Arm:
         self._speed = 1.0
         self._mode: Mode | None = None
         self._breaks: tuple[BreakRule, ...] = ()
+        self._name = ""
 
     # ------------------------------------------------------------------------------- connection
 
@@ -193,7 +195,21 @@ class Arm:
         """Short form."""
         link = self._connection
         state = "closed" if link.closed.is_set() else "connected" if link.is_connected else "lost"
-        return f"<Arm {link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
+        name = f"{self._name}: " if self._name else ""
+        return f"<Arm {name}{link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
+
+    @property
+    def name(self) -> str:
+        """Its name in `connect_all`, or that of its saved target, with which errors of several arms begin; "": none.
+
+        Raises:
+            ShapeError: not a text (when it is set).
+        """
+        return self._name
+
+    @name.setter
+    def name(self, value: str) -> None:
+        self._name = printable(instance(value, str, "name"))
 
     @property
     def connection(self) -> Connection:
@@ -423,7 +439,10 @@ class Arm:
         self,
         motion: Motion | Sequence[Motion],
         *,
+        mode: Mode | None = None,
         speed: float | None = None,
+        until: Condition | None = None,
+        then: Reaction | None = None,
         start: npt.ArrayLike | None = None,
         step: float = 0.01,
         collision_check: CollisionCheck | None = None,
@@ -433,9 +452,15 @@ class Arm:
         It is planned as the virtual cabinet plans it, also beside a robot, whose own planner may take a little longer
         or shorter. Needs `pip install 'heptarm[sim]'`, but no simulator.
 
+        Mode, break condition and reaction are checked as `move` checks them. The preview is of the commanded path to
+        its end: a compliant arm may be beside it, and a condition may end it earlier.
+
         Args:
             motion: one motion or several, without hand guiding and endless holds.
+            mode: see `move`.
             speed: ceiling, (0, 1]; the lower one of this and `arm.speed` applies, as in `move`.
+            until: see `move`.
+            then: see `move`.
             start: joint positions at which it begins, shape (7,) [rad]; None: where the arm rests.
             step: time between two samples of the result [s], 0.001 to 1.
             collision_check: checks the path for collisions, such as a `heptarm.CollisionModel`; None:
@@ -453,13 +478,13 @@ class Arm:
             StaleState: the newest state is too old, or lacks the joints.
             MissingExtra: the planner is not installed.
         """
-        motions = program.listed(motion)
-        ceiling = self._speed
-        if speed is not None:
-            ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        motions, breaks = program.listed(motion), self._breaks
         return self._foresight.preview(
             motions,
-            ceiling=ceiling,
+            ceiling=self._ceiling(speed),
+            mode=self._mode if mode is None else mode,
+            until=self._until(until, breaks),
+            then=self._then(then, until, breaks),
             start=None if start is None else array(start, 7, "start"),
             step=within(step, "step", 0.001, 1.0, unit="s"),
             check=None if collision_check is None else _checked(collision_check),
@@ -618,6 +643,12 @@ class Arm:
         finally:
             self._breaks = tuple(one for one in self._breaks if one is not rule)
 
+    def _ceiling(self, speed: float | None) -> float:
+        """The ceiling of one call: the lower one of its own, None for none, and that of all."""
+        return (
+            self._speed if speed is None else min(self._speed, within(speed, "speed", 0.0, 1.0, above=True))
+        )
+
     def _until(self, until: Condition | None, breaks: tuple[BreakRule, ...]) -> Condition | None:
         """A break condition together with those of the enclosing blocks."""
         if until is not None:
@@ -651,9 +682,7 @@ class Arm:
         then: Reaction | None,
         when: str,
     ) -> MotionHandle:
-        ceiling, breaks = self._speed, self._breaks
-        if speed is not None:
-            ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        ceiling, breaks = self._ceiling(speed), self._breaks
         motions = program.resolved(self._connection, self._tooling, motions)
         self._foresight.examine(motions, when, ceiling)
         return program.send(
@@ -743,11 +772,12 @@ class Arm:
             **settings: as follows.
             period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
             multiplier: answer every n-th message; 1.
-            mode: control mode of the hold; None: that of `using`, otherwise position.
+            mode: control mode of the hold; None: that of `using`, otherwise position, and for a ready law that commands
+                torques `JointImpedance(stiffness=0.0)`.
             law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in
                 every cycle; a law of `heptarm.law`, `heptarm.law_from` or `heptarm.laws` runs there without Python.
                 None: `Fri.command`.
-            params: numbers and arrays by name for the law, which can change while it runs.
+            params: numbers, arrays and poses by name for the law, which can change while it runs.
             memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
             collision: bands of the external torques, as `collision_guard` makes them: the loop watches them in every
                 message, and the arm brakes at once. None: those of the `guarded` block, if there is one.

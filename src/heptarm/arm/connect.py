@@ -154,13 +154,13 @@ def connect(
 
 
 def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
-    """Give an arm the ceiling of the speed and the tool of its saved target.
+    """Give an arm the name, the ceiling of the speed and the tool of its saved target.
 
     Raises:
         CommandRejected: the cabinet does not know the tool; the text lists those that it knows.
     """
     saved.mark_used()
-    arm.speed = saved.speed
+    arm.name, arm.speed = saved.name, saved.speed
     newest = arm.connection.newest()
     mode = None if newest is None else newest.groups.mode
     if control and saved.tool and (mode is None or mode.tool != saved.tool):

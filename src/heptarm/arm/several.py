@@ -62,6 +62,11 @@ class StatesOfArms:
     states: tuple[State, ...]
     spread: float
 
+    def __str__(self) -> str:
+        """The states, one below the other, and how far they are apart."""
+        head = f"{len(self.states)} arms, sampled within {self.spread * 1e3:.1f} ms"
+        return "\n".join([head, *map(str, self.states)])
+
 
 class Arms:
     """Several connected arms; made by `connect_all`.
@@ -180,9 +185,9 @@ def connect_all(*targets: str, settings: Mapping[str, Any] | None = None, **name
             try:
                 arms[name] = connect(instance(target, str, name), **dict(settings or {}))
             except HeptarmError as error:
-                error.text = f"{name}: {error.text}"
-                error.args = (error.text,)
+                _of(name, error)
                 raise
+            arms[name].name = name
     except BaseException:
         Arms(arms).close()
         raise
@@ -248,6 +253,10 @@ class MotionOfArms:
         self._watcher = threading.Thread(target=self._watch, name="heptarm-together", daemon=True)
         self._watcher.start()
 
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<MotionOfArms {', '.join(map(repr, self.handles.values()))}, skew {self.skew * 1e3:.1f} ms>"
+
     @property
     def done(self) -> bool:
         """Whether the programs of all arms have ended."""
@@ -293,7 +302,7 @@ class MotionOfArms:
             error = self.handles[arm].error
             if error is None or self._first is not None:
                 continue
-            self._first = error
+            self._first = _of(arm.name, error)
             if self._stops_others and waiting:
                 _log.warning("one of %d arms failed, the others are stopped: %s", len(self.handles), error)
                 for failure in _of_each(sorted(waiting, key=list(self.handles).index), Arm.stop)[1]:
@@ -342,23 +351,30 @@ def start_together(
             arm.wait_until(_is_idle, timeout=_SOON)
         except Timeout:
             raise ModeConflict(
-                "an arm still moves, so that it could not begin with the others",
+                f"{arm.name or 'an arm'} still moves, so that it could not begin with the others",
                 parameter="motions",
                 hint="wait until all arms rest: arm.wait_for_rest()",
             ) from None
+        except HeptarmError as error:
+            _of(arm.name, error)
+            raise
     handles: dict[Arm, MotionHandle] = {}
     try:
         _raise_first(_of_each(arms, Arm.pause))
         for arm in arms:
             _wait_until_braked(arm)
         for arm in arms:
-            handles[arm] = arm.start(motions[arm], speed=speed, mode=mode, when="reject")
+            try:
+                handles[arm] = arm.start(motions[arm], speed=speed, mode=mode, when="reject")
+            except HeptarmError as error:
+                _of(arm.name, error)
+                raise
         for arm in arms:
             _wait_until_taken(arm, handles[arm])
         time.sleep(seconds)
-        for handle in handles.values():
+        for arm, handle in handles.items():
             if handle.error is not None:
-                raise handle.error
+                raise _of(arm.name, handle.error)
     except BaseException:
         _withdraw(arms, handles)
         raise
@@ -424,12 +440,20 @@ def _of_each(
     answers: list[_Answer] = []
     errors: list[HeptarmError] = []
     with ThreadPoolExecutor(len(these), thread_name_prefix="heptarm-together") as pool:
-        for future in [pool.submit(act, one) for one in these]:
+        for one, future in [(one, pool.submit(act, one)) for one in these]:
             try:
                 answers.append(future.result())
             except HeptarmError as error:
-                errors.append(error)
+                errors.append(_of(one.name, error) if isinstance(one, Arm) else error)
     return answers, errors
+
+
+def _of(name: str, error: HeptarmError) -> HeptarmError:
+    """The error, whose text begins with the name of its arm."""
+    if name and not error.text.startswith(f"{name}: "):
+        error.text = f"{name}: {error.text}"
+        error.args = (error.text,)
+    return error
 
 
 def _raise_first(outcome: tuple[list[Any], list[HeptarmError]]) -> None:

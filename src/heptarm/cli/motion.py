@@ -17,6 +17,7 @@ from heptarm.cli.output import confirm, emit, state_data
 from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
 from heptarm.errors import CommandRejected, NotReady
+from heptarm.record.recording import load
 from heptarm.values.arrays import within
 from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance
@@ -238,9 +239,10 @@ def teach(
 
 
 def replay(
-    file: Annotated[Path, Parameter(help="File written by heptarm teach.")],
+    file: Annotated[Path, Parameter(help="File written by heptarm teach, or a recording, .mcap.")],
     /,
     *,
+    arm_of: Annotated[str, Parameter(name="--arm", help="Which arm, in a recording of several.")] = "",
     by: Annotated[
         Literal["servo", "spline"],
         Parameter(help="With the recorded timing, or as one smooth spline motion of the cabinet."),
@@ -256,11 +258,10 @@ def replay(
     For example:
 
         heptarm replay path.npz --speed-scaling 0.3 --target lab1
+
+        heptarm replay run.mcap --target sim://iiwa14
     """
-    try:
-        trajectory = Trajectory.load(file)
-    except OSError as error:
-        raise CommandRejected(f"{file}: {error.strerror}", parameter="file", value=str(file)) from error
+    trajectory = _trajectory(file, arm_of)
     with access.target.connect() as arm:
         if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
@@ -272,6 +273,20 @@ def replay(
         off = np.degrees(done.deviation)
         print(f"{done.result.cause.value} after {done.result.duration:.1f} s, {off:.2f} deg off at most")
     return 0
+
+
+def _trajectory(file: Path, arm: str) -> Trajectory:
+    """The trajectory of a file that was taught, or that of a recording without its rests.
+
+    Raises:
+        CommandRejected: it cannot be read, or is neither.
+    """
+    if file.suffix.lower() == ".mcap":
+        return load(file, arm=arm).trajectory().trimmed().thinned()
+    try:
+        return Trajectory.load(file)
+    except OSError as error:
+        raise CommandRejected(f"{file}: {error.strerror}", parameter="file", value=str(file)) from error
 
 
 def recover(

@@ -176,6 +176,8 @@ class PanelArm:
             self._seen = state.stamp
             self._note(state, tcp)
         stands = () if state is None else self._reasons(state.groups.safety)
+        if self._recorder is not None and not self._recorder.is_running:
+            self._end_recording()  # a full disk has ended it
         handle = self._handle
         running = ""
         if handle is not None and not handle.done:
@@ -382,9 +384,11 @@ class PanelArm:
             speed: fraction of the full speed, (0, 1].
 
         Raises:
-            CommandRejected: there is no such point, the list is empty, or a point cannot be reached in this way.
+            CommandRejected: there is no such point, the list is empty, the points were taught with another tool, or one
+                cannot be reached in this way.
         """
         chosen = self._chosen(names)
+        self._check_tool(chosen)
         found = self.arm.plan(self.points.motions(chosen), speed=speed)
         self.show_plan(found.outline())
         self._say(f"Planned: {found.duration:.1f} s; {found.closest('velocity')}")
@@ -461,15 +465,7 @@ class PanelArm:
         chosen = self._chosen(names)
         if self._jogger.is_moving:
             raise ModeConflict("the arm is being jogged", parameter="points", hint="release the button first")
-        tools = {list(self.points)[self.points.index(name)].tool for name in chosen}
-        attached = self.arm.state.tool
-        if tools - {attached}:
-            raise CommandRejected(
-                f"the points were taught with {' and '.join(sorted(tool or 'no tool' for tool in tools))}, "
-                f"attached is {attached or 'no tool'}",
-                parameter="points",
-                hint="attach the tool with which they were taught",
-            )
+        self._check_tool(chosen)
         handle = self.arm.start(self.points.motions(chosen), speed=speed, when="reject")
         self._visiting, self._handle = tuple(chosen), handle
         handle.add_done_callback(self._on_done)
@@ -483,6 +479,18 @@ class PanelArm:
                 "the list of points is empty", parameter="points", hint="teach a point first"
             )
         return chosen
+
+    def _check_tool(self, names: tuple[str, ...]) -> None:
+        """Refuse points that were taught with another tool."""
+        tools = {list(self.points)[self.points.index(name)].tool for name in names}
+        attached = self.arm.state.tool
+        if tools - {attached}:
+            raise CommandRejected(
+                f"the points were taught with {' and '.join(sorted(tool or 'no tool' for tool in tools))}, "
+                f"attached is {attached or 'no tool'}",
+                parameter="points",
+                hint="attach the tool with which they were taught",
+            )
 
     def _on_done(self, handle: MotionHandle) -> None:
         error = handle.error
@@ -536,10 +544,16 @@ class PanelArm:
             recorder.close()
             self._say(f"Recorded to {recorder.path}")
 
+    def _end_recording(self) -> None:
+        try:
+            self.stop_recording()
+        except HeptarmError as error:
+            self.report(error)
+
     def close(self) -> None:
         """End jogging and recording; the arm itself stays open."""
         self._jogger.close()
-        self.stop_recording()
+        self._end_recording()
 
 
 def groups_for(offered: object) -> tuple[str, ...]:

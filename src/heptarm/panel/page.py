@@ -361,9 +361,9 @@ class ArmPage:
         self._button("Delete", lambda: model.points.delete(self._chosen.value), color="gray")
         self._run_speed = gui.add_slider("Run at [%]", 1, 100, 1, _SLOW)
         for label, action in (
-            ("Go to point", lambda: (self._chosen.value,)),
-            ("Step", self._next_point),
-            ("Run all", lambda: ()),
+            ("Go to point", self._run_chosen),
+            ("Step", self._step),
+            ("Run all", self._run),
         ):
             handle = gui.add_button(label, color="orange")
             handle.on_click(self._runner(action))
@@ -395,23 +395,26 @@ class ArmPage:
         point = tuple(points)[points.index(self._chosen.value)]
         points.approach(point.name, straight=not point.straight)
 
-    def _runner(self, names: Callable[[], tuple[str, ...]]) -> Callable[[Any], None]:
+    def _runner(self, action: Callable[[], None]) -> Callable[[Any], None]:
         """What runs points, and remembers whose page has started it."""
 
         def run(event: Any) -> None:
             self._client = event.client_id
-            self._do(lambda: self.model.run(*names(), speed=float(self._run_speed.value) / 100))
+            self._do(action)
 
         return run
 
-    def _next_point(self) -> tuple[str, ...]:
-        """The chosen point, after which the next one is chosen."""
+    def _run(self, *names: str) -> None:
+        self.model.run(*names, speed=float(self._run_speed.value) / 100)
+
+    def _run_chosen(self) -> None:
+        self._run(*((self._chosen.value,) if self.model.points.names else ()))
+
+    def _step(self) -> None:
+        """Run to the chosen point, and choose the next one; a step that is refused chooses none."""
+        self._run_chosen()
         names, chosen = self.model.points.names, self._chosen.value
-        if not names:
-            return ()
-        index = self.model.points.index(chosen)
-        self._chosen.value = names[(index + 1) % len(names)]
-        return (chosen,)
+        self._chosen.value = names[(self.model.points.index(chosen) + 1) % len(names)]
 
     def _load(self, content: bytes) -> None:
         try:

@@ -276,13 +276,14 @@ def _limits(
 
 def _draw_bands(axes: Axes, recording: Recording, *, is_first: bool) -> None:
     """Motions as bands, notes and important events as lines; their names above the first row."""
-    end = float(recording.t[-1]) if len(recording) else 0.0
+    first, last = _span(recording)
     top = axes.get_xaxis_transform()
     for index, one in enumerate(recording.motions):
-        until = end if np.isnan(one.end) else one.end
-        axes.axvspan(one.begin, until, color="0.5", alpha=0.12 if index % 2 else 0.06, linewidth=0)
+        # a part of a recording has motions that began before it or end behind it
+        begin, until = max(one.begin, first), last if np.isnan(one.end) else min(one.end, last)
+        axes.axvspan(begin, until, color="0.5", alpha=0.12 if index % 2 else 0.06, linewidth=0)
         if is_first:
-            middle = (one.begin + until) / 2
+            middle = (begin + until) / 2
             axes.text(
                 middle,
                 1.02,
@@ -309,6 +310,12 @@ def _draw_bands(axes: Axes, recording: Recording, *, is_first: bool) -> None:
                     va="top",
                     rotation=90,
                 )
+
+
+def _span(recording: Recording) -> tuple[float, float]:
+    """First and last time that is drawn [s]."""
+    times = [t for t in (recording.t, recording.signals.get(f"{FRI}t")) if t is not None and len(t)]
+    return min((float(t[0]) for t in times), default=0.0), max((float(t[-1]) for t in times), default=0.0)
 
 
 def _draw_path(axes: Any, recording: Recording, colour: str, style: str) -> None:

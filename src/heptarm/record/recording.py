@@ -19,6 +19,7 @@ from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, frozen, instance, shown
+from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
 from heptarm.values.robot import ROBOTS, RobotModel
 from heptarm.values.text import lines
@@ -171,9 +172,17 @@ class Recording:
             end: likewise, or "end".
 
         Raises:
-            CommandRejected: there is no note with that text.
+            CommandRejected: there is no note with that text, or the end is before the beginning.
         """
         first, last = self._moment(begin, "begin"), self._moment(end, "end")
+        if last < first:
+            raise CommandRejected(
+                f"end must not be before begin at {first:.3f} s, got {last:.3f} s",
+                parameter="end",
+                value=end,
+                allowed=f"from {first:.3f} s on",
+                hint="exchange them; of notes with the same text the first one counts",
+            )
         masks = {prefix: _within(self.signals.get(f"{prefix}t"), first, last) for prefix in ("", FRI)}
         signals = {
             name: values[masks[FRI if name.startswith(FRI) else ""]] for name, values in self.signals.items()
@@ -198,6 +207,29 @@ class Recording:
         known = ", ".join(repr(one.text) for one in self.notes) or "none"
         raise CommandRejected(
             f"there is no note {shown(when)}; there are {known}", parameter=name, value=when, allowed=known
+        )
+
+    def trajectory(self) -> Trajectory:
+        """The measured joint positions over time, to be trimmed, thinned and replayed; see `Arm.replay`.
+
+        Without pushed states those of the FRI cycles.
+
+        Raises:
+            CommandRejected: fewer than two positions were recorded.
+        """
+        for prefix in ("", FRI):
+            t, q = self.signals.get(f"{prefix}t"), self.signals.get(f"{prefix}q")
+            if t is None or q is None:
+                continue
+            known = ~np.isnan(q).any(axis=1)
+            times, rows = np.unique(t[known], return_index=True)
+            if len(times) > 1:
+                return Trajectory.of(times, q[known][rows], robot=self.facts.get("robot", ""))
+        raise CommandRejected(
+            f"{self.path.name} has fewer than 2 joint positions, so that there is no trajectory",
+            parameter="path",
+            value=str(self.path),
+            hint='record the state group "joints", and while the arm moves',
         )
 
     def to_pandas(self, *, fri: bool = False) -> Any:

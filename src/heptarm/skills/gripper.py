@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING, Protocol
 
-from heptarm.errors import Timeout
+from heptarm.errors import CommandRejected, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.io import SignalValues, find_signal
 
@@ -38,6 +39,43 @@ class Gripper(Protocol):
         """Whether something is between its closed fingers."""
 
 
+def _wired(arm: Arm, role: str, name: str, others: Mapping[str, str]) -> str:
+    """The full name of a signal of a gripper, checked.
+
+    Args:
+        arm: whose signals.
+        role: "open" and "close" are outputs, others inputs.
+        name: as in `arm.io`.
+        others: full names of the signals that are known already, by their roles.
+
+    Raises:
+        CommandRejected: there is no such signal, it is of another kind, or has another role.
+    """
+    known = tuple(arm.io.signals.values())
+    signal = find_signal(name, known)
+    needs_output = role in ("open", "close")
+    wanted = "output" if needs_output else "input"
+    if signal.is_output != needs_output or signal.kind != "boolean":
+        fitting = [one.name for one in known if one.is_output == needs_output and one.kind == "boolean"]
+        is_kind = "output" if signal.is_output else "input"
+        raise CommandRejected(
+            f"{role} must be a boolean {wanted}, got {signal.name}, a signal of kind {signal.kind}, {is_kind}",
+            parameter=role,
+            value=name,
+            allowed=", ".join(fitting),
+            hint=f"boolean {wanted}s of this cabinet are {', '.join(fitting) or 'none'}",
+        )
+    for other, taken in others.items():
+        if taken == signal.name:
+            raise CommandRejected(
+                f"{role} must be another signal than {other}, got {signal.name} for both",
+                parameter=role,
+                value=name,
+                hint="each signal of a gripper has one meaning",
+            )
+    return signal.name
+
+
 class TwoSignalGripper:
     """A gripper that one output opens and another one closes, confirmed by two end switches.
 
@@ -57,7 +95,7 @@ class TwoSignalGripper:
         settle: see above [s].
 
     Raises:
-        CommandRejected: no signal, or more than one, has such a name.
+        CommandRejected: no signal, or more than one, has such a name; or it is of another kind, or is named twice.
         LimitError: a time outside its range.
     """
 
@@ -73,13 +111,21 @@ class TwoSignalGripper:
         timeout: float = PATIENCE,
         settle: float = SETTLE,
     ) -> None:
-        known = tuple(arm.io.signals.values())
         self._arm = arm
-        self._open, self._close = find_signal(open, known).name, find_signal(close, known).name
-        self._is_open, self._is_closed = find_signal(is_open, known).name, find_signal(is_closed, known).name
-        self._holds = None if holds is None else find_signal(holds, known).name
+        found: dict[str, str] = {}
+        named = [("open", open), ("close", close), ("is_open", is_open), ("is_closed", is_closed)]
+        for role, name in named if holds is None else [*named, ("holds", holds)]:
+            found[role] = _wired(arm, role, name, found)
+        self._open, self._close = found["open"], found["close"]
+        self._is_open, self._is_closed = found["is_open"], found["is_closed"]
+        self._holds = found.get("holds")
         self._timeout = within(timeout, "timeout", 0.0, 600.0, above=True, unit="s")
         self._settle = within(settle, "settle", 0.0, self._timeout, unit="s")
+
+    def __repr__(self) -> str:
+        """Short form: its signals."""
+        switches = ", ".join(filter(None, (self._is_open, self._is_closed, self._holds)))
+        return f"<TwoSignalGripper {self._open}, {self._close}; {switches}>"
 
     @property
     def is_open(self) -> bool:

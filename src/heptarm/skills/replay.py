@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import isnan
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.result import Cause, Result
 from heptarm.values.robot import RobotModel
+from heptarm.values.text import degrees, fixed, lines
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
@@ -44,6 +46,16 @@ class Replay(Value):
     result: Result
     deviation: float
     lag: float = float("nan")
+
+    def __str__(self) -> str:
+        """A few lines: how it ended, and how near it came."""
+        rows = {
+            "cause": self.result.cause.value,
+            "duration": f"{self.result.duration:.2f} s",
+            "deviation": f"{degrees(self.deviation)} at most from the taught path",
+            "lag": "" if isnan(self.lag) else f"{fixed(self.lag * 1e3, 0)} ms, median",
+        }
+        return lines("Replay", rows)
 
 
 def replay(

@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Value, shown
+from heptarm.values.text import lines
 
 #: Value of a signal: boolean or number.
 SignalValue: TypeAlias = bool | float
@@ -123,6 +124,14 @@ class SignalValues(Mapping[str, SignalValue]):
     def __hash__(self) -> int:
         """Hash of names, values and time."""
         return hash((self.stamp, tuple(self._values.items())))
+
+    def __str__(self) -> str:
+        """A line for each signal."""
+        rows = {
+            name: ("on" if value else "off") if isinstance(value, bool) else f"{value:g}"
+            for name, value in self._values.items()
+        }
+        return lines(f"{len(rows)} signals at {self.stamp * 1e-9:.3f} s of the cabinet", rows)
 
     def __repr__(self) -> str:
         """Short form."""

@@ -268,10 +268,19 @@ class Pose(Value):
 
         Raises:
             ShapeError: not three numbers.
-            LimitError: a number that is not finite.
+            LimitError: a number that is not finite, or more than a turn, as degrees are.
         """
         vector = array(rotvec, 3, "rotvec")
         angle = float(np.linalg.norm(vector))
+        if angle > _TURN:
+            raise LimitError(
+                f"rotvec must be at most one turn long, {2.0 * math.pi:.4f} rad, got {angle:g} rad",
+                code=2,
+                parameter="rotvec",
+                value=rotvec,
+                allowed=f"[0, {2.0 * math.pi:.4f}] rad",
+                hint="angles are radians: heptarm.deg(...) makes them of degrees",
+            )
         if angle == 0.0:
             return cls.of(xyz)
         axis = vector / angle * math.sin(angle / 2)

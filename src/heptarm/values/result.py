@@ -117,6 +117,14 @@ class MotionEvent(Value):
     code: int = 0
     text: str = ""
 
+    def __str__(self) -> str:
+        """One line."""
+        where = f"motion {self.item}" + (f", segment {self.segment}" if self.segment >= 0 else "")
+        what = "" if self.trigger is None else f": {self.trigger}"
+        when = "" if isnan(self.time) else f" after {self.time:.3f} s"
+        failed = f", not done: {self.text} (code {self.code})" if self.code else ""
+        return f"{self.kind}, {where}{what}{when}{failed}"
+
     @property
     def label(self) -> str:
         """Label of a trigger that notifies; otherwise empty."""

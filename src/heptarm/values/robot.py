@@ -10,6 +10,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, shown, within
 from heptarm.values.pose import Pose, deg
+from heptarm.values.text import columns, fixed, lines
 
 
 def _no_inertia() -> Array:
@@ -174,6 +175,20 @@ class RobotModel:
     ddq_max: Array
     dddq_max: Array
     tau_max: Array
+
+    def __str__(self) -> str:
+        """A few lines: its name, its dimensions, and the limits of its joints."""
+        low, high, fastest = (np.degrees(one) for one in (self.q_min, self.q_max, self.dq_max))
+        lengths = ", ".join(fixed(1e3 * one, 0) for one in (self.d_bs, self.d_se, self.d_ew, self.d_wf))
+        rows = {
+            "links": f"{lengths} mm: base, shoulder, elbow, wrist, flange",
+            "joint": "".join(f"{f'A{i + 1}':>8}" for i in range(7)),
+            "lowest [deg]": columns(low, 1),
+            "highest [deg]": columns(high, 1),
+            "speed [deg/s]": columns(fastest, 1),
+            "torque [Nm]": columns(self.tau_max, 0),
+        }
+        return lines(f"{self.title} ({self.name})", rows)
 
     @property
     def dh(self) -> Array:

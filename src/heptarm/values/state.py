@@ -118,6 +118,12 @@ class Wrench(Value):
         for name in ("force", "torque", "force_inaccuracy", "torque_inaccuracy"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
+    def __str__(self) -> str:
+        """One line."""
+        force, torque = (" ".join(fixed(v, 2) for v in one) for one in (self.force, self.torque))
+        doubt = "" if self.valid() else "   inaccurate here"
+        return f"force {force} N   torque {torque} Nm{doubt}"
+
     def seen(self, lever: Array, axes: Array) -> Wrench:
         """The same load at another point in other axes.
 
@@ -325,10 +331,7 @@ class State(Value):
         if groups.pose is not None:
             rows["pose"] = str(self.pose)
         if groups.wrench is not None:
-            force, torque = (
-                " ".join(fixed(v, 2) for v in one) for one in (self.wrench.force, self.wrench.torque)
-            )
-            rows["wrench"] = f"force {force} N   torque {torque} Nm"
+            rows["wrench"] = str(self.wrench)
         if groups.motion is not None:
             rows["motion"] = str(groups.motion)
         if groups.safety is not None:
@@ -336,9 +339,9 @@ class State(Value):
         if groups.mode is not None:
             held = self.workpiece + (" (safety workpiece)" if self.safety_workpiece else "")
             attached = ", ".join(part for part in (self.tool, held) if part) or "no tool"
-            rows["control"] = f"{self.mode!r}, {attached}, motion frame {self.frame}"
+            rows["control"] = f"{self.mode}, {attached}, motion frame {self.frame}"
         if groups.io is not None:
-            rows["io"] = str(groups.io)
+            rows["io"] = str(groups.io).partition("\n")[2].replace("\n  ", "\n").strip()
         age = "" if self.clock is None else f", {fixed(self.age * 1e3, 1)} ms old"
         return lines(f"State at {self.stamp * 1e-9:.3f} s of the cabinet{age}", rows)
 

@@ -70,6 +70,12 @@ def _cells(text: str, cells: tuple[str, ...]) -> Cells:
     return found
 
 
+def listing(values: Iterable[float], unit: str = "") -> str:
+    """Numbers with their unit; one number if all are the same, "-" for NaN."""
+    texts = ["-" if math.isnan(value) else f"{float(value):g}" for value in values]
+    return f"{texts[0] if len(set(texts)) == 1 else ' '.join(texts)} {unit}".rstrip()
+
+
 def lines(title: str, rows: Mapping[str, str]) -> Listing:
     """A title and aligned rows below it; empty ones are left out."""
     shown = {name: text for name, text in rows.items() if text}

@@ -69,14 +69,7 @@ class _Carried(Value):
 
     def __str__(self) -> str:
         """Name, load data, frames and shapes, a line each."""
-        rows = {
-            "mass": f"{self.mass:g} kg",
-            "com": " ".join(f"{v * 1e3:.1f}" for v in self.com) + " mm from the flange",
-            "inertia": " ".join(f"{v:.4g}" for v in self.inertia) + " kg m² (xx yy zz xy xz yz)",
-        }
-        frames = {name: str(pose) for name, pose in self.frames}
-        shapes = {"shapes": "\n".join(map(str, self.shapes))}
-        return lines(f"{type(self).__name__} {self.name}", rows | frames | shapes)
+        return _text(self)
 
     @property
     def body(self) -> Body:
@@ -166,6 +159,10 @@ class KnownTool(Value):
     inertia: Array = field(default_factory=lambda: frozen(np.zeros(6)))
     shapes: tuple[Shape, ...] = ()
 
+    def __str__(self) -> str:
+        """Name, load data, frames and shapes, a line each."""
+        return _text(self)
+
     @property
     def body(self) -> Body:
         """Mass, centre of mass and inertia."""
@@ -175,6 +172,18 @@ class KnownTool(Value):
     def frame_names(self) -> tuple[str, ...]:
         """Names of its frames."""
         return tuple(name for name, _ in self.frames)
+
+
+def _text(tool: _Carried | KnownTool) -> str:
+    """Name, load data, frames and shapes, a line each."""
+    rows = {
+        "mass": f"{tool.mass:g} kg",
+        "com": " ".join(f"{v * 1e3:.1f}" for v in tool.com) + " mm from the flange",
+        "inertia": " ".join(f"{v:.4g}" for v in tool.inertia) + " kg m² (xx yy zz xy xz yz)",
+    }
+    frames = {name: str(pose) for name, pose in tool.frames}
+    shapes = {"shapes": "\n".join(map(str, tool.shapes))}
+    return lines(f"{type(tool).__name__} {tool.name}", rows | frames | shapes)
 
 
 def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejected:

@@ -43,6 +43,10 @@ class Io(Mapping[str, SignalValue]):
         """Number of signals."""
         return len(self._connection.signals)
 
+    def __repr__(self) -> str:
+        """Short form: the names of the signals; `print(arm.io.values_now)` shows their values."""
+        return f"<Io {', '.join(self) or 'without signals'}>"
+
     def __getitem__(self, name: str) -> SignalValue:
         """Value of a signal in the newest state: True or False, or a number.
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TypedDict
 
-import numpy.typing as npt
-
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConflict, ShapeError
@@ -17,7 +15,7 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop.client import Client, check_settings
 from heptarm.fri.loop.compiled import CompiledLaw
-from heptarm.fri.loop.law_interface import Memory
+from heptarm.fri.loop.law_interface import Given, Memory
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
@@ -47,6 +45,9 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "pose": ("pose", "e1"),
     "monitor": (),
 }
+#: What laws of a kind command; and the mode in which they are alone with the arm, where there is only one such mode.
+_BY_LAW = {"position": "q", "torque": "tau", "wrench": "wrench"}
+_FOR_LAWS: dict[str, Mode] = {"torque": JointImpedance(stiffness=0.0)}
 #: FRI's own ports.
 PORTS = range(30200, 30210)
 #: Default periods [ms].
@@ -63,8 +64,8 @@ class FriKeywords(TypedDict, total=False):
     multiplier: int
     mode: Mode | None
     law: Law | None
-    params: Mapping[str, npt.ArrayLike] | None
-    memory: Mapping[str, npt.ArrayLike] | None
+    params: Mapping[str, Given] | None
+    memory: Mapping[str, Given] | None
     collision: CollisionGuard | None
     policy: Policy | None
     limits: Limits | None
@@ -104,8 +105,8 @@ def request(
     multiplier: int = 1,
     mode: Mode | None = None,
     law: Law | None = None,
-    params: Mapping[str, npt.ArrayLike] | None = None,
-    memory: Mapping[str, npt.ArrayLike] | None = None,
+    params: Mapping[str, Given] | None = None,
+    memory: Mapping[str, Given] | None = None,
     collision: CollisionGuard | None = None,
     policy: Policy | None = None,
     limits: Limits | None = None,
@@ -130,6 +131,9 @@ def request(
     _check_kind(kind, connection.welcome.capabilities)
     period = (PERIOD_MONITOR if kind == "monitor" else PERIOD) if period_ms is None else period_ms
     _check_period(kind, period, multiplier)
+    if isinstance(law, CompiledLaw):
+        _check_law(kind, law)
+        mode = _FOR_LAWS.get(law.kind) if mode is None else mode
     check_mode(kind, mode)
     if kind == "monitor" and law is not None:
         raise ModeConflict(
@@ -210,6 +214,23 @@ def _check_kind(kind: str, capabilities: tuple[str, ...]) -> None:
         allowed=", ".join(offered),
         hint=hint,
     )
+
+
+def _check_law(kind: str, law: CompiledLaw) -> None:
+    """Refuse a law in a session that does not command what the law is written to command.
+
+    Raises:
+        ModeConflict: it would run without effect.
+    """
+    commanded = _BY_LAW.get(law.kind)
+    if commanded is not None and kind != "monitor" and commanded not in COMMANDS[kind]:
+        raise ModeConflict(
+            f'{law!r} commands {commanded}, which is not commanded in an FRI session of kind "{kind}"',
+            code=int(Code.MODE_CONFLICT),
+            parameter="law",
+            allowed=", ".join(COMMANDS[kind]),
+            hint=f'open the session with arm.fri("{law.kind}", law=...)',
+        )
 
 
 def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:

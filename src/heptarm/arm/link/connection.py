@@ -587,14 +587,25 @@ class Connection:
                 raise
 
     def stop(self, kind: wire.StopKind) -> None:
-        """Stop the arm; without a session if this one was lost, since the arm may still move."""
+        """Stop the arm; without a session if this one was lost, since the arm may still move.
+
+        Raises:
+            ConnectionLost: neither way reaches the cabinet.
+        """
         try:
             self.request(wire.Stop(kind=kind))
         except (ConnectionLost, Timeout):
             if self.closed.is_set():
                 raise
             _log.warning("the connection is lost; stopping the arm through a new connection")
-            halt(self._dial, kind, clock=self.clock, timeout=self.options.timeout)
+            try:
+                halt(self._dial, kind, clock=self.clock, timeout=self.options.timeout)
+            except ConnectFailed as error:
+                raise ConnectionLost(
+                    f"the arm could not be stopped: the connection is lost, and through a new one {error.text}",
+                    code=error.code,
+                    hint="press the emergency stop; a cabinet that runs stops the arm when it has lost its controller",
+                ) from error
 
     @contextlib.contextmanager
     def stopping_on_interrupt(self) -> Iterator[None]:

@@ -300,8 +300,15 @@ class States(Iterator[State]):
         a group lacks is NaN.
 
         Raises:
+            CommandRejected: the stream has no end.
             ConnectionLost: the link has ended, unless the stream ends with a motion.
         """
+        if self._end is None and self._until is None:
+            raise CommandRejected(
+                "a stream of states without an end never becomes arrays",
+                parameter="duration",
+                hint="give it an end: arm.states(duration=2.0), handle.states(), or arm.record(...)",
+            )
         taken = []
         while (sample := self._take()) is not None:
             taken.append(sample)
@@ -311,7 +318,7 @@ class States(Iterator[State]):
         """As `to_numpy`, as a `pandas.DataFrame` with a column per number, such as "q.A1", over `t`.
 
         Raises:
-            MissingExtra: pandas is not installed.
+            MissingExtra: pandas is not installed; others as `to_numpy`.
         """
         return to_frame(self.to_numpy(), require("pandas", extra="record").DataFrame)
 

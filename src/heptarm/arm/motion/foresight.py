@@ -15,15 +15,17 @@ import numpy as np
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
-from heptarm.arm.motion.program import resolved
-from heptarm.arm.translate.motions import items
+from heptarm.arm.motion.program import checked, resolved
 from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, TouchOnPath
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.reaction import Reaction
 from heptarm.values.frames import TOOL
+from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.motion import Hold, Motion, hold
 from heptarm.values.pose import quaternion
@@ -131,6 +133,9 @@ class Foresight:
         motions: Sequence[Motion],
         *,
         ceiling: float,
+        mode: Mode | None,
+        until: Condition | None,
+        then: Reaction,
         start: Array | None,
         step: float,
         check: CollisionCheck | None,
@@ -142,8 +147,7 @@ class Foresight:
         else:
             robot.check(start, "start")
         motions = resolved(self._connection, tooling, tuple(motions), start)
-        items(motions, robot, ceiling)
-        tooling.check(motions, None)
+        checked(self._connection, tooling, motions, ceiling=ceiling, mode=mode, until=until, then=then)
         program = self._planned(motions, start, ceiling, step)
         boundary = self.boundary()
         if boundary is not None:
@@ -168,6 +172,7 @@ class Foresight:
             tuple(_listed(motions, program)),
             () if used is None else tuple(_collisions(program, used)),
             used is not None,
+            until,
         )
 
     def _planned(

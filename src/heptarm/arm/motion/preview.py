@@ -15,6 +15,7 @@ from heptarm.io.plan_box import PlanOutline, hand_over
 from heptarm.record import plot as plots
 from heptarm.values.arrays import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision
+from heptarm.values.condition.condition import Condition
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.values.text import fixed, lines
@@ -97,6 +98,7 @@ class ProgramPreview(Value):
         motions: its motions, in their order.
         collisions: where bodies would touch, at most one for each motion; empty if none do, or if nothing checked it.
         is_checked: whether a collision model has checked it. That is no safety function.
+        until: break condition, which may end it earlier than planned; None: there is none.
     """
 
     robot: RobotModel
@@ -109,6 +111,7 @@ class ProgramPreview(Value):
     motions: tuple[PreviewedMotion, ...]
     collisions: tuple[ForeseenCollision, ...] = ()
     is_checked: bool = False
+    until: Condition | None = None
 
     @property
     def duration(self) -> float:
@@ -165,6 +168,7 @@ class ProgramPreview(Value):
         count = len(self.motions)
         rows = {
             "duration": f"{self.duration:.2f} s at full override",
+            "until": "" if self.until is None else f"{self.until}; it may end earlier",
             "motions": "\n".join(self._listed()),
             "path": f"{self.length:.3f} m of the tool frame, to {self.end}",
         }

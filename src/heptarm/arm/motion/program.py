@@ -175,6 +175,58 @@ def _text(value: object) -> str:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class CheckedProgram:
+    """Motions that were checked as the cabinet checks them, as far as this side can.
+
+    Attributes:
+        items: of the message.
+        until: for each node of the break condition the part of the condition that the user wrote.
+    """
+
+    items: tuple[wire.Item, ...]
+    until: tuple[Condition, ...]
+
+
+def checked(
+    connection: Connection,
+    tooling: Tooling,
+    motions: tuple[Motion, ...],
+    *,
+    ceiling: float,
+    mode: Mode | None,
+    until: Condition | None,
+    then: Reaction = "stay",
+) -> CheckedProgram:
+    """Check motions, their triggers, mode and break condition; nothing is sent.
+
+    Args:
+        connection: to the cabinet.
+        tooling: the attached tool and its frames.
+        motions: in their order.
+        ceiling: no joint is faster than this fraction of its maximum, (0, 1].
+        mode: control mode of all of them; None: position.
+        until: condition that ends them.
+        then: reaction when `until` has ended one of them.
+
+    Raises:
+        CommandRejected: one of them is not possible; LimitError and others name the value and the range.
+    """
+    message_of_mode = mode_message(mode)
+    tooling.check(motions, mode)
+    break_condition, parts = condition_message(until, connection.signals)
+    tooling.check_until(parts)
+    reaction = None if until is None else reaction_message(then)
+    made = items(
+        motions, connection.robot, ceiling, mode=message_of_mode, until=break_condition, reaction=reaction
+    )
+    made = tuple(
+        replace(item, triggers=_triggers(index, motion, connection, tooling))
+        for index, (item, motion) in enumerate(zip(made, motions, strict=True))
+    )
+    return CheckedProgram(made, parts)
+
+
 def send(
     connection: Connection,
     tooling: Tooling,
@@ -187,7 +239,7 @@ def send(
     then: Reaction = "stay",
     breaks: tuple[BreakRule, ...] = (),
 ) -> MotionHandle:
-    """Check motions and send them as one program; see `Arm.start`.
+    """Check motions and send them as one program; see `checked` and `Arm.start`.
 
     Args:
         connection: to the cabinet.
@@ -205,23 +257,15 @@ def send(
         raise ShapeError(
             f"when must be one of {allowed}, got {when!r}", parameter="when", value=when, allowed=allowed
         )
-    message_of_mode = mode_message(mode)
-    tooling.check(motions, mode)
-    break_condition, parts = condition_message(until, connection.signals)
-    tooling.check_until(parts)
-    reaction = None if until is None else reaction_message(then)
-    made = items(
-        motions, connection.robot, ceiling, mode=message_of_mode, until=break_condition, reaction=reaction
-    )
-    made = tuple(
-        replace(item, triggers=_triggers(index, motion, connection, tooling))
-        for index, (item, motion) in enumerate(zip(made, motions, strict=True))
-    )
-    message = wire.Run(items=made, when=_WHEN[when])
-    triggers = tuple(map(triggers_of, motions))
-    limit = _limit(connection, motions, ceiling)
+    found = checked(connection, tooling, motions, ceiling=ceiling, mode=mode, until=until, then=then)
     return MotionHandle.send(
-        connection, message, count=len(motions), limit=limit, until=parts, triggers=triggers, breaks=breaks
+        connection,
+        wire.Run(items=found.items, when=_WHEN[when]),
+        count=len(motions),
+        limit=_limit(connection, motions, ceiling),
+        until=found.until,
+        triggers=tuple(map(triggers_of, motions)),
+        breaks=breaks,
     )
 
 

@@ -340,6 +340,8 @@ _COSTS = 4096
 #: Time before a tick at which its thread wakes to warm up the caches [s].
 _EARLY = 200e-6
 _DOUBLES = np.dtype(np.float64)
+#: A point that is moved by less is not moved [m].
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,6 +365,7 @@ class ServoStats:
             the newest one was held, by the factor 0.
         slowdowns: for each reason so far, the smallest factor.
         held: targets that were not sent because bodies of `keep_clear_of` are near them; the last good one was.
+        clamped: targets that were sent changed: clipped to the limits of the joints, or moved into `arm.workspace`.
     """
 
     sent: int
@@ -380,6 +383,7 @@ class ServoStats:
     slowdown: Slowdown = FREE
     slowdowns: tuple[Slowdown, ...] = ()
     held: int = 0
+    clamped: int = 0
 
     def __str__(self) -> str:
         """A few aligned lines with units."""
@@ -390,6 +394,9 @@ class ServoStats:
             "age": f"{fixed(self.age_median * 1e3, 2)} ms median, {fixed(self.age_p99 * 1e3, 2)} ms p99 when applied",
             "refused": self.text,
             "held": f"{self.held} targets at the last good one" if self.held else "",
+            "clamped": f"{self.clamped} targets, to the limits of the joints or the workspace"
+            if self.clamped
+            else "",
             "slowed": "; ".join(map(str, self.slowdowns)),
         }
         return lines("Servo", rows)
@@ -452,7 +459,7 @@ class Servo(Block):
         self._result: Result | None = None
         self._began = self._due = self._last = 0
         self._first_sent = self._last_sent = 0
-        self._sent = self._late_ticks = 0
+        self._sent = self._late_ticks = self._clamped = 0
         self._warm_up_socket: WarmUpConnection | None = None
         self._last_target: tuple[type[wire.OneWay], tuple[float, ...]] | None = None
         self._costs: deque[int] = deque(maxlen=_COSTS)
@@ -514,6 +521,11 @@ class Servo(Block):
         self._active = False
         self._connection.leave_block(handle)
         self._result = handle.wait(timeout=_PATIENCE)
+
+    def __repr__(self) -> str:
+        """Short form."""
+        state = "not begun" if self._handle is None else "active" if self._active else "ended"
+        return f"<{type(self).__name__}, {state}, {self._sent} targets sent>"
 
     def _on_end(self, _: MotionHandle) -> None:
         self._active = False
@@ -606,7 +618,9 @@ class Servo(Block):
         seconds = (self._last_sent - self._first_sent) * 1e-9
         median, p99 = np.percentile(self._costs, [50, 99]) * 1e-9 if self._costs else (nan, nan)
         rate = (self._sent - 1) / seconds if self._sent > 1 and seconds > 0 else nan
-        stats = ServoStats(self._sent, rate, self._late_ticks, float(median), float(p99))
+        stats = ServoStats(
+            self._sent, rate, self._late_ticks, float(median), float(p99), clamped=self._clamped
+        )
         if self._clear is not None:
             clear = self._clear
             stats = replace(stats, slowdown=clear.slowdown, slowdowns=clear.slowdowns, held=clear.held)
@@ -661,11 +675,13 @@ class JointServo(Servo):
                 parameter="dq",
                 hint='leave dq out, or use engine="smart"',
             )
+        clamped = self._clamped
         sent, target = self._clip(q)
         if self._boundary is not None:
             sent = self._inside(sent, self._boundary)
-            if dq is not None and sent.tolist() != target:
-                dq = np.zeros(7)  # it comes to rest at the wall
+            if sent.tolist() != target:
+                self._clamped = clamped + 1
+                dq = None if dq is None else np.zeros(7)  # it comes to rest at the wall
             target = sent.tolist()
         velocity = [] if dq is None else array(dq, 7, "dq").tolist()
         if self._clear is not None and self._active:
@@ -689,6 +705,7 @@ class JointServo(Servo):
         if not (all(map(le, self._low, target)) and all(map(le, target, self._high))):  # nor is NaN
             sent = array(sent, 7, "q").clip(self._low, self._high)
             target = sent.tolist()
+            self._clamped += 1
         return sent, target
 
     def _inside(self, q: Array, boundary: Boundary) -> Array:
@@ -775,7 +792,9 @@ class PoseServo(Servo):
         inside = boundary.clamped_point(tool)
         if boundary.refuses and boundary.outside(tool) > TOLERANCE:
             raise boundary.refusal_of_point(tool, "the target", parameter="pose")
-        pose = Pose.of(pose.xyz + inside - tool, pose.quat)
+        if clamped := float(np.abs(inside - tool).max()) > _ROUNDING:
+            self._clamped += 1
+            pose = Pose.of(pose.xyz + inside - tool, pose.quat)
         if boundary.workspace.joints is not None:
             # the cabinet chooses the joint positions nearest to those before
             near = self.start.q if self._near is None else self._near
@@ -786,6 +805,7 @@ class PoseServo(Servo):
             if ((q < boundary.q_min - TOLERANCE) | (q > boundary.q_max + TOLERANCE)).any():
                 if boundary.refuses:
                     raise boundary.refusal(q, "the target", parameter="pose")
+                self._clamped += not clamped
                 return self._newest if self._newest is not None else self._here
             self._near = q
         self._newest = pose

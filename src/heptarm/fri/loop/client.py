@@ -28,7 +28,7 @@ from heptarm.fri.loop import process
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import Law
-from heptarm.fri.loop.law_interface import LiveMemory, flat
+from heptarm.fri.loop.law_interface import Given, LiveMemory, flat
 from heptarm.fri.loop.law_limit import LawWatch
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
@@ -58,8 +58,8 @@ def check_settings(
     pose_limits: PoseLimits | None,
     policy: Policy | None,
     law: Law | CompiledLaw | None,
-    params: Mapping[str, npt.ArrayLike] | None,
-    memory: Mapping[str, npt.ArrayLike] | None,
+    params: Mapping[str, Given] | None,
+    memory: Mapping[str, Given] | None,
     collision: CollisionGuard | None,
     history: int,
     realtime: bool,
@@ -153,8 +153,8 @@ class Client(Reader):
         pose_limits: PoseLimits | None = None,
         policy: Policy | None = None,
         law: Law | CompiledLaw | None = None,
-        params: Mapping[str, npt.ArrayLike] | None = None,
-        memory: Mapping[str, npt.ArrayLike] | None = None,
+        params: Mapping[str, Given] | None = None,
+        memory: Mapping[str, Given] | None = None,
         collision: CollisionGuard | None = None,
         history: int = 2048,
         realtime: bool = True,
@@ -185,7 +185,7 @@ class Client(Reader):
         self._limits = limits or Limits.of(arm)
         name = process.importable(law)
         sent = b"" if law is None or name else process.by_value(law)
-        known: Mapping[str, npt.ArrayLike] = law.parameters(arm) if isinstance(law, CompiledLaw) else {}
+        known: Mapping[str, Given] = law.parameters(arm) if isinstance(law, CompiledLaw) else {}
         values, schema = Params.flat({**known, **(params or {})})
         known = law.memory if isinstance(law, CompiledLaw) else {}
         remembered, kept = flat({**known, **(memory or {})}, "memory")

@@ -24,7 +24,7 @@ from heptarm.values.robot import RobotModel, robot
 
 #: Number of arguments of a law with memory: state, output, parameters, memory.
 WITH_MEMORY = 4
-_Numbers = Mapping[str, npt.ArrayLike]
+_Numbers = Mapping[str, interface.Given]
 
 
 def include_dir() -> Path:
@@ -41,9 +41,11 @@ class CompiledLaw:
 
     Attributes:
         success: what its function returns unless it has failed.
+        kind: of the sessions that it is written for: "torque", "position" or "wrench"; empty: not known.
     """
 
     success = 0
+    kind: str = ""
 
     def __init__(self, params: _Numbers | None = None, memory: _Numbers | None = None) -> None:
         _check(params, memory)

@@ -16,8 +16,11 @@ import numpy.typing as npt
 from heptarm.errors import ShapeError
 from heptarm.fri.protocol.messages import JOINTS
 from heptarm.values.arrays import finite_entries, numbers, shown
+from heptarm.values.pose import Pose
 
 Floats = npt.NDArray[np.float64]
+#: What a parameter or a member of the memory is given; a pose is x y z [m] and its quaternion x y z w, shape (7,).
+Given: TypeAlias = npt.ArrayLike | Pose
 #: Shape and first word of each member, by name.
 Schema: TypeAlias = Mapping[str, tuple[tuple[int, ...], int]]
 
@@ -57,13 +60,11 @@ COMMAND: tuple[tuple[str, tuple[int, ...], str, str], ...] = (
 )
 
 
-def flat(
-    values: Mapping[str, npt.ArrayLike], what: str
-) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
+def flat(values: Mapping[str, Given], what: str) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
     """Flatten numbers and arrays by name into words and their schema.
 
     Args:
-        values: numbers and arrays by name.
+        values: numbers, arrays and poses by name.
         what: "params" or "memory", for the text of an error.
 
     Raises:
@@ -79,11 +80,16 @@ def flat(
     schema: dict[str, tuple[tuple[int, ...], int]] = {}
     start = 0
     for name, value in values.items():
-        given = numbers(value, name, "a number or an array of numbers")
+        given = _numbers(value, name, "a number or an array of numbers")
         schema[name] = (given.shape, start)
         parts.append(given.reshape(-1))
         start += given.size
     return (np.concatenate(parts) if parts else np.zeros(0)), schema
+
+
+def _numbers(value: Given, name: str, wanted: str = "numbers") -> Floats:
+    """The numbers of a value, of any shape; raises as `numbers` does."""
+    return numbers(value.array if isinstance(value, Pose) else value, name, wanted)
 
 
 def size(schema: Schema) -> int:
@@ -129,11 +135,11 @@ class Fields:
     def _unknown(self, name: str) -> AttributeError:
         return AttributeError(f"no {self._what} {name!r}; there are {', '.join(self._schema) or 'none'}")
 
-    def _checked(self, values: Mapping[str, npt.ArrayLike]) -> list[tuple[int, Floats]]:
+    def _checked(self, values: Mapping[str, Given]) -> list[tuple[int, Floats]]:
         """First word and numbers of each value, checked."""
         found = []
         for name, value in values.items():
-            given = finite_entries(numbers(value, name), name, nan=True)
+            given = finite_entries(_numbers(value, name), name, nan=True)
             if name not in self._schema:
                 raise self._unknown(name)
             shape, start = self._schema[name]
@@ -164,11 +170,12 @@ class Memory(Fields):
     def __getattr__(self, name: str) -> Any:
         return self._view(name)
 
-    def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
+    def __setattr__(self, name: str, value: Given) -> None:
         if name not in self._schema:
             raise self._unknown(name)
         shape, start = self._schema[name]
-        self._values[start : start + prod(shape)].reshape(shape)[...] = value
+        given = value.array if isinstance(value, Pose) else value
+        self._values[start : start + prod(shape)].reshape(shape)[...] = given
 
 
 class LiveMemory(Fields):
@@ -214,10 +221,10 @@ class LiveMemory(Fields):
             raise self._unknown(name)
         return found[name]
 
-    def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
+    def __setattr__(self, name: str, value: Given) -> None:
         self.set(**{name: value})
 
-    def set(self, **values: npt.ArrayLike) -> None:
+    def set(self, **values: Given) -> None:
         """Write several values at once: the law sees all of them or none.
 
         Raises:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.law_interface import Fields, Schema, flat
+from heptarm.fri.loop.law_interface import Fields, Given, Schema, flat
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import (
     CommandMode,
@@ -276,11 +276,13 @@ class Params(Fields):
             part.flags.writeable = False
         return part
 
-    def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
+    def __setattr__(self, name: str, value: Given) -> None:
         self.set(**{name: value})
 
-    def set(self, **values: npt.ArrayLike) -> None:
+    def set(self, **values: Given) -> None:
         """Change several parameters at once: the law sees all changes or none.
+
+        A pose is its seven numbers: x y z [m] and quaternion x y z w.
 
         Raises:
             ShapeError: a value has a different shape than initially.
@@ -297,7 +299,7 @@ class Params(Fields):
         self._values[:] = values
 
     @staticmethod
-    def flat(values: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
+    def flat(values: Mapping[str, Given]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
         """Flatten a mapping into numbers and their schema.
 
         Raises:

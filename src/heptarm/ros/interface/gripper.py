@@ -7,6 +7,7 @@ import itertools
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeout
 from math import isfinite, nan
 from typing import Any
 
@@ -69,7 +70,7 @@ class _GripperGoal:
     def run(self, client: GoalClient) -> ActionResult:
         """Wait for the end switches. A cancelled goal waits no more; the valves keep their command."""
         while True:
-            with contextlib.suppress(TimeoutError, HeptarmError):
+            with contextlib.suppress(FutureTimeout):  # in Python 3.10 it is no TimeoutError
                 self._ended.exception(timeout=FEEDBACK_PERIOD)
             if self._ended.done():
                 break

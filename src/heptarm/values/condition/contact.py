@@ -12,6 +12,7 @@ from heptarm.errors import ShapeError
 from heptarm.values.arrays import Array, Value, array, frozen, shown
 from heptarm.values.pose import Pose
 from heptarm.values.result import Result
+from heptarm.values.text import degrees, fixed, lines
 
 _AXES = {
     sign + name: tuple((-1.0 if sign == "-" else 1.0) * (i == k) for k in range(3))
@@ -77,6 +78,19 @@ class Contact(Value):
     q: Array
     result: Result
     first: Contact | None = None
+
+    def __str__(self) -> str:
+        """A few lines: where it was, and how strong."""
+        rows = {
+            "pose": str(self.pose),
+            "force": f"{' '.join(fixed(one, 2) for one in self.force)} N",
+            "travel": f"{fixed(self.travel * 1e3, 2)} mm",
+            "joints": degrees(self.q),
+            "spread": ""
+            if self.first is None
+            else f"{fixed(self.spread * 1e3, 3)} mm from the first contact",
+        }
+        return lines("Contact", rows)
 
     @property
     def spread(self) -> float:

@@ -31,6 +31,11 @@ class SetOutput(Value):
         if not isinstance(self.value, bool):
             finite(self.value, "value")
 
+    def __str__(self) -> str:
+        """In words."""
+        value = ("on" if self.value else "off") if isinstance(self.value, bool) else f"{self.value:g}"
+        return f"set {self.signal} to {value}"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Notify(Value):
@@ -50,6 +55,10 @@ class Notify(Value):
                 parameter="label",
                 value=self.label,
             )
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"notify {self.label!r}"
 
 
 Action: TypeAlias = SetOutput | Notify
@@ -79,3 +88,7 @@ class Trigger(Value):
                 value=self.action,
                 hint="make one with heptarm.do, for example notify('half way') or set_output('LEDBlue', True)",
             )
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"{self.action} when {self.condition}"

@@ -26,6 +26,7 @@ from heptarm.values.mode.directions import (
     put,
     six,
 )
+from heptarm.values.text import listing
 
 #: Largest stiffness of a joint [Nm/rad].
 STIFFEST_JOINT = 5000.0
@@ -61,6 +62,10 @@ class JointImpedance(Value):
     def __init__(self, stiffness: npt.ArrayLike, *, damping: npt.ArrayLike = DAMPING) -> None:
         put(self, "stiffness", each(stiffness, 7, "stiffness", 0.0, STIFFEST_JOINT, "Nm/rad"))
         put(self, "damping", each(damping, 7, "damping", 0.0, 1.0))
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"joint impedance, {listing(self.stiffness, 'Nm/rad')}, damping {listing(self.damping)}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -140,6 +145,27 @@ class CartesianImpedance(Value):
                 parameter="max_force_stops",
                 hint="give a max_force for at least one direction",
             )
+
+    def __str__(self) -> str:
+        """One line: the springs, and what else is set."""
+        along, about = listing(self.stiffness[:3], "N/m"), listing(self.stiffness[3:], "Nm/rad")
+        parts = [
+            f"Cartesian impedance, {along}, {about}",
+            f"damping {listing(self.damping)}",
+            f"null space {self.nullspace_stiffness:g} Nm/rad",
+            f"frame {self.frame}",
+        ]
+        if self.additional_force.any():
+            parts.append(f"additional force {listing(self.additional_force, 'N, Nm')}")
+        limits = (
+            ("max_force", self.max_force, "N, Nm"),
+            ("max_velocity", self.max_velocity, "m/s, rad/s"),
+            ("max_deviation", self.max_deviation, "m, rad"),
+        )
+        parts += [
+            f"{name} {listing(values, unit)}" for name, values, unit in limits if not np.isnan(values).all()
+        ]
+        return ", ".join(parts)
 
 
 def _stiffness(value: Directional) -> Array:

@@ -24,10 +24,18 @@ __all__ = ["CartesianImpedance", "HandGuiding", "JointImpedance", "Mode", "Posit
 class Position(Value):
     """Stiff position control, the default."""
 
+    def __str__(self) -> str:
+        """One line."""
+        return "position control"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandGuiding(Value):
     """Guided by hand: what `state.mode` is while a `hand_guide` motion runs; no motion can be given it."""
+
+    def __str__(self) -> str:
+        """One line."""
+        return "hand guiding"
 
 
 Mode: TypeAlias = Position | JointImpedance | CartesianImpedance | SineImpedance

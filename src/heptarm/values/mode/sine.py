@@ -27,6 +27,7 @@ from heptarm.values.mode.directions import (
     six,
 )
 from heptarm.values.mode.impedance import NO_FORCE, STIFFEST, STRONGEST, UNLIMITED, CartesianImpedance
+from heptarm.values.text import listing
 
 #: Highest frequency of an overlaid force [Hz].
 FASTEST = 15.0
@@ -122,6 +123,17 @@ class SineImpedance(Value):
                 parameter="stay_active",
                 hint="give a total_time or a hold_time",
             )
+
+    def __str__(self) -> str:
+        """One line: the impedance, and the force overlaid on it."""
+        quantities = (
+            ("amplitude", self.amplitude, "N, Nm"),
+            ("frequency", self.frequency, "Hz"),
+            ("bias", self.bias, "N, Nm"),
+        )
+        parts = [f"{name} {listing(values, unit)}" for name, values, unit in quantities if values.any()]
+        parts += [] if isnan(self.duration) else [f"for {self.duration:g} s"]
+        return f"{self.base}; overlaid force: {', '.join(parts) or 'none'}"
 
     @property
     def duration(self) -> float:

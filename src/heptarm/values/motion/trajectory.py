@@ -13,6 +13,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.arrays import Array, Value, finite, finite_entries, frozen, instance, numbers, within
 from heptarm.values.motion.spline import JointSpline, spline_joints
+from heptarm.values.text import degrees, fixed, lines
 
 #: Marks a file as a trajectory, so that another .npz is not mistaken for one.
 FORMAT = "heptarm trajectory 1"
@@ -63,6 +64,17 @@ class Trajectory(Value):
         """Number of points."""
         return len(self.times)
 
+    def __str__(self) -> str:
+        """A few lines: how long it is, where it begins and ends, how fast it is."""
+        rows = {
+            "robot": self.robot,
+            "duration": f"{self.duration:.2f} s, {len(self)} points",
+            "begin": degrees(self.q[0]),
+            "end": degrees(self.q[-1]),
+            "fastest": f"{' '.join(fixed(one, 1) for one in np.degrees(self.fastest))} deg/s",
+        }
+        return lines("Trajectory", rows)
+
     @property
     def duration(self) -> float:
         """Time of the last point [s]."""
@@ -112,6 +124,8 @@ class Trajectory(Value):
                 hint="teach again, or give a smaller value of still",
             )
         begin, end = max(int(away[0]) - 1, 0), min(int(before[-1]) + 1, len(self) - 1)
+        if begin >= end:  # it creeps, so that the rest at its beginning ends behind that at its end
+            return self
         return Trajectory.of(self.times[begin : end + 1], self.q[begin : end + 1], robot=self.robot)
 
     def thinned(self, *, tolerance: float = 2e-3) -> Trajectory:
