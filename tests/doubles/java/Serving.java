@@ -120,7 +120,9 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
                 runtime.setDestination((JointPosition) destination);
             }
             return false;
-        } catch (IllegalStateException e) {
+        } catch (IllegalStateException e) { // of a destination
+            return true;
+        } catch (CommandInvalidException e) { // of a motion that has ended
             return true;
         }
     }

@@ -423,7 +423,8 @@ def _failure(error: str) -> str:
 def _described(error: Exception) -> str:
     """An error of the host in one line."""
     text = " ".join(str(error).split())
-    if text.startswith(type(error).__name__) and (said := without_java(text)):  # of Java, which names its class itself
+    # an exception of Java names its class itself
+    if text.startswith(type(error).__name__) and (said := without_java(text)):
         return said
     return text if isinstance(error, HeptarmError) else f"{type(error).__name__}: {text}"
 

@@ -150,7 +150,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         container.dispatch(() -> notified.onGoalReachedEvent("GOAL_REACHED", position, new int[] {0, 0}, target));
     }
 
-    /** Looks for reached goals while the motion runs: an application need not update the runtime to hear of them. */
+    /** Looks for reached goals while the motion runs: an application need not update the runtime to receive them. */
     private void watch(long nanos) {
         if (container.isFinished()) {
             watching.stop();
