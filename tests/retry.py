@@ -79,9 +79,11 @@ def starved(outcome: object) -> str:
 
 
 def silent(outcome: object) -> str:
-    """The cause of a program that the cabinet took for lost, since it heard nothing of it for its watchdog time."""
-    failed = isinstance(outcome, subprocess.CompletedProcess) and outcome.returncode != 0
-    return "a controller was silent" if failed and "its watchdog time is" in str(outcome.stderr) else ""  # type: ignore[union-attr]
+    """The cause of a program that lost its session since one side heard nothing of the other for the time allowed."""
+    if not isinstance(outcome, subprocess.CompletedProcess) or outcome.returncode == 0:
+        return ""
+    said = str(outcome.stderr)
+    return "one side was silent" if "its watchdog time is" in said or "nothing received from" in said else ""
 
 
 def busy(outcome: object) -> str:

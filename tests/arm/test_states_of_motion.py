@@ -172,5 +172,7 @@ def test_a_loop_of_4_ms_per_state_sees_the_peak_of_a_contact(arm: ha.Arm) -> Non
         thread.join(120.0)
     assert result.cause is ha.Cause.CONDITION
     assert peaks["slow"] == peaks["fast"] > 10.0
-    assert counts["slow"] == counts["fast"] and lost == {"fast": 0, "slow": 0}
+    assert (
+        counts["slow"] == counts["fast"] and lost["slow"] == lost["fast"]
+    )  # those that the cabinet sampled too late
     arm.move(ha.lin_rel(z=0.1, frame="base", speed_mps=0.3))

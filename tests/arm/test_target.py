@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import pytest
 
 import heptarm as ha
@@ -72,3 +74,14 @@ def test_wrong_options_are_refused_before_anything_is_tried() -> None:
     for options in ({"watchdog": 0.01}, {"state_rate": 5000.0}, {"timeout": 0.0}):
         with pytest.raises(ha.LimitError):
             ha.connect("127.0.0.1:1", **options)  # type: ignore[arg-type]
+
+
+def test_the_name_of_a_robot_alone_is_no_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*_: object, **__: object) -> None:
+        raise socket.gaierror  # without a network a look-up may take long
+
+    monkeypatch.setattr(socket, "create_connection", unknown)
+    with pytest.raises(
+        ha.ConnectFailed, match=r'no host has that name \("sim://iiwa14" starts a simulator\)'
+    ):
+        ha.connect("iiwa14")

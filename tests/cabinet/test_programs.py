@@ -122,6 +122,7 @@ def test_stop_does_not_wait_for_the_planning(peer: Peer) -> None:
 
 def test_stop_after_motion_lets_the_running_one_finish(peer: Peer) -> None:
     running, waiting = (peer.ask(run(ptp(q))) for q in (1.0, 2.0))
+    peer.wait_for(wire.MotionStarted, lambda event: event.id == running.id)
     peer.ask(wire.Stop(kind=wire.StopKind.AFTER_MOTION))
     assert finished(peer, waiting).cause == wire.Cause.STOPPED
     assert finished(peer, running).cause == wire.Cause.FINISHED

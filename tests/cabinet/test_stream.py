@@ -70,6 +70,24 @@ def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callabl
         assert stamps == sorted(set(stamps))
 
 
+def test_every_state_that_was_due_is_sent_or_reported_as_missed(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="slow") as slow, Peer(cabinet.port, name="quick") as quick:
+        slow.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 32768)
+        slow.send(wire.Subscribe(groups=wire.Groups(63), rate=1000.0), 1)
+        for _ in range(20):  # it does not read for a second
+            quick.ask(wire.Stop())
+            time.sleep(0.05)
+        slow.wait_for(wire.StatesMissed)
+        slow.read_for(0.5)
+        slow.ask(wire.Subscribe(groups=wire.Groups(0), rate=0.0))
+        stamps = [state.joints.stamp for state in slow.all(wire.State) if state.joints is not None]
+        missed = sum(event.count for event in slow.all(wire.StatesMissed))
+        assert missed > 0
+        # stamps are those of the readings, up to a period after a state was due
+        assert len(stamps) + missed == pytest.approx((stamps[-1] - stamps[0]) / 1e6 + 1.0, abs=3.0)
+
+
 def test_requests_without_reading_the_answers_end_that_client_only(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make(heartbeat=10.0)  # the other client sends nothing meanwhile
     with Peer(cabinet.port) as rude, Peer(cabinet.port) as other:

@@ -55,13 +55,26 @@ def rest(peer: Peer) -> None:
     peer.wait_for(wire.MotionFinished, lambda event: event.id == accepted.id)
 
 
-def fitted(peer: Peer) -> tuple[str, str, str]:
-    """Tool, workpiece and motion frame in the next state."""
+def mode(peer: Peer) -> wire.ModeState:
+    """Mode and tools in the next state."""
     since = len(peer.seen)
     peer.ask(wire.Subscribe(groups=wire.Groups.MODE, rate=100.0))
     state = peer.wait(lambda _, message: isinstance(message, wire.State), since=since)
     peer.ask(wire.Subscribe(groups=wire.Groups.NONE, rate=0.0))
-    return state.mode.tool, state.mode.workpiece, state.mode.frame
+    assert isinstance(state, wire.State) and state.mode is not None
+    return state.mode
+
+
+def fitted(peer: Peer) -> tuple[str, str, str]:
+    """Tool, workpiece and motion frame in the next state."""
+    seen = mode(peer)
+    return seen.tool, seen.workpiece, seen.frame
+
+
+def held(peer: Peer) -> tuple[str, str]:
+    """Workpiece and safety workpiece in the next state."""
+    seen = mode(peer)
+    return seen.workpiece, seen.safety_workpiece
 
 
 FAR = wire.Pose(xyz=(2.1, 0.0, 0.0), quat=(0.0, 0.0, 0.0, 1.0))
@@ -141,6 +154,47 @@ def test_tools_come_and_go_and_the_state_reports_it(peer: Peer) -> None:
     assert fitted(peer) == ("gripper", "", "tip")
     peer.ask(wire.AttachTool(name="", frame=""))
     assert fitted(peer) == ("", "", "flange")
+
+
+def test_a_safety_workpiece_is_one_until_it_or_its_tool_is_detached(peer: Peer) -> None:
+    counted = wire.AttachLoad(load=EMPTY, attached=True, safety=True)
+    assert held(peer) == ("", "")
+    assert isinstance(peer.ask(counted), wire.Accepted)
+    assert held(peer) == ("part", "part")
+    refused = peer.ask(wire.AttachLoad(load=replace(EMPTY, name="other"), attached=True))
+    assert refused.code == Code.BUSY and held(peer) == ("part", "part")
+    peer.ask(wire.AttachLoad(load=EMPTY, attached=False))
+    assert held(peer) == ("", "")
+    peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
+    assert held(peer) == ("part", "")
+    peer.ask(wire.AttachTool(name="", frame=""))
+    peer.ask(counted)
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    peer.ask(wire.AttachTool(name="gripper", frame=""))
+    assert held(peer) == ("", "")
+
+
+def test_a_robot_that_does_not_take_a_safety_workpiece_holds_none(peer: Peer) -> None:
+    heavy = replace(EMPTY, mass=12.0)
+    refused = peer.ask(wire.AttachLoad(load=heavy, attached=True, safety=True))
+    assert (refused.code, refused.parameter, refused.allowed) == (Code.OUT_OF_RANGE, "safety", "false")
+    assert held(peer) == ("", "")
+    assert isinstance(peer.ask(wire.AttachLoad(load=heavy, attached=True)), wire.Accepted)
+    assert held(peer) == ("part", "")
+
+
+def test_the_workpiece_of_a_template_is_attached_by_its_name(cabinet: FakeCabinet, peer: Peer) -> None:
+    block = replace(EMPTY, name="block", mass=0.0)
+    with Peer(cabinet.port) as other:
+        at = len(other.seen)
+        peer.ask(wire.AttachLoad(load=block, attached=True, template=True, safety=True))
+        event = other.wait(lambda _, message: isinstance(message, wire.ToolChanged), since=at)
+    assert event.workpiece is not None and event.workpiece.mass == 0.2  # the template's
+    assert held(peer) == ("block", "block")
+    peer.ask(wire.AttachLoad(load=block, attached=False))
+    refused = peer.ask(wire.AttachLoad(load=EMPTY, attached=True, template=True))
+    assert (refused.code, refused.parameter, refused.value) == (Code.UNKNOWN_NAME, "load.name", "part")
+    assert held(peer) == ("", "")
 
 
 def test_every_client_receives_what_is_attached(cabinet: FakeCabinet, peer: Peer) -> None:

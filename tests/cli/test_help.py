@@ -163,3 +163,21 @@ def test_a_view_without_viser_is_one_sentence() -> None:
 def test_a_simulator_that_starts_too_slowly_is_one_sentence() -> None:
     with pytest.raises(ConnectFailed, match=r"did not start within 0\.001 s \(check the load"):
         PrivateCabinet.start(parse_target("sim://iiwa14"), timeout=0.001)
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (("moove", "ptp"), "heptarm --help"),
+        (("move", "pttp"), "heptarm move --help"),
+        (("move", "ptp", "1"), "heptarm move ptp --help"),
+    ],
+)
+def test_a_wrong_word_names_the_help_that_there_is(words: tuple[str, ...], named: str) -> None:
+    done = run(*words)
+    assert done.returncode == 1 and done.stderr.endswith(f"({named})\n"), done.stderr
+
+
+def test_without_a_target_the_option_is_named() -> None:
+    done = run("state")
+    assert done.returncode == 1 and "--target sim://iiwa14" in done.stderr, done.stderr

@@ -145,8 +145,11 @@ def _limits(arm: _Arm) -> None:
     arm.set("configuration/setSpeedOverride", "SetSpeedOverride", override_reduction=1.0)
     arm.set("configuration/setEndpointFrame", "SetEndpointFrame", frame_id="iiwa_link_ee")
     arm.set("configuration/setEndpointFrame", "SetEndpointFrame", frame_id="")
-    arm.set("configuration/setWorkpiece", "SetWorkpiece", workpiece_id="")
-    arm.refused("configuration/setWorkpiece", "SetWorkpiece", "not supported", workpiece_id="Box")
+    for name in ("", "Box", "Box", ""):  # a template of the stage's project
+        arm.set("configuration/setWorkpiece", "SetWorkpiece", workpiece_id=name)
+    arm.refused(
+        "configuration/setWorkpiece", "SetWorkpiece", "no workpiece template Crate", workpiece_id="Crate"
+    )
     arm.refused(
         "configuration/setPTPJointLimits",
         "SetPTPJointSpeedLimits",

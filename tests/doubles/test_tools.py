@@ -81,6 +81,27 @@ def test_tools_as_a_sunrise_application_uses_them(tmp_path: Path, project: Path)
     assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]
 
 
+LIFTED = (
+    "a safety workpiece is lifted",
+    "what is too heavy is refused",
+    "and the one before is still counted",
+    "the stop comes with the motion",
+    "the arm is stopped",
+)
+
+
+def test_an_application_that_forgets_the_safety_workpiece_is_stopped(tmp_path: Path) -> None:
+    """It sets none while it holds one, or puts it down and leaves it set."""
+    _compile(HERE / "java" / "Lifting.java", tmp_path)
+    said = tmp_path / "said.txt"
+    for forgotten in ("to count", "to reset"):
+        data = (f"sample.file={said}", f"sample.forgotten={forgotten}")
+        done = _run("sample.Lifting", tmp_path, *data, more=("--safety", "12,5"))
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert said.read_text().splitlines() == [f"{one} = true" for one in LIFTED], forgotten
+        assert "external torque of A" in done.stderr
+
+
 def test_a_project_file_reports_its_tools_and_places(project: Path) -> None:
     found = templates.read_project(project)
     gripper, cube = found.templates

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import http.client
+import socket
 import urllib.parse
 from collections.abc import Iterator
 
 import pytest
 
+from heptarm.cli.panel import panel
+from heptarm.errors import HeptarmError
+from heptarm.panel.guard import free_port
 from tests.cli.running import sim
 
 pytest.importorskip("viser")
@@ -100,3 +104,32 @@ def test_the_websocket_needs_the_token_and_the_origin_as_well(view) -> None:
         assert refused.value.response.status_code == 403
     with connect(Cookie=cookie, Origin=f"http://{view.netloc}"):
         pass
+
+
+def test_the_first_free_port_is_taken() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as used:
+        port = used.getsockname()[1]
+        assert free_port("127.0.0.1", port) > port
+    assert free_port("localhost", 0) == 0
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "expected_text"),
+    [
+        ("127.0.0.1", 99999, r"port must be in \[0, 65535\], got 99999"),
+        ("127.0.0.1", -1, r"port must be in \[0, 65535\], got -1"),
+        (
+            "192.0.2.7",
+            8080,
+            r"host must be an address of this machine, got '192.0.2.7': .*127.0.0.1 for this machine",
+        ),
+    ],
+)
+def test_an_address_that_is_none_is_refused_before_anything_starts(
+    host: str, port: int, expected_text: str
+) -> None:
+    """The web server of the page would look for ever for a port on it."""
+    with pytest.raises(HeptarmError, match=expected_text):
+        free_port(host, port)
+    with pytest.raises(HeptarmError, match=expected_text):
+        panel(host=host, port=port)

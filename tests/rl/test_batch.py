@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.rl.sim import simulation
 from heptarm.rl.sim.batch import BatchReach
 from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import STRONG, Randomisation
@@ -109,6 +110,18 @@ def test_a_saved_simulation_goes_on_as_if_nothing_had_happened() -> None:
     other = BatchReach(task, envs=5, randomisation=STRONG, seed=9)
     other.load(saved)
     assert all((a == b).all() for a, b in zip(went_on, drive(other, 30, seed=1), strict=True))
+
+
+def test_finer_steps_of_the_engine_would_move_the_arms_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    paths = []
+    for steps in (simulation.SUBSTEPS, 64):
+        monkeypatch.setattr(simulation, "SUBSTEPS", steps)
+        arms = BatchReach(ReachTask(), envs=4, randomisation=STRONG, seed=3, starts="together")
+        drive(arms, 20)
+        paths.append([arms.step(np.full((4, 7), 0.8)).tip for _ in range(20)])
+    away = np.linalg.norm(np.subtract(*paths), axis=-1)
+    assert away.max() < 0.002
+    assert np.sqrt((away**2).mean()) < 0.0006
 
 
 def test_the_plant_moves_alike() -> None:

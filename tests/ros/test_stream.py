@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.stream import PointStream, is_streamed
 from heptarm.ros.trajectory.trajectory import KinematicState
 from heptarm.values.robot import robot
@@ -65,6 +66,89 @@ def test_jitter_of_arrivals_hardly_shows() -> None:
     assert np.abs(np.array(speeds[50:]) / 0.3 - 1.0).max() < 0.15
     smooth = np.convolve(speeds, np.ones(20) / 20.0, "valid")
     assert np.abs(smooth[50:] / 0.3 - 1.0).max() < 0.03
+
+
+def arrivals(rng: np.random.Generator, period: float, count: int, *, actual: float = 1.0) -> np.ndarray:
+    """Times at which messages arrive over a busy machine: late by milliseconds, and held up for up to 50 ms."""
+    sent = 10.0 + actual * period * np.arange(count)
+    came = sent + rng.exponential(0.001, count)
+    for begin in rng.uniform(sent[0], sent[-1], 12):
+        end = begin + rng.uniform(0.01, 0.05)
+        held = (sent > begin) & (sent < end)
+        came[held] = np.maximum(came[held], end)
+    return np.maximum.accumulate(came)
+
+
+@pytest.mark.parametrize("counts", ["numbers", "times"])
+@pytest.mark.parametrize("rate", [50, 100, 250])
+def test_late_and_lost_points_hardly_show_where_the_sender_counts(rate: int, counts: str) -> None:
+    """Of points that are held up together only the newest is seen."""
+    rng, period = np.random.default_rng(7), 1.0 / rate
+    stream, speed = PointStream(ARM), 0.3 * np.eye(7)[6]
+    came = arrivals(rng, period, 4 * rate)
+    seen = np.flatnonzero(np.diff(came, append=np.inf) > 1e-4)
+    assert len(seen) < len(came)
+    here, path, begin, speeds = HERE, None, 0.0, []
+    for k in seen:
+        if path is not None:
+            for t in np.arange(begin, came[k], 0.005):
+                speeds.append(path.sample(t - begin).dq[6])
+            here = path.sample(float(came[k] - begin))
+        published = 123.0 + k * period + rng.uniform(0.0, 0.2 * period)
+        sent = PublishInfo(number=int(k)) if counts == "numbers" else PublishInfo(time=published)
+        begin = float(came[k])
+        path = stream.add_point(
+            begin, begin, here, period, (k + 1) * period * speed, None, ACCELERATION, sent
+        )
+    ratios = np.array(speeds[240:]) / 0.3  # it has caught up with a stream that began with its full speed
+    assert np.abs(ratios - 1.0).max() < 0.05
+    assert np.abs(np.convolve(ratios, np.ones(40) / 40.0, "valid") - 1.0).max() < 0.02
+
+
+def test_a_pause_between_two_streams_is_no_jitter_of_the_second() -> None:
+    """It follows a swing from the rest in which the first one ended, as one that began after a long pause."""
+    period = 0.01
+
+    def followed(pause: float) -> np.ndarray:
+        stream, here, path, begin, found = PointStream(ARM), HERE, None, 0.0, []
+        last = 1.19 + pause
+        for k in range(200):
+            now = 1.0 + k * period if k < 20 else last + (k - 20) * period
+            if path is not None:
+                here = path.sample(min(now - begin, path.duration))
+                found.append(here.q[6])
+            place = 0.05 * (1.0 - np.cos(np.pi * period * max(0, k - 19))) * np.eye(7)[6]
+            begin = now
+            path = stream.add_point(now, now, here, period, place, None, ACCELERATION, PublishInfo(number=k))
+        return np.array(found[60:])  # it has caught up
+
+    np.testing.assert_allclose(followed(0.1), followed(2.0), atol=2e-4)
+    np.testing.assert_allclose(followed(0.25), followed(2.0), atol=2e-4)
+
+
+@pytest.mark.parametrize("actual", [0.8, 0.98, 1.0, 1.02, 1.25])
+def test_the_period_is_measured_where_the_declared_one_is_wrong(actual: float) -> None:
+    period, times = 0.01, SendTimes()
+    came = arrivals(np.random.default_rng(3), period, 400, actual=actual)
+    late = [
+        times.add(float(now), period, PublishInfo(number=k))[0] - (10.0 + actual * period * k)
+        for k, now in enumerate(came)
+    ]
+    assert np.abs(late[100:]).max() < 0.012
+    assert np.abs(np.diff(late[100:])).max() < 0.002
+
+
+def test_a_count_that_begins_again_begins_at_the_arrival() -> None:
+    times = SendTimes()
+    assert times.add(10.0, 0.02, PublishInfo(number=5)) == (10.0, 0.0)
+    assert times.add(10.04, 0.02, PublishInfo(number=6))[0] == pytest.approx(10.02, abs=0.011)
+    assert times.add(10.06, 0.02, PublishInfo(number=3)) == (10.06, 0.0)
+    assert times.add(10.5, 0.02, PublishInfo(number=4)) == pytest.approx((10.5, 0.42)), "the sender paused"
+    assert times.add(10.53, 0.02, None) == (10.53, 0.0)
+    assert times.add(10.55, 0.02, PublishInfo(time=3.0)) == (10.55, 0.0)
+    assert times.add(10.57, 0.02, PublishInfo(time=3.0)) == (10.57, 0.0), (
+        "a clock that stands still counts nothing"
+    )
 
 
 def test_a_joint_at_its_limit_stays_inside() -> None:

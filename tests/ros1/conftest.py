@@ -43,9 +43,12 @@ def stage() -> Iterator[Stage]:
 
 
 @pytest.fixture(scope="session")
-def spare() -> Iterator[Stage]:
-    """A second one, for tests that start a node of their own; they release its control."""
-    running = Stage()
+def spare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
+    """A second one, with a workpiece template, for tests that start a node of their own; they release its control."""
+    project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
+    box = '<workpieceTemplate class="" name="Box"><loadData mass="0.3"/></workpieceTemplate>'
+    project.write_text(f"<objectTemplates>{box}</objectTemplates>")
+    running = Stage("--project", str(project))
     yield running
     running.close()
 

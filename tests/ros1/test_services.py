@@ -119,6 +119,11 @@ def test_tools_come_and_go(client: Client) -> None:
     assert "gripper" in call("/heptarm/tools", GetNames).names
     ask("attach_workpiece", AttachWorkpiece, name="cube", mass=0.3, com=Point())
     ask("detach_workpiece")
+    safe = ask("attach_workpiece", AttachWorkpiece, name="cube", mass=0.3, com=Point(), safety=True)
+    assert "as the safety workpiece" in safe
+    ask("detach_workpiece")
+    answer = call("/heptarm/attach_workpiece", AttachWorkpiece, name="ball", known=True, com=Point())
+    assert not answer.success and "no workpiece template ball" in answer.message
     ask("detach_tool")
     answer = call("/heptarm/attach_tool", AttachTool, known=True, tcp=Pose(), **{**gripper, "name": "broom"})
     assert not answer.success and "broom" in answer.message

@@ -123,7 +123,7 @@ def test_a_node_that_the_system_stops_for_a_while(victim: Client, tough: NodePro
     sent = victim.send(step(victim, time=9.0, size=6.0))
     under_way(victim, here)
     tough.process.send_signal(signal.SIGSTOP)
-    time.sleep(1.5)
+    time.sleep(3.0)  # a busy cabinet forgives as long as it was late itself
     tough.process.send_signal(signal.SIGCONT)
     ended = victim.result(sent)
     assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended

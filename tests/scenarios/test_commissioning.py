@@ -33,6 +33,7 @@ READ = {
     "drives.thresholds",
     "drives.message",
     "drives.med_torques",
+    "safety.counted_load",
     "fri.limit_text",
 }
 

@@ -27,12 +27,13 @@ SPEED = 4.0
 SEED = 7
 
 
-#: FRI sessions, which need answers within milliseconds of this machine's time; and streams of velocities, which a
-#: thread integrates by this machine's clock: if it is late, the arm moves later, and in a fast simulator farther.
+#: FRI sessions, which need answers within milliseconds of this machine's time; streams of velocities, which a thread
+#: integrates by this machine's clock; a hand that lets go at a place. If this machine is late, the arm moves later, and
+#: in a fast simulator farther.
 IN_REAL_TIME = [
     one.name
     for one in testing.scenarios()
-    if one.group == "laws" or one.name in ("servo.joint_velocities", "servo.twist")
+    if one.group == "laws" or one.name in ("servo.joint_velocities", "servo.twist", "guiding.precise")
 ]
 #: All others: the cabinet runs faster than time.
 FAST = [one.name for one in testing.scenarios() if one.name not in IN_REAL_TIME]

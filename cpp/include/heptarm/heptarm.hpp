@@ -1802,6 +1802,7 @@ struct ModeState {
     std::string tool;  ///< attached tool; empty: none
     std::string workpiece;  ///< attached workpiece; empty: none
     std::string frame;  ///< default motion frame: a frame of the tool, or flange
+    std::string safety_workpiece;  ///< workpiece whose load the safety functions of the cabinet count; empty: none
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1810,6 +1811,7 @@ struct ModeState {
         visit(self.tool, "tool");
         visit(self.workpiece, "workpiece");
         visit(self.frame, "frame");
+        visit(self.safety_workpiece, "safety_workpiece");
     }
 };
 
@@ -2177,11 +2179,15 @@ struct AttachLoad {
     static constexpr const char* NAME = "AttachLoad";
     ToolInfo load;
     bool attached = false;  ///< false: detach the workpiece of that name
+    bool template_ = false;  ///< true: the workpiece of the project's template of that name; the rest of load does not matter
+    bool safety = false;  ///< true: as the safety workpiece: the safety functions of the cabinet count its load, too, until it is detached
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
         visit(self.load, "load");
         visit(self.attached, "attached");
+        visit(self.template_, "template");
+        visit(self.safety, "safety");
     }
 };
 
@@ -2712,6 +2718,18 @@ struct SegmentReached {
     }
 };
 
+/// States that were due and are not sent: the cabinet sampled late, or the client reads too slowly. They were due before the states that follow.
+struct StatesMissed {
+    static constexpr std::uint16_t TYPE = 108;
+    static constexpr const char* NAME = "StatesMissed";
+    std::uint32_t count = 0;  ///< since the last report
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.count, "count");
+    }
+};
+
 /// The operator has answered a dialog.
 struct DialogClosed {
     static constexpr std::uint16_t TYPE = 107;
@@ -2782,7 +2800,7 @@ struct State {
 };
 
 /// Any message.
-using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, AskOperator, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, ToolChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, DialogClosed, State>;
+using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, AskOperator, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, ToolChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, StatesMissed, DialogClosed, State>;
 
 /// The message with this id in a body. Throws DecodeError.
 inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {
@@ -2844,6 +2862,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case Notice::TYPE: return decode<Notice>(data, size);
         case ConditionFired::TYPE: return decode<ConditionFired>(data, size);
         case SegmentReached::TYPE: return decode<SegmentReached>(data, size);
+        case StatesMissed::TYPE: return decode<StatesMissed>(data, size);
         case DialogClosed::TYPE: return decode<DialogClosed>(data, size);
         case State::TYPE: return decode<State>(data, size);
         default: throw DecodeError("unknown message id " + std::to_string(type));

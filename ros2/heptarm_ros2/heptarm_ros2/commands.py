@@ -15,6 +15,8 @@ from heptarm.ros.interface.messages import class_of
 from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
+from heptarm.ros.trajectory.send_times import PublishInfo
+from heptarm_ros2.topic_thread import LeftAlone, TopicThread
 
 
 class Commands:
@@ -28,8 +30,8 @@ class Commands:
             node.get_logger().warning(
                 f"{package} is not installed: topics and services with its types are left out"
             )
-        at_once = ReentrantCallbackGroup()
-        one_topic, one_service = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        at_once, one_service = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        one_topic = LeftAlone()
         self._subscriptions = [
             node.create_subscription(
                 class_of(row.type, "msg"),
@@ -41,6 +43,9 @@ class Commands:
             )
             for row in table.topics
         ]
+        self._thread = TopicThread(
+            node, [one for one in self._subscriptions if one.callback_group is one_topic]
+        )
         self._services = [
             node.create_service(
                 class_of(row.type, "srv"),
@@ -51,17 +56,22 @@ class Commands:
             for row in table.services
         ]
 
+    def end(self) -> None:
+        """Handle no more messages; returns when the last one is handled."""
+        self._thread.end()
+
     def destroy(self) -> None:
         """Destroy subscriptions and services."""
+        self.end()
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         for service in self._services:
             self._node.destroy_service(service)
 
-    def _on_message(self, row: Topic) -> Callable[[Any], None]:
-        def callback(message: Any) -> None:
+    def _on_message(self, row: Topic) -> Callable[[Any, Any], None]:
+        def callback(message: Any, info: Any) -> None:
             try:
-                self._topics.handle(row, message)
+                self._topics.handle(row, message, _sent(info))
             except HeptarmError as error:
                 self._node.get_logger().warning(f"{row.name}: {error}", throttle_duration_sec=1.0)
 
@@ -72,3 +82,8 @@ class Commands:
             return self._requests.answer(row, request).fill(response)
 
         return callback
+
+
+def _sent(info: Any) -> PublishInfo:
+    """What the middleware knows of the sending of a message: not all number them."""
+    return PublishInfo(number=info.get("publication_sequence_number"), time=1e-9 * info["source_timestamp"])

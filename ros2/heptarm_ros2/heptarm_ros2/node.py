@@ -191,6 +191,8 @@ class HeptarmNode(LifecycleNode):
     def close(self) -> None:
         """Leave the arm at rest, without logging: ROS may be shut down already."""
         self._ending.set()
+        if self._commands is not None:
+            self._commands.end()
         if self.driver is not None:
             self.driver.close()
             self.driver = None

@@ -29,7 +29,14 @@ from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityS
 from heptarm.arm.motion.preview import ProgramPreview
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
-from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
+from heptarm.arm.motion.servo import (
+    JointServo,
+    PoseServo,
+    ServoKeywords,
+    ServoRequest,
+    StreamTerms,
+    documented,
+)
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
@@ -688,57 +695,30 @@ class Arm:
         self._tooling.check_mode(request.mode)
         ends, parts = condition_message(self._until(request.until, breaks), self._connection.signals)
         self._tooling.check_until(parts)
-        message, boundary = replace(message, until=ends), self._foresight.boundary()
-        clear = None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of)
-        period, watchdog = request.period, request.watchdog_time
-        if kind == "joint":
-            return JointServo(
-                self._connection,
-                message,
-                period=period,
-                watchdog=watchdog,
-                boundary=boundary,
-                clear=clear,
-                until=parts,
-                breaks=breaks,
-            )
-        moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(
-                self._connection,
-                message,
-                period=period,
-                watchdog=watchdog,
-                moving=moving,
-                boundary=boundary,
-                clear=clear,
-                until=parts,
-                breaks=breaks,
-            )
-        speed, acceleration = request.joint_fractions(self._speed)
-        limits = JogLimits(speed, acceleration, request.silence, boundary, clear)
-        if kind == "velocity":
-            return VelocityServo(
-                self._connection,
-                message,
-                limits,
-                period=period,
-                watchdog=watchdog,
-                until=parts,
-                breaks=breaks,
-            )
-        along, change, turn, spin = request.line_limits()
-        return TwistServo(
-            self._connection,
-            message,
-            limits,
-            twist=TwistLimits(along, change, turn, spin),
-            moving=moving,
-            axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
-            period=period,
-            watchdog=watchdog,
+        terms = StreamTerms(
+            replace(message, until=ends),
+            period=request.period,
+            watchdog=request.watchdog_time,
+            boundary=self._foresight.boundary(),
+            clear=None if request.keep_clear_of is None else self._tooling.loaded(request.keep_clear_of),
             until=parts,
             breaks=breaks,
+        )
+        if kind == "joint":
+            return JointServo(self._connection, terms)
+        moving = self._tooling.on_flange(request.moving)
+        if kind in ("pose", "lin"):
+            return PoseServo(self._connection, terms, moving=moving)
+        limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
+        if kind == "velocity":
+            return VelocityServo(self._connection, terms, limits)
+        return TwistServo(
+            self._connection,
+            terms,
+            limits,
+            twist=TwistLimits(*request.line_limits()),
+            moving=moving,
+            axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 
     def fri(
@@ -892,16 +872,27 @@ class Arm:
         """
         self._tooling.detach()
 
-    def attach_workpiece(self, workpiece: Workpiece) -> None:
+    def attach_workpiece(self, workpiece: Workpiece | str, *, safety: bool = False) -> None:
         """Tell the cabinet what the tool holds, at the motion frame; the arm has to be at rest.
 
+        Args:
+            workpiece: the workpiece, or the name of a workpiece template of the project.
+            safety: make it the safety workpiece: the safety functions of the cabinet, which monitor external forces
+                by themselves, count its load until it is detached. Otherwise they count none, and may take the weight
+                of a heavy workpiece for a collision. See `State.safety_workpiece`.
+
         Raises:
+            CommandRejected: the project has no template of that name, or the cabinet does not take it as the safety
+                workpiece; then nothing is attached.
             ModeConflict: a motion runs, or a workpiece is attached already.
         """
-        self._tooling.attach_workpiece(workpiece)
+        self._tooling.attach_workpiece(workpiece, safety=safety)
 
-    def detach_workpiece(self, workpiece: Workpiece) -> None:
-        """Tell the cabinet that the tool does not hold the workpiece any more.
+    def detach_workpiece(self, workpiece: Workpiece | str) -> None:
+        """Tell the cabinet that the tool does not hold the workpiece any more; then there is no safety workpiece.
+
+        Args:
+            workpiece: the workpiece, or its name.
 
         Raises:
             CommandRejected: the tool does not hold it.
@@ -918,9 +909,9 @@ class Arm:
             yield
 
     @contextlib.contextmanager
-    def attached(self, workpiece: Workpiece) -> Iterator[None]:
+    def attached(self, workpiece: Workpiece | str, *, safety: bool = False) -> Iterator[None]:
         """A block in which the tool holds a workpiece. See `attach_workpiece`."""
-        self.attach_workpiece(workpiece)
+        self.attach_workpiece(workpiece, safety=safety)
         with self._undoing(lambda: self.detach_workpiece(workpiece)):
             yield
 

@@ -16,13 +16,14 @@ from heptarm.arm.link.state_stream import GROUPS, groups_of
 from heptarm.arm.link.target import parse_target, target_from_env
 from heptarm.arm.translate.text import printable
 from heptarm.arm.watchdog import CONNECTION
-from heptarm.errors import ShapeError
+from heptarm.errors import ConnectFailed, ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.keys import find_key
 from heptarm.io.targets import SavedTarget
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import finite, flag, instance, within, word
+from heptarm.values.robot import ROBOTS
 from heptarm.wire import messages as wire
 
 _log = logging.getLogger("heptarm.arm")
@@ -128,7 +129,12 @@ def connect(
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)
 
     def dial() -> Transport:
-        return tcp.connect(host, port, timeout=options.timeout)
+        try:
+            return tcp.connect(host, port, timeout=options.timeout)
+        except ConnectFailed as error:
+            if host not in ROBOTS:
+                raise
+            raise ConnectFailed(error.text, hint=f'"sim://{host}" starts a simulator') from error
 
     try:
         arm = Arm(Connection(dial, options, clock=RealClock(), cabinet=private))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -44,6 +45,7 @@ PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_l
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
+_GROUPS = {"move": MOVES, "plan": PLANS, "key": KEYS, "targets": TARGETS, "rl": LEARNING}
 
 app = App(
     name="heptarm",
@@ -127,8 +129,15 @@ def main() -> None:
 
 
 def _help() -> str:
-    """What to type for the help of the command on the command line."""
-    return " ".join(["heptarm", *_words[:1], "--help"])
+    """What to type for the help of the command on the command line, as far as there is one."""
+    known = ["heptarm"]
+    below: Mapping[str, object] = {**COMMANDS, **_GROUPS}
+    for word in _words:
+        if word not in below:
+            break
+        known.append(word)
+        below = _GROUPS.get(word, {})
+    return " ".join([*known, "--help"])
 
 
 def _fail(sentence: str) -> NoReturn:

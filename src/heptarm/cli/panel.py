@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from heptarm.cli.options import NO_TARGETS, CommandTargets, Json
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
-from heptarm.panel.guard import is_local
+from heptarm.panel.guard import free_port, is_local
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import STATE_RATE, Panel, PanelOptions, model_of
 
@@ -71,6 +71,7 @@ def panel(
             parameter="read-only",
             hint="give one of them",
         )
+    free_port(host, port)  # before a simulator starts
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
         models: list[PanelArm] = []

@@ -99,6 +99,14 @@ def sim(
             "Default: the controller's load data."
         ),
     ] = "",
+    safety: Annotated[
+        str,
+        Parameter(
+            help="TORQUE or TORQUE,MASS: limits of safety functions, which count the load of tool and safety "
+            "workpiece: external torque of an axis while the arm moves [Nm], mass of a safety workpiece [kg]. "
+            "Default: none."
+        ),
+    ] = "",
     sensors: Annotated[
         str,
         Parameter(
@@ -290,6 +298,7 @@ def sim(
                 real_time=real_time,
                 fault=fault,
                 payload=payload,
+                safety=safety,
                 sensors=sensors,
                 scene=scene,
                 project=project,
@@ -319,6 +328,7 @@ def sim(
             "--meshes": bool(meshes),
             "--key-file": key_file is not None,
             "--project": project is not None,
+            "--safety": bool(safety),
             "--scene": bool(scene),
             "--count": count != 1,
             "--real-time": real_time != "fri",
@@ -366,6 +376,7 @@ def sim(
         real_time=real_time,
         fault=fault,
         payload=payload,
+        safety=safety,
         sensors=sensors,
         scene=scene,
         project=project,

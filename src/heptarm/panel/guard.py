@@ -8,6 +8,7 @@ if it has one (against other pages), and it must bring the token, in the URL or 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hmac
 import http
 import ipaddress
@@ -18,8 +19,10 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from heptarm.errors import HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.values.arrays import integer
 
+LAST_PORT = 65535
 #: Names under which a browser on this machine reaches a panel that listens on an address of it.
 _LOCAL = ("127.0.0.1", "localhost", "[::1]")
 #: A remote address, to look up which own one is used for it; nothing is sent to it (RFC 5737, TEST-NET-1).
@@ -47,6 +50,42 @@ def _own_address() -> str:
             return str(probe.getsockname()[0])
         except OSError:
             return socket.gethostname()
+
+
+def free_port(host: str, port: int) -> int:
+    """The first free port from a port on; 0: any.
+
+    Args:
+        host: address of this machine to listen on.
+        port: TCP port, [0, 65535].
+
+    Raises:
+        LimitError: there is no such port.
+        CommandRejected: this machine does not have that address, or no port from there on is free.
+    """
+    integer(port, "port", 0, LAST_PORT)
+    for one in range(port, LAST_PORT + 1):
+        try:
+            with socket.create_server((host, one), family=_family(host)):
+                return one if port else 0
+        except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise CommandRejected(
+                    f"host must be an address of this machine, got {host!r}: {str(error.strerror).partition(' (')[0]}",
+                    parameter="host",
+                    value=host,
+                    hint="127.0.0.1 for this machine alone, 0.0.0.0 for the whole network",
+                ) from None
+    raise CommandRejected(
+        f"no port from {port} to {LAST_PORT} is free on {host}",
+        parameter="port",
+        value=port,
+        hint="0 takes a free one",
+    )
+
+
+def _family(host: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
 class PageGuard:

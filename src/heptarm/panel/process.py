@@ -30,10 +30,9 @@ from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.plan_box import PlanBox
 from heptarm.panel import texts
-from heptarm.panel.guard import PageGuard, is_local
+from heptarm.panel.guard import PageGuard, free_port, is_local
 from heptarm.panel.model import PanelArm, groups_for
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
-from heptarm.values.arrays import integer
 from heptarm.wire.messages import StopKind
 
 if TYPE_CHECKING:
@@ -99,7 +98,8 @@ class Panel:
 
     Raises:
         MissingExtra: viser is not installed.
-        CommandRejected: the scene or the meshes cannot be drawn.
+        CommandRejected: the scene or the meshes cannot be drawn, or there is no such address to listen on.
+        LimitError: there is no such port.
     """
 
     def __init__(self, arms: Sequence[PanelArm], options: PanelOptions) -> None:
@@ -113,11 +113,11 @@ class Panel:
             meshes = ArmMeshes.of(options.meshes)
         except ValueError as error:
             raise CommandRejected(str(error), parameter="meshes", value=options.meshes) from None
-        integer(options.port, "port", 0, 65535)
+        port = free_port(options.host, options.port)  # viser would wait for ever for an address that is none
         guard = PageGuard(options.host)
         # viser's own lines have a URL without the token, which lets nobody in
         with contextlib.redirect_stdout(io.StringIO()), guard.installed():
-            server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
+            server = viser.ViserServer(host=options.host, port=port, verbose=False)
         self.server = server
         self._arms = tuple(arms)
         self._ended = threading.Event()

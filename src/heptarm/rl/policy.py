@@ -153,7 +153,7 @@ class Policy:
 
 
 def shipped(*, feature: bool = False) -> Policy:
-    """The policy that is part of heptarm, for an iiwa 14, trained by `heptarm rl train --seed 0`.
+    """The policy that is part of heptarm, for an iiwa 14, trained by `heptarm rl train --seed 0` of an earlier version.
 
     Args:
         feature: the one that also sees the way to the target (`--feature`).

@@ -108,6 +108,15 @@ class SimulatorOptions:
             '"off": drives never trip, whatever speed, torque or position', metavar="on|off", in_target=True
         ),
     )
+    safety: str = field(
+        default="",
+        metadata=_about(
+            "limits of safety functions, with the load of tool and safety workpiece: external torque of an axis while "
+            "the arm moves [Nm], mass of a safety workpiece [kg]",
+            metavar="TORQUE[,MASS]",
+            in_target=True,
+        ),
+    )
     sensors: str = field(
         default="ideal",
         metadata=_about(

@@ -255,6 +255,7 @@ class Control(Value):
         tool: name of the attached tool; empty: none.
         workpiece: name of the attached workpiece; empty: none.
         frame: the motion frame unless a motion names another: a frame of the tool, or "flange".
+        safety_workpiece: name of the workpiece whose load the safety functions of the cabinet count; empty: none.
     """
 
     stamp: int
@@ -262,6 +263,7 @@ class Control(Value):
     tool: str = ""
     workpiece: str = ""
     frame: str = "flange"
+    safety_workpiece: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -332,7 +334,8 @@ class State(Value):
         if groups.safety is not None:
             rows["safety"] = str(groups.safety)
         if groups.mode is not None:
-            attached = ", ".join(part for part in (self.tool, self.workpiece) if part) or "no tool"
+            held = self.workpiece + (" (safety workpiece)" if self.safety_workpiece else "")
+            attached = ", ".join(part for part in (self.tool, held) if part) or "no tool"
             rows["control"] = f"{self.mode!r}, {attached}, motion frame {self.frame}"
         if groups.io is not None:
             rows["io"] = str(groups.io)
@@ -437,6 +440,11 @@ class State(Value):
     def workpiece(self) -> str:
         """Name of the attached workpiece; empty: none."""
         return _of(self.groups.mode, "mode").workpiece
+
+    @property
+    def safety_workpiece(self) -> str:
+        """Name of the workpiece whose load the safety functions of the cabinet count; empty: none."""
+        return _of(self.groups.mode, "mode").safety_workpiece
 
     @property
     def frame(self) -> str:

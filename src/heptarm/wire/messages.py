@@ -2350,6 +2350,7 @@ class ModeState:
     tool: str = ""
     workpiece: str = ""
     frame: str = ""
+    safety_workpiece: str = ""
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ModeState_0.pack(self.stamp))
@@ -2357,6 +2358,7 @@ class ModeState:
         out.append(codec.put_str(self.tool))
         out.append(codec.put_str(self.workpiece))
         out.append(codec.put_str(self.frame))
+        out.append(codec.put_str(self.safety_workpiece))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ModeState, int]:
@@ -2367,7 +2369,8 @@ class ModeState:
         tool, pos = codec.read_str(data, pos)
         workpiece, pos = codec.read_str(data, pos)
         frame, pos = codec.read_str(data, pos)
-        return cls(stamp=stamp, mode=mode, tool=tool, workpiece=workpiece, frame=frame), pos
+        safety_workpiece, pos = codec.read_str(data, pos)
+        return cls(stamp=stamp, mode=mode, tool=tool, workpiece=workpiece, frame=frame, safety_workpiece=safety_workpiece), pos
 
     def _check(self, path: str) -> None:
         self.mode._check(path + "mode.")
@@ -3646,7 +3649,7 @@ class AttachTool:
         self._check("")
 
 
-_AttachLoad_0 = Struct(">B")
+_AttachLoad_0 = Struct(">BBB")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3660,10 +3663,12 @@ class AttachLoad:
 
     load: ToolInfo
     attached: bool
+    template: bool = False
+    safety: bool = False
 
     def _write(self, out: list[bytes]) -> None:
         self.load._write(out)
-        out.append(_AttachLoad_0.pack(self.attached))
+        out.append(_AttachLoad_0.pack(self.attached, self.template, self.safety))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[AttachLoad, int]:
@@ -3671,7 +3676,9 @@ class AttachLoad:
         v = codec.unpack(_AttachLoad_0, data, pos)
         pos += _AttachLoad_0.size
         attached = codec.read_bool(v[0])
-        return cls(load=load, attached=attached), pos
+        template = codec.read_bool(v[1])
+        safety = codec.read_bool(v[2])
+        return cls(load=load, attached=attached, template=template, safety=safety), pos
 
     def _check(self, path: str) -> None:
         self.load._check(path + "load.")
@@ -5351,6 +5358,51 @@ class SegmentReached:
         self._check("")
 
 
+_StatesMissed_0 = Struct(">I")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatesMissed:
+    """States that were due and are not sent: the cabinet sampled late, or the client reads too slowly. They were due before the states that follow."""
+
+    TYPE: ClassVar[int] = 108
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    count: int
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_StatesMissed_0.pack(self.count))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[StatesMissed, int]:
+        v = codec.unpack(_StatesMissed_0, data, pos)
+        pos += _StatesMissed_0.size
+        count = v[0]
+        return cls(count=count), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> StatesMissed:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "StatesMissed")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _DialogClosed_0 = Struct(">Ii")
 
 
@@ -5525,7 +5577,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | DialogClosed | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | StatesMissed | DialogClosed | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5587,6 +5639,7 @@ MESSAGES: dict[int, type[Message]] = {
     103: Notice,
     104: ConditionFired,
     105: SegmentReached,
+    108: StatesMissed,
     107: DialogClosed,
     112: State,
 }

@@ -148,7 +148,7 @@ public class Alone extends RoboticsAPIApplication {
     }
 
     private void tools() throws Exception {
-        say("no tool is attached", Arrays.asList(arm.attached()).equals(Arrays.asList("", "", "flange")));
+        say("no tool is attached", Arrays.asList(arm.attached()).equals(Arrays.asList("", "", "flange", "")));
         say("one that nobody knows", code(() -> arm.attach("hammer")) == Code.UNKNOWN_NAME);
         arm.define(GRIPPER);
         double before = arm.pose().xyz[2];

@@ -12,6 +12,7 @@ from heptarm.ros.interface.messages import class_of
 from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm_ros1 import convert
 
 
@@ -39,11 +40,17 @@ def _subscriber(topics: TopicDispatcher, row: Topic) -> rospy.Subscriber:
 
     def callback(message: Any) -> None:
         try:
-            topics.handle(row, message)
+            topics.handle(row, message, _sent(message))
         except HeptarmError as error:
             rospy.logwarn_throttle(1.0, f"{name}: {error}")
 
     return rospy.Subscriber(name, class_of(row.type, "msg"), callback, queue_size=1, tcp_nodelay=True)
+
+
+def _sent(message: Any) -> PublishInfo:
+    """As which message of its publisher it was published: ROS 1 numbers those with a header."""
+    header = getattr(message, "header", None)
+    return PublishInfo() if header is None else PublishInfo(number=header.seq)
 
 
 def _service(requests: ServiceDispatcher, row: Service) -> rospy.Service:

@@ -187,21 +187,25 @@ class Tooling:
         with contextlib.suppress(Timeout):
             self._connection.wait_for(is_shown, _SHOWN)
 
-    def attach_workpiece(self, workpiece: Workpiece) -> None:
-        """Attach a workpiece; see `Arm.attach_workpiece`."""
-        instance(workpiece, Workpiece, "workpiece")
+    def attach_workpiece(self, workpiece: Workpiece | str, *, safety: bool) -> None:
+        """Attach a workpiece, or that of a template; see `Arm.attach_workpiece`."""
+        one = _named(workpiece)
+        instance(safety, bool, "safety")
         before = self.attached
-        self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=True))
-        self._workpiece = workpiece
-        self._commanded = None if before is None else Attachment(before.tool, workpiece.name, before.frame)
+        self._connection.request(
+            wire.AttachLoad(
+                load=tool_message(one), attached=True, template=isinstance(workpiece, str), safety=safety
+            )
+        )
+        self._workpiece = None if isinstance(workpiece, str) else workpiece
+        self._commanded = None if before is None else Attachment(before.tool, one.name, before.frame)
         if before is not None:
-            self._wait_until_shown(before.tool, workpiece.name)
+            self._wait_until_shown(before.tool, one.name)
 
-    def detach_workpiece(self, workpiece: Workpiece) -> None:
+    def detach_workpiece(self, workpiece: Workpiece | str) -> None:
         """Detach a workpiece; see `Arm.detach_workpiece`."""
-        instance(workpiece, Workpiece, "workpiece")
         before = self.attached
-        self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=False))
+        self._connection.request(wire.AttachLoad(load=tool_message(_named(workpiece)), attached=False))
         self._workpiece = None
         self._commanded = None if before is None else Attachment(before.tool, "", before.frame)
         if before is not None:
@@ -336,3 +340,9 @@ class Tooling:
         """External force and torque at the origin of one frame in the axes of another; raises as `pose` does."""
         lever = self.pose(state, TOOL).xyz - self.pose(state, name).xyz
         return state.wrench.seen(lever, self.pose(state, axes).rotation)
+
+
+def _named(workpiece: Workpiece | str) -> Workpiece:
+    """The workpiece itself; of a name one of that name, of which nothing else is known."""
+    instance(workpiece, (Workpiece, str), "workpiece")
+    return Workpiece(workpiece) if isinstance(workpiece, str) else workpiece

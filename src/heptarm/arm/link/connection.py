@@ -807,6 +807,8 @@ class Connection:
             before, self._stops = self._stops, message.bits & _STOPPED
             if self._stops & ~before:
                 self.capture("safety stop")
+        elif isinstance(message, wire.StatesMissed):
+            self.feed.note_gap(message.count)
         self.events.dispatch(message)
 
     def _on_control(self, message: wire.ControlChanged) -> None:

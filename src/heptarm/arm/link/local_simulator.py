@@ -117,10 +117,11 @@ class PrivateCabinet:
         output: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
         replies: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
+        wrong_option = threading.Event()
         readers = [
             threading.Thread(
                 target=_read_output,
-                args=(process, ready, replies, output),
+                args=(process, ready, replies, output, wrong_option),
                 name="heptarm-sim-out",
                 daemon=True,
             ),
@@ -143,9 +144,11 @@ class PrivateCabinet:
                     f"the virtual cabinet did not start within {timeout:g} s",
                     hint="check the load and the free memory of this machine",
                 )
+            hint = "run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'"
+            if wrong_option.is_set():
+                hint = f'correct the target "{target}"'
             raise ConnectFailed(
-                f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}",
-                hint="run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'",
+                f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}", hint=hint
             )
         return cls(process, port, readers, replies)
 
@@ -200,8 +203,9 @@ def _read_output(
     ready: queue.SimpleQueue[int | None],
     replies: queue.SimpleQueue[tuple[str, str]],
     output: deque[str],
+    wrong_option: threading.Event,
 ) -> None:
-    """Read the READY line, then the replies to operator commands."""
+    """Read the READY line, which may be a refusal of an option, then the replies to operator commands."""
     assert process.stdout is not None
     for line in process.stdout:
         try:
@@ -212,6 +216,8 @@ def _read_output(
                 ready.put(int(message["port"]))
             else:
                 output.append(str(message["error"]))
+                if message.get("options"):
+                    wrong_option.set()
         except (ValueError, KeyError, TypeError):
             output.append(line.rstrip())
     ready.put(None)

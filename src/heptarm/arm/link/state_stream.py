@@ -118,7 +118,7 @@ class StateFeed:
         return list(self._kept)
 
     def note_gap(self, count: int) -> None:
-        """Count states that were missed while there was no link as lost by all open streams."""
+        """Count states that never arrived as lost by all open streams."""
         for one in self._queues:
             one.skip(count)
 
@@ -228,8 +228,9 @@ class States(Iterator[State]):
     def lost(self) -> int:
         """States that this stream did not return though it should have: the loop was too slow for too long.
 
-        States that were missed while an observer's link was interrupted are included, by their rate. A stream with a
-        rate leaves states out by design and does not count them.
+        Included are those that the cabinet sampled too late to send, or could not send to a program that reads too
+        slowly, and those that were missed while an observer's link was interrupted, by their rate. A stream with a rate
+        leaves states out by design and does not count them.
         """
         return 0 if self._queue is None else self._queue.lost
 

@@ -72,7 +72,7 @@ def target_from_env() -> str:
     if not value:
         raise ConnectFailed(
             f"no target was given and {VARIABLE} is not set",
-            hint=f'set it, as in {VARIABLE}=sim://iiwa14, or use connect("sim://iiwa14"); {_EXAMPLES}',
+            hint=f'connect("sim://iiwa14"); on the command line --target sim://iiwa14; or set {VARIABLE}; {_EXAMPLES}',
         )
     return value
 

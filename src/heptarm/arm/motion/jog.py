@@ -16,10 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
-from heptarm.arm.motion.handle import BreakRule
-from heptarm.arm.motion.servo import Servo, ServoStats
+from heptarm.arm.motion.servo import Servo, ServoStats, StreamTerms
 from heptarm.errors import HeptarmError
-from heptarm.model.boundary import TOLERANCE, Boundary
+from heptarm.model.boundary import TOLERANCE
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.model.velocity import (
     FREE,
@@ -32,8 +31,6 @@ from heptarm.model.velocity import (
     wall_velocity,
 )
 from heptarm.values.arrays import Array, array
-from heptarm.values.clearance import ClearanceModel
-from heptarm.values.condition.condition import Condition
 from heptarm.values.pose import Pose
 from heptarm.wire import messages as wire
 
@@ -60,15 +57,11 @@ class JogLimits:
         speed: largest speed of the joints, a fraction of each axis' maximum.
         acceleration: likewise.
         silence: time without a command after which the velocity becomes zero [s].
-        boundary: of the workspace; None: there is none.
-        clear: model of bodies to brake before; None: none.
     """
 
     speed: float
     acceleration: float
     silence: float
-    boundary: Boundary | None = None
-    clear: ClearanceModel | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,26 +94,8 @@ class JogServo(Servo):
     size = 7
     name = "dq"
 
-    def __init__(
-        self,
-        connection: Connection,
-        message: wire.ServoOpen,
-        limits: JogLimits,
-        *,
-        period: float,
-        watchdog: float,
-        until: tuple[Condition, ...] = (),
-        breaks: tuple[BreakRule, ...] = (),
-    ) -> None:
-        super().__init__(
-            connection,
-            message,
-            period=period,
-            watchdog=watchdog,
-            boundary=limits.boundary,
-            until=until,
-            breaks=breaks,
-        )
+    def __init__(self, connection: Connection, terms: StreamTerms, limits: JogLimits) -> None:
+        super().__init__(connection, terms)
         self.timeout = limits.silence
         self._limits = limits
         self._command: tuple[Array, int] | None = None  # and when it was set
@@ -149,6 +124,9 @@ class JogServo(Servo):
         self._thread = threading.Thread(target=self._run, name="heptarm-jog", daemon=True)
         self._thread.start()
         return self
+
+    def _check_of_targets(self) -> None:
+        """None: the path brakes before bodies, so no target of it is refused."""
 
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
@@ -255,7 +233,7 @@ class JogServo(Servo):
 
     def _obstacle(self, path: VelocityPath, dq: Array) -> Slowdown | None:
         """Bodies that come near."""
-        model = self._limits.clear
+        model = self._terms.clear
         if model is None or not dq.any():
             return None
         scale = _LOOK_AHEAD / max(
@@ -333,20 +311,14 @@ class TwistServo(JogServo):
     def __init__(
         self,
         connection: Connection,
-        message: wire.ServoOpen,
+        terms: StreamTerms,
         limits: JogLimits,
         *,
         twist: TwistLimits,
         moving: Pose,
         axes: Callable[[Pose], Pose],
-        period: float,
-        watchdog: float,
-        until: tuple[Condition, ...] = (),
-        breaks: tuple[BreakRule, ...] = (),
     ) -> None:
-        super().__init__(
-            connection, message, limits, period=period, watchdog=watchdog, until=until, breaks=breaks
-        )
+        super().__init__(connection, terms, limits)
         self._twist_limits = twist
         self._moving = moving  # pose of the motion frame in the flange frame
         self._axes = axes  # pose of the frame of the twist in the base, by that of the flange

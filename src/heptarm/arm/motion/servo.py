@@ -398,6 +398,29 @@ class ServoStats:
         return as_html(str(self))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StreamTerms:
+    """What all kinds of streams are made of.
+
+    Attributes:
+        message: that opens the motion.
+        period: time between two ticks [s].
+        watchdog: longest gap between two targets; a longer one stops the arm [s].
+        boundary: of the workspace; None: there is none.
+        clear: model of bodies to keep clear of; None: none.
+        until: conditions that end the motion, in the order of the message.
+        breaks: conditions of the arm itself, and what follows when one of them ends the motion.
+    """
+
+    message: wire.ServoOpen
+    period: float
+    watchdog: float
+    boundary: Boundary | None = None
+    clear: ClearanceModel | None = None
+    until: tuple[Condition, ...] = ()
+    breaks: tuple[BreakRule, ...] = ()
+
+
 class Servo(Block):
     """A stream of targets; made by `Arm.servo`, used in a `with` block. Its subclasses define what a target is.
 
@@ -411,29 +434,16 @@ class Servo(Block):
 
     what = "servo motion"
 
-    def __init__(
-        self,
-        connection: Connection,
-        message: wire.ServoOpen,
-        *,
-        period: float,
-        watchdog: float,
-        boundary: Boundary | None = None,
-        clear: ClearanceModel | None = None,
-        until: tuple[Condition, ...] = (),
-        breaks: tuple[BreakRule, ...] = (),
-    ) -> None:
-        self.period = period
-        self.watchdog = watchdog
+    def __init__(self, connection: Connection, terms: StreamTerms) -> None:
+        self.period = terms.period
+        self.watchdog = terms.watchdog
         self._connection = connection
         self._link = connection.link
         self._clock = connection.clock
-        self._message = message
-        self._boundary = boundary
-        self._clear_of = clear
+        self._terms = terms
+        self._message = terms.message
+        self._boundary = terms.boundary
         self._clear: ClearTargets | None = None
-        self._until = until
-        self._breaks = breaks
         self._handle: MotionHandle | None = None
         self._number = 0
         self._active = False
@@ -459,7 +469,7 @@ class Servo(Block):
             raise LocalProtocolError("a servo is used once", hint="make another one with arm.servo(...)")
         self._connection.check_may_wait("the with block of arm.servo()")
         handle = self._handle = MotionHandle.send(
-            self._connection, self._message, until=self._until, breaks=self._breaks
+            self._connection, self._message, until=self._terms.until, breaks=self._terms.breaks
         )
         if not handle.wait_started(_PATIENCE):
             handle.cancel()
@@ -474,18 +484,22 @@ class Servo(Block):
         self._start = self._connection.wait_for(
             lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
         )
-        if self._clear_of is not None:
-            try:
-                self._clear = ClearTargets(self._clear_of, self._start.q)
-            except BaseException:  # of the model: there will be no targets
-                handle.cancel()
-                raise
+        try:
+            self._clear = self._check_of_targets()
+        except BaseException:  # of the model: there will be no targets
+            handle.cancel()
+            raise
         self._warm_up_socket = WarmUpConnection()
         self._began = self._due = self._last = self._clock.nanos()
         self._number, self._active = handle.id, True
         self._connection.enter_block(handle, "arm.servo()")
         handle.add_done_callback(self._on_end)
         return self
+
+    def _check_of_targets(self) -> ClearTargets | None:
+        """What refuses targets near bodies; None: nothing."""
+        clear = self._terms.clear
+        return None if clear is None else ClearTargets(clear, self.start.q)
 
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
@@ -613,28 +627,8 @@ class Servo(Block):
 class JointServo(Servo):
     """A stream of joint positions."""
 
-    def __init__(
-        self,
-        connection: Connection,
-        message: wire.ServoOpen,
-        *,
-        period: float,
-        watchdog: float,
-        boundary: Boundary | None = None,
-        clear: ClearanceModel | None = None,
-        until: tuple[Condition, ...] = (),
-        breaks: tuple[BreakRule, ...] = (),
-    ) -> None:
-        super().__init__(
-            connection,
-            message,
-            period=period,
-            watchdog=watchdog,
-            boundary=boundary,
-            clear=clear,
-            until=until,
-            breaks=breaks,
-        )
+    def __init__(self, connection: Connection, terms: StreamTerms) -> None:
+        super().__init__(connection, terms)
         self._low, self._high = connection.robot.q_min.tolist(), connection.robot.q_max.tolist()
         self._newest: Array | None = None
 
@@ -716,29 +710,8 @@ class JointServo(Servo):
 class PoseServo(Servo):
     """A stream of poses of the motion frame in the base: followed by the joints or, as "lin", on straight lines."""
 
-    def __init__(
-        self,
-        connection: Connection,
-        message: wire.ServoOpen,
-        *,
-        period: float,
-        watchdog: float,
-        moving: Pose,
-        boundary: Boundary | None = None,
-        clear: ClearanceModel | None = None,
-        until: tuple[Condition, ...] = (),
-        breaks: tuple[BreakRule, ...] = (),
-    ) -> None:
-        super().__init__(
-            connection,
-            message,
-            period=period,
-            watchdog=watchdog,
-            boundary=boundary,
-            clear=clear,
-            until=until,
-            breaks=breaks,
-        )
+    def __init__(self, connection: Connection, terms: StreamTerms, *, moving: Pose) -> None:
+        super().__init__(connection, terms)
         self._to_flange = moving.inverse()  # moving: pose of the motion frame in the flange frame
         self._newest: Pose | None = None
         self._near: Array | None = None

@@ -1,7 +1,7 @@
 """The simulated arm of training: the included model with full dynamics and the plant's servo.
 
 The plant closes its loop every millisecond in Python; for training its servos become MuJoCo actuators, so
-that a decision of 1/30 s is eight steps inside the engine. Each has a low-pass filter that
+that a decision of 1/30 s is four steps inside the engine. Each has a low-pass filter that
 models the servo's interpolation. Gravity counts as compensated, so it is switched off; what the controller
 does not know (a payload) acts as an external force.
 """
@@ -18,8 +18,9 @@ from heptarm.rl.task import ReachTask
 from heptarm.sim.plant.world import specification
 from heptarm.values.arrays import Array
 
-#: Steps of the engine in a decision.
-SUBSTEPS = 8
+#: Steps of the engine in a decision. Of position-controlled arms under random actions, four deviate by 0.2 mm (root
+#: mean square) from 64, eight by 0.1 mm; both are equally near to the plant.
+SUBSTEPS = 4
 #: Damping ratio of joint impedance.
 IMPEDANCE_DAMPING = 0.7
 GRAVITY = 9.81

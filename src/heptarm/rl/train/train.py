@@ -104,7 +104,7 @@ class Training:
     Args:
         recipe: what to do.
         team: the workers.
-        threads: of the simulation.
+        threads: of the simulation and of learning.
         engine: class of the simulation's engine.
     """
 
@@ -118,7 +118,12 @@ class Training:
             task = recipe.task
             self.agent = ppo.Agent(task.observation_size, task.action_size, settings).to(team.device)
         team.align(self.agent)
-        self.learner = ppo.Learner(self.agent, settings, team.mean if team.size > 1 else None)
+        self.learner = ppo.Learner(
+            self.agent,
+            settings,
+            team.mean if team.size > 1 else None,
+            threads=threads if team.device.type == "cpu" else 1,
+        )
         self.arms = BatchReach(
             task,
             envs=settings.envs,
@@ -152,44 +157,39 @@ class Training:
         arms, agent, s, device = self.arms, self.agent, self.recipe.settings, self.team.device
         task = self.recipe.task
         shape = (s.horizon, s.envs)
-        seen = torch.empty((*shape, task.observation_size), device=device)
-        action = torch.empty((*shape, task.action_size), device=device)
-        mean, likelihood = torch.empty_like(action), torch.empty(shape, device=device)
-        value, after = torch.empty(shape, device=device), torch.empty(shape, device=device)
-        reward, done = torch.empty(shape, device=device), torch.empty(shape, device=device)
-        raw = np.empty((*shape, task.observation_size), dtype=np.float32)
-        ended: list[Any] = []
+        noise = torch.randn((*shape, task.action_size), generator=self.random).to(device)
+        action, mean = torch.empty_like(noise), torch.empty_like(noise)
+        raw = np.empty((s.horizon + 1, s.envs, task.observation_size), dtype=np.float32)
+        reward, done = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.bool_)
+        finals, ended = [], []
         with torch.no_grad():
-            deviation = agent.spread.exp()
-            now = arms.observe().astype(np.float32)
+            noise *= agent.spread.exp()
+            raw[0] = arms.observe()
             for t in range(s.horizon):
-                raw[t] = now
-                seen[t] = agent.scaler(torch.from_numpy(now).to(device))
-                mean[t] = agent.policy(seen[t])
-                noise = torch.randn(action[t].shape, generator=self.random).to(device)
-                action[t] = mean[t] + deviation * noise
-                likelihood[t] = agent.likelihood(mean[t], action[t])
-                value[t] = agent.value(seen[t]).squeeze(-1)
+                mean[t] = agent.policy(agent.scaler(torch.from_numpy(raw[t]).to(device)))
+                torch.add(mean[t], noise[t], out=action[t])
                 decided = action[t].cpu().numpy()
                 step = arms.step(decided)
-                gain = step.reward
+                reward[t], done[t], raw[t + 1] = step.reward, step.done, step.observation
                 if s.action_cost:
-                    gain = gain - s.action_cost * (np.clip(decided, -1.0, 1.0) ** 2).sum(-1)
-                reward[t] = torch.from_numpy(np.float32(s.reward_scale) * gain.astype(np.float32)).to(device)
-                done[t] = torch.from_numpy(step.done.astype(np.float32)).to(device)
-                now = step.observation.astype(np.float32)
-                if t > 0:
-                    after[t - 1] = torch.where(done[t - 1] > 0, after[t - 1], value[t])
+                    reward[t] -= s.action_cost * (np.clip(decided, -1.0, 1.0) ** 2).sum(-1)
                 if step.done.any():
-                    last = agent.scaler(torch.from_numpy(step.final.astype(np.float32)).to(device))
-                    after[t, torch.from_numpy(step.done).to(device)] = agent.value(last).squeeze(-1)
+                    finals.append(step.final)
                     ended.append(step.distance[step.done])
-            coming = agent.value(agent.scaler(torch.from_numpy(now).to(device))).squeeze(-1)
-            after[-1] = torch.where(done[-1] > 0, after[-1], coming)
-            advantage = ppo.advantages(reward, value, after, done, s)
-            self._look(raw)
-        samples = ppo.Samples(seen, action, mean, likelihood, value, advantage)
-        return samples, self._facts(float(reward.mean()) / s.reward_scale, ended)
+            # what does not affect the next decision is computed for all decisions at once
+            seen = agent.scaler(torch.from_numpy(raw).to(device))
+            worth = agent.value(seen).squeeze(-1)
+            value, after = worth[:-1], worth[1:].clone()
+            if finals:
+                last = torch.from_numpy(np.concatenate(finals).astype(np.float32)).to(device)
+                after[torch.from_numpy(done).to(device)] = agent.value(agent.scaler(last)).squeeze(-1)
+            gains = torch.from_numpy(s.reward_scale * reward).to(device)
+            over = torch.from_numpy(done.astype(np.float32)).to(device)
+            advantage = ppo.advantages(gains, value, after, over, s)
+            likelihood = agent.likelihood(mean, action)
+            self._look(raw[:-1])
+        samples = ppo.Samples(seen[:-1], action, mean, likelihood, value, advantage)
+        return samples, self._facts(float(reward.mean()), ended)
 
     def _look(self, raw: Any) -> None:
         """Let the scaler see the observations of all workers."""
@@ -306,7 +306,7 @@ def train(
         resume: policy file of an earlier `out` to go on from; it goes on exactly as if never interrupted.
         steps: environment steps instead of the recipe's, as to train longer after a `resume`.
         device: "cpu" or "cuda": where the networks live; the simulation stays on the CPU.
-        threads: of the simulation.
+        threads: of the simulation and of learning; the result does not depend on them.
         checkpoint: updates between two checkpoints.
         engine: class of the simulation's engine.
 
@@ -320,7 +320,7 @@ def train(
         raise CommandRejected(f"out must end in .npz, got {path.name!r}", parameter="out", value=str(path))
     if checkpoint < 1:
         raise LimitError(f"checkpoint must be at least 1, got {checkpoint}", code=2, parameter="checkpoint")
-    torch.set_num_threads(1)  # more threads would compete with those of the simulation
+    torch.set_num_threads(1)  # for tensors this small, more would wait for each other most of the time
     from heptarm.rl.train import distributed
 
     with distributed.team(device) as team:

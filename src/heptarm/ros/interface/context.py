@@ -28,7 +28,7 @@ class NodeContext:
     Attributes:
         driver: see above.
         ros: see above.
-        workpiece: attached by a service; None: none is.
+        workpiece: attached by a service, or the name of its template; None: none is.
         taught: trajectories recorded by the action `teach`, by name.
         gripper: of the action `gripper_cmd`; None: it has had no goal yet.
         gripper_goal: number of its newest goal; 0: none.
@@ -38,7 +38,7 @@ class NodeContext:
     def __init__(self, driver: Driver, ros: RosAdapter) -> None:
         self.driver = driver
         self.ros = ros
-        self.workpiece: Workpiece | None = None
+        self.workpiece: Workpiece | str | None = None
         self.taught: dict[str, Trajectory] = {}
         self.gripper: TwoSignalGripper | None = None
         self.gripper_goal = 0

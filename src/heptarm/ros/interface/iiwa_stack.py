@@ -317,23 +317,21 @@ def set_endpoint_frame(context: NodeContext, request: Any) -> str:
 
 
 def set_workpiece(context: NodeContext, request: Any) -> str:
-    """Detach the workpiece.
+    """Attach the workpiece of a template of the project as the safety workpiece, in place of the one before.
 
-    Raises:
-        CommandRejected: one is to be attached; templates of the project are not available.
+    An empty name only detaches. On a cabinet without safety workpieces it is attached as any other.
     """
-    if request.workpiece_id:
-        raise CommandRejected(
-            f"workpiece_id must be empty, got {request.workpiece_id!r}: templates of workpieces are not supported",
-            parameter="workpiece_id",
-            value=request.workpiece_id,
-            hint="attach one with its mass by heptarm's service attach_workpiece",
-        )
-    if context.workpiece is not None:
+    if context.workpiece is not None or request.workpiece_id:
         context.wait_for_rest()
+    if context.workpiece is not None:
         context.arm.detach_workpiece(context.workpiece)
         context.workpiece = None
-    return "no workpiece is attached"
+    if not request.workpiece_id:
+        return "no workpiece is attached"
+    safety = "safety_workpieces" in context.arm.capabilities
+    context.arm.attach_workpiece(request.workpiece_id, safety=safety)
+    context.workpiece = request.workpiece_id
+    return f"{request.workpiece_id} is attached"
 
 
 def time_to_destination(context: NodeContext, request: Any) -> ServiceResponse:

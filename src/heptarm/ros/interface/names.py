@@ -273,7 +273,7 @@ _IIWA_STACK = (
         NameRole.SERVICE, "~/move_pose", "SetPTPCartesianSpeedLimits", "configuration/setPTPCartesianLimits"
     ),
     *_iiwa_stack(NameRole.SERVICE, "~/move_pose", "SetEndpointFrame", "configuration/setEndpointFrame"),
-    *_iiwa_stack(NameRole.SERVICE, "~/detach_workpiece", "SetWorkpiece", "configuration/setWorkpiece"),
+    *_iiwa_stack(NameRole.SERVICE, "~/attach_workpiece", "SetWorkpiece", "configuration/setWorkpiece"),
     *_iiwa_stack(NameRole.SERVICE, "~/state", "TimeToDestination", "state/timeToDestination"),
     *_iiwa_stack(NameRole.ACTION, "~/move_joints", "MoveToJointPosition", "action/move_to_joint_position"),
     *_iiwa_stack(

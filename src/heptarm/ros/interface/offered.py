@@ -5,7 +5,8 @@ A node subscribes to every topic and serves every service::
     table = offered(values)
     topics, services = TopicDispatcher(context), ServiceDispatcher(context)
     for row in table.topics:
-        ...                       # under row.name with row.type: topics.handle(row, message); log a refusal
+        ...                       # under row.name with row.type: topics.handle(row, message, PublishInfo());
+                                  # log a refusal
 """
 
 from __future__ import annotations

@@ -301,10 +301,12 @@ def detach_tool(context: NodeContext, request: Any) -> str:
 def attach_workpiece(context: NodeContext, request: Any) -> str:
     """Attach a workpiece to the tool."""
     context.wait_for_rest()
-    workpiece = Workpiece(**_load(request))
-    context.arm.attach_workpiece(workpiece)
+    workpiece: Workpiece | str = request.name
+    if not request.known:
+        workpiece = Workpiece(**_load(request))
+    context.arm.attach_workpiece(workpiece, safety=bool(request.safety))
     context.workpiece = workpiece
-    return f"{request.name} is attached"
+    return f"{request.name} is attached" + (" as the safety workpiece" if request.safety else "")
 
 
 def detach_workpiece(context: NodeContext, request: Any) -> str:

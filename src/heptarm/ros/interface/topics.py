@@ -24,14 +24,15 @@ from heptarm.ros.interface.motions import (
     velocities,
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.values.arrays import Array, array
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
 
 #: Frames of a twist.
 _FRAMES: tuple[Literal["base", "flange", "tool"], ...] = ("base", "flange", "tool")
-#: Handles a message of a topic.
-Handler = Callable[[NodeContext, Any], None]
+#: Handles a message of a topic; that of one that is `counted` takes when or as which the message was published as well.
+Handler = Callable[..., None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +44,14 @@ class Topic:
         type: "package/Type".
         handler: handles a message; raises HeptarmError to refuse it.
         at_once: never waits for another topic.
+        counted: its handler takes a `PublishInfo` after the message.
     """
 
     name: str
     type: str
     handler: Handler
     at_once: bool = False
+    counted: bool = False
 
 
 class TopicDispatcher:
@@ -62,18 +65,22 @@ class TopicDispatcher:
         self._context = context
         self._lock = threading.Lock()
 
-    def handle(self, topic: Topic, message: Any) -> None:
+    def handle(self, topic: Topic, message: Any, sent: PublishInfo) -> None:
         """Handle a message.
 
         Args:
             topic: its row.
             message: of its type.
+            sent: when or as which it was published.
 
         Raises:
             HeptarmError: refused; the text gives the reason.
         """
         with contextlib.nullcontext() if topic.at_once else self._lock:
-            topic.handler(self._context, message)
+            if topic.counted:
+                topic.handler(self._context, message, sent)
+            else:
+                topic.handler(self._context, message)
 
 
 def stop(context: NodeContext, message: Any) -> None:
@@ -99,13 +106,13 @@ def command_lin(context: NodeContext, message: Any) -> None:
     context.driver.start(lin(stamped_pose(message, context.driver)))
 
 
-def joint_trajectory(context: NodeContext, message: Any) -> None:
+def joint_trajectory(context: NodeContext, message: Any, sent: PublishInfo) -> None:
     """Execute a trajectory_msgs/JointTrajectory, or follow a stream; in ROS 1 one without points stops the arm."""
     if not message.points and context.ros.empty_stops:
         context.driver.end_trajectory()
         return
     goal = trajectory_goal(context.ros, message, now=context.driver.now)
-    context.driver.accept(replace(goal, from_topic=True))
+    context.driver.accept(replace(goal, from_topic=True, sent=sent))
 
 
 # ----------------------------------------------------------------------------------- servo
@@ -240,7 +247,7 @@ TOPICS = (
     Topic("~/command/joint", _JOINTS, command_joint),
     Topic("~/command/pose", _POSE, command_pose),
     Topic("~/command/lin", _POSE, command_lin),
-    Topic("~/joint_trajectory", "trajectory_msgs/JointTrajectory", joint_trajectory),
+    Topic("~/joint_trajectory", "trajectory_msgs/JointTrajectory", joint_trajectory, counted=True),
     Topic("~/servo/joint", _JOINTS, servo_joint),
     Topic("~/servo/velocity", _JOINTS, servo_velocity),
     Topic("~/servo/pose", _POSE, servo_pose),
@@ -276,7 +283,13 @@ def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
     forward = values["forward_controllers"]
     ours = tuple(row for row in TOPICS if forward or row.name not in (_FORWARD_POSITION, _FORWARD_VELOCITY))
     return ours + tuple(
-        Topic(entry.name, entry.type, _PRESET_HANDLERS[entry.role], at_once=entry.role is NameRole.STOP)
+        Topic(
+            entry.name,
+            entry.type,
+            _PRESET_HANDLERS[entry.role],
+            at_once=entry.role is NameRole.STOP,
+            counted=entry.role is NameRole.TRAJECTORY,
+        )
         for entry in PRESETS[values["names"]].entries
         if entry.role in _PRESET_HANDLERS and entry.is_available
     )

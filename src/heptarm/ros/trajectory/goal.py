@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from heptarm.errors import CommandRejected
+from heptarm.ros.trajectory.send_times import PublishInfo
 
 
 class ErrorCode(IntEnum):
@@ -91,6 +92,7 @@ class TrajectoryGoal:
         goal_time: how long after its end the arm may take to reach the goal [s]; 0: the default; -1: no limit.
         extras: names of filled fields that this server does not support.
         from_topic: received by topic, so it may be a point of a stream; see `stream`.
+        sent: when or as which its message was published; None: unknown.
     """
 
     joints: tuple[str, ...]
@@ -101,6 +103,7 @@ class TrajectoryGoal:
     goal_time: float = 0.0
     extras: tuple[str, ...] = ()
     from_topic: bool = False
+    sent: PublishInfo | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -218,7 +218,7 @@ class TrajectoryRunner:
         if len(times) == 1:
             speed = None if dq is None else dq[0]
             trajectory = self._stream.add_point(
-                now, effective, here, float(times[0]), q[0], speed, acceleration
+                now, effective, here, float(times[0]), q[0], speed, acceleration, goal.sent
             )
         else:
             late = 0.0 if goal.start is None else effective - goal.start

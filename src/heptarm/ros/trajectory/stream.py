@@ -9,10 +9,12 @@ points with the velocity of the stream, and settles at the last one when the str
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 
 import numpy as np
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
+from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -55,7 +57,9 @@ class PointStream:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
-        self._points: deque[tuple[float, Array]] = deque()
+        self._points: deque[tuple[float, Array]] = deque()  # when they were sent, and where they are
+        self._arrivals: deque[float] = deque()
+        self._times = SendTimes()
 
     def add_point(
         self,
@@ -66,8 +70,9 @@ class PointStream:
         q: Array,
         dq: Array | None,
         acceleration: Array,
+        sent: PublishInfo | None = None,
     ) -> JointTrajectory:
-        """Continue through a point that the arm is to reach a period after its arrival.
+        """Continue through a point that the arm is to reach a period after it was sent.
 
         The arm needs longer than a period to join the stream smoothly. So the trajectory leads to where the stream will
         be then, by its velocity: the arm follows without lag as long as that does not change.
@@ -80,6 +85,7 @@ class PointStream:
             q: its positions, shape (7,) [rad].
             dq: its velocities, shape (7,) [rad/s]; None: estimate them from the stream.
             acceleration: largest one to reach the stream and to settle, shape (7,) [rad/s²].
+            sent: when or as which its message was published; None: points count from their arrival.
 
         Returns:
             From `here` to the stream, then back to rest at the point.
@@ -88,18 +94,28 @@ class PointStream:
             GoalRefused: the point is too far away.
         """
         _check_distance(here, q)
-        if self._points and now - self._points[-1][0] > _PAUSE:
+        if self._arrivals and now - self._arrivals[-1] > _PAUSE:
             self._points.clear()
-        self._points.append((now, q))
-        while now - self._points[0][0] > _HISTORY:
+            self._arrivals.clear()
+            self._times.restart()
+        time, pause = self._times.add(now, period, sent)
+        if pause > _LONGEST_GAP or (pause > 0.0 and np.abs(here.dq).max() < _REST):
+            self._arrivals.clear()  # nothing was sent: that was no jitter
+        self._arrivals.append(now)
+        self._points = deque((then + pause, place) for then, place in self._points if then + pause < time)
+        self._points.append((time, q))
+        while now - self._arrivals[0] > _HISTORY:
+            self._arrivals.popleft()
+        while time - self._points[0][0] > _HISTORY:
             self._points.popleft()
-        gaps = np.diff([time for time, _ in self._points])
-        gap = min(float(gaps.max(initial=period)), _LONGEST_GAP)
-        place, speed = self._fit(period, max(_WINDOW, 2.0 * gap))
+        gap = _longest_gap(self._arrivals, period)
+        place, speed = self._fit(
+            period, max(_WINDOW, 2.0 * _longest_gap([then for then, _ in self._points], period))
+        )
         speed = speed if dq is None else dq
         horizon = max(2.0 * period, _LEAST_HORIZON, _MARGIN * gap)
         while True:
-            aim, velocity = self._ahead(q, place, speed, begin - now + horizon - period)
+            aim, velocity = self._ahead(q, place, speed, begin - time + horizon - period)
             excess = (_acceleration(here, aim, velocity, horizon) > acceleration).any()
             if not excess or horizon > _LONGEST_HORIZON:
                 break
@@ -184,6 +200,11 @@ class PointStream:
         centred = times - times.mean()
         slope = centred @ places / (centred @ centred)
         return places.mean(axis=0) - slope * times.mean(), slope
+
+
+def _longest_gap(times: Collection[float], period: float) -> float:
+    """Longest time between two of several, which increase [s]."""
+    return min(float(np.diff(np.fromiter(times, float)).max(initial=period)), _LONGEST_GAP)
 
 
 def _check_distance(here: KinematicState, q: Array) -> None:

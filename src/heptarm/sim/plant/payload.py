@@ -72,6 +72,44 @@ class _LastLink:
         mujoco.mj_setConst(model, self._scratch)
 
 
+class LoadedModel:
+    """An arm with a load on its flange, without contacts: what a controller computes with.
+
+    Args:
+        model: of the arm, which this changes.
+
+    Attributes:
+        mass: inertia matrix, shape (7, 7) [kg m²].
+        bias: Coriolis, centrifugal and gravity torques, shape (7,) [Nm].
+
+    Both are valid after `follow`.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model, self._link = model, _LastLink(model)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self._scratch: mujoco.MjData | None = None
+        self._full = np.zeros((model.nv, model.nv))
+        self.mass, self.bias = self._full[:7, :7], np.zeros(7)
+
+    def carry(self, load: Body) -> None:
+        """Replace the load, in the flange frame."""
+        self._link.carry(load)
+        if self._scratch is None:
+            self._scratch = mujoco.MjData(self._model)
+            self.bias = self._scratch.qfrc_bias[:7]
+
+    def follow(self, world: mujoco.MjData) -> None:
+        """Take over the posture and the velocities of the world's arm."""
+        model, data = self._model, self._scratch
+        assert data is not None
+        data.qpos[:] = world.qpos[: model.nq]
+        data.qvel[:] = world.qvel[: model.nv]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fullM(model, data, self._full)
+
+
 class PayloadModel:
     """Payload of the simulated arm; used by the thread that ticks the plant.
 
@@ -96,12 +134,8 @@ class PayloadModel:
     ) -> None:
         self._data, self._world_mass = data, mass
         self._has_tool = bare is not None
-        self._believed = copy(model) if bare is None else bare
-        self._true_link, self._believed_link = _LastLink(model), _LastLink(self._believed)
-        # the controller's model has no contacts
-        self._believed.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        self._scratch: mujoco.MjData | None = None
-        self._full = np.zeros((self._believed.nv, self._believed.nv))
+        self._true_link = _LastLink(model)
+        self._believed = LoadedModel(copy(model) if bare is None else bare)
         self._declared = self._hanging = NOTHING
         self._pinned: Body | None = None
         self._settle()
@@ -130,21 +164,13 @@ class PayloadModel:
         if hanging == self._declared and not self._has_tool:
             self._agree()
             return
-        self._believed_link.carry(self._declared)
-        if self._scratch is None:
-            self._scratch = mujoco.MjData(self._believed)
+        self._believed.carry(self._declared)
         self.differs = True
-        self.mass, self.bias = self._full[:7, :7], self._scratch.qfrc_bias[:7]
+        self.mass, self.bias = self._believed.mass, self._believed.bias
 
     def believe(self) -> None:
         """Update the controller's model for the present posture; needed in each tick in which it differs."""
-        model, data = self._believed, self._scratch
-        assert data is not None
-        data.qpos[:] = self._data.qpos[: model.nq]
-        data.qvel[:] = self._data.qvel[: model.nv]
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        mujoco.mj_fullM(model, data, self._full)
+        self._believed.follow(self._data)
 
 
 def _matrix(quat: Array) -> Array:

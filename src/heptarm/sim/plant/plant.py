@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from math import atan2, cos, inf, nan, sin, sqrt
 
@@ -26,6 +27,7 @@ from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.native import NativeTick
 from heptarm.sim.plant.payload import PayloadModel
+from heptarm.sim.plant.safety_monitor import UNLIMITED, ExternalTorqueMonitor, SafetyLimits
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
@@ -149,6 +151,7 @@ class Plant:
         scene: what else is around it and on its flange; None: nothing.
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
         errors: of the sensors, and friction of the joints; None: ideal ones.
+        limits: of safety functions that depend on the load; see `heptarm.sim.plant.safety_monitor`.
 
     Attributes:
         submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
@@ -163,6 +166,7 @@ class Plant:
         scene: Scene | None = None,
         monitored: bool = True,
         errors: SensorErrors | None = None,
+        limits: SafetyLimits = UNLIMITED,
     ) -> None:
         self.robot: RobotModel = robot(model)
         self._errors = errors
@@ -176,6 +180,10 @@ class Plant:
         self._views()
         self._load = ExternalLoad(self.model, self.data)
         bare = compiled(model) if is_mounted(self.model) else None
+        self._limits = limits
+        self._safety_monitor: ExternalTorqueMonitor | None = None
+        if limits.torque < inf:
+            self._safety_monitor = ExternalTorqueMonitor(copy(self.model if bare is None else bare), limits)
         self._payload = PayloadModel(self.model, self.data, self._mass, bare)
         self._mounted = FlangeShapes(self.model)
         self._changes: deque[Callable[[], None]] = deque()  # of what is carried; made before the next tick
@@ -311,6 +319,25 @@ class Plant:
         """Declare the load data of the controller; also the true payload, unless `set_payload` sets another one."""
         self._changes.append(lambda: self._payload.declare(load))
 
+    def set_safety_load(self, load: Body, *, workpiece: float) -> None:
+        """Set the load that the safety functions count: tools and the safety workpiece.
+
+        Args:
+            load: in the flange frame.
+            workpiece: mass of the safety workpiece [kg]; 0: there is none.
+
+        Raises:
+            ValueError: the safety configuration allows no workpiece as heavy as that.
+        """
+        most = self._limits.workpiece
+        if workpiece > most:
+            raise ValueError(
+                f"the safety workpiece has {workpiece:g} kg, the safety configuration allows {most:g} kg"
+            )
+        monitor = self._safety_monitor
+        if monitor is not None:
+            self._changes.append(lambda: monitor.count(load))
+
     def set_payload(self, load: Body) -> None:
         """Set the true payload on the flange; declared load data do not change it any more."""
         self._changes.append(lambda: self._payload.set_true(load))
@@ -374,9 +401,14 @@ class Plant:
         mujoco.mj_fullM(m, d, self._mass)
         if self._payload.differs:
             self._payload.believe()
+        watched = self._safety_monitor if interpolator.order and not self.safety.latched else None
+        if watched is not None:
+            watched.follow(d)
         self._drive()
         mujoco.mj_step2(m, d)
         self._sense()
+        if watched is not None:
+            self._watch(watched)
         if self._monitor is not None and not self._tripped:
             self._supervise(self._monitor)
         self.tick_count += 1
@@ -450,6 +482,13 @@ class Plant:
             self.safety.request_stop(StopRequest.DRIVE_ERROR)
             self.interpolator.trip(reason)
             self._close_brakes()
+            log.warning("%s", reason)
+
+    def _watch(self, monitor: ExternalTorqueMonitor) -> None:
+        """Let a safety function stop the arm on its path."""
+        reason = monitor.check(self._load.torque, self._sensed.mass, self._sensed.bias, self._acc)
+        if reason:
+            self.safety.request_stop(StopRequest.PROTECTIVE_STOP)
             log.warning("%s", reason)
 
     def _brake_or_open(self) -> None:

@@ -29,6 +29,7 @@ from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.safety_monitor import parse_safety
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.sensor_errors import parse_sensors, sensor_errors
 from heptarm.sim.plant.shared_state import PositionsFile, Trace
@@ -120,6 +121,7 @@ class VirtualCabinet:
             scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
             errors=sensor_errors(robot(options.model), options.sensors),
+            limits=parse_safety(options.safety),
         )
         self.sessions = Sessions(
             self.plant,
@@ -368,6 +370,7 @@ def main(argv: list[str] | None = None) -> int:
         if options.drive_monitoring not in ("on", "off"):
             raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
         parse_sensors(options.sensors)
+        parse_safety(options.safety)
         real_time_of(options)
         if options.project is not None:
             project.read_project(options.project)

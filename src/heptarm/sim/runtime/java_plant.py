@@ -321,8 +321,11 @@ class JavaPlant:
 
     def setAttachedLoad(self, load: Any) -> None:
         """Set the load data of everything attached to the flange."""
-        given = seam.AttachedLoad.decode(bytes(load.encode()))
-        self._plant.set_load_data(Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia)))
+        self._plant.set_load_data(_body(load))
+
+    def setSafetyLoad(self, load: Any, workpiece: float) -> None:
+        """Set the load that the safety functions count."""
+        self._plant.set_safety_load(_body(load), workpiece=float(workpiece))
 
     def setCarriedBodies(self, carried: Any) -> None:
         """Set the shapes of everything attached to the flange."""
@@ -333,6 +336,11 @@ class JavaPlant:
                 for one in given.bodies
             ]
         )
+
+
+def _body(load: Any) -> Body:
+    given = seam.AttachedLoad.decode(bytes(load.encode()))
+    return Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia))
 
 
 def _shape(one: seam.BodyShape) -> Shape:
@@ -351,7 +359,7 @@ def java_memory() -> dict[str, int]:
 
 
 #: Methods whose errors concern their argument; those of the others concern the state of the plant.
-_ARGUMENT_ERRORS = ("setAttachedLoad", "setCarriedBodies")
+_ARGUMENT_ERRORS = ("setAttachedLoad", "setSafetyLoad", "setCarriedBodies")
 
 
 def _carry_out(calls: Any, plant: JavaPlant) -> None:

@@ -23,10 +23,10 @@ from heptarm.values.pose import deg
 _LONG = 120.0
 
 
-def _guide(arm: Arm, push: tuple[float, float, float], offset: float) -> None:
-    """Push until a joint has turned by this angle [rad]."""
+def _guide(arm: Arm, push: tuple[float, float, float], offset: float, *, at_most: float = _LONG) -> None:
+    """Push until a joint has turned by this angle [rad], and for at most so many seconds of the robot."""
     before = arm.state.q
-    arm.operator.push(push, duration=_LONG)
+    arm.operator.push(push, duration=at_most)
     arm.wait_until(lambda s: np.abs(s.q - before).max() > offset, timeout=60.0)
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
@@ -54,7 +54,8 @@ def precise(arm: Arm) -> None:
     start = arm.wait_for_rest().pose
     handle = arm.start(hold(_LONG), mode=compliance("y", frame="base"))
     handle.wait_started(20.0)
-    _guide(arm, (10.0, 10.0, 10.0), 0.1)
+    # nothing slows it down along the axis: a hand that pushed on until this program saw it might throw the arm
+    _guide(arm, (10.0, 10.0, 10.0), 0.1, at_most=0.3)
     let_go(arm, handle)
     end = arm.wait_for_rest().pose
     above(float(end.xyz[1] - start.xyz[1]), 0.01, "guided by", unit="m")

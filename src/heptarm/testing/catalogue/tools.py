@@ -6,13 +6,15 @@ import numpy as np
 
 from heptarm import model
 from heptarm.arm.arm import Arm
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, MotionAborted
 from heptarm.testing.measure import Unfit, above, baseline, fresh, holds, near, watch
 from heptarm.testing.scenario import Risk, scenario
-from heptarm.testing.stage import TABLE
+from heptarm.testing.stage import HOME, TABLE, stage
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
+from heptarm.values.result import Cause
 from heptarm.values.shape import capsule
 from heptarm.values.tool import Tool, Workpiece
 from heptarm.when import force
@@ -81,6 +83,39 @@ def load(arm: Arm) -> None:
             near(held.force, seen.force, 0.8, "force", unit="N")
             peg = arm.pose("scenario-part/peg")
             near(peg.xyz, (arm.pose() @ Pose.at(0, 0, 0.08)).xyz, 2e-4, "its own frame", unit="m")
+
+
+@scenario(
+    line=6,
+    rows="I5",
+    virtual=True,
+    risk=Risk.FAULT,
+    space=0.1,
+    needs=("workpieces", "safety_workpieces", "lin_rel"),
+)
+def safety_workpiece(arm: Arm) -> None:
+    """Safety functions count the safety workpiece only: any other weight looks like a collision, and stops the arm."""
+    from heptarm.arm.connect import connect
+
+    target = f"{stage(model=arm.robot.name, speed=4.0)}&safety=12,5"
+    with connect(target, watchdog=10.0, timeout=30.0, black_box=False) as own:
+        own.move(ptp(HOME))
+        with own.attached("Block", safety=True):
+            holds(fresh(own).safety_workpiece == "Block", "the template's workpiece is the safety workpiece")
+            holds(own.move(lin_rel(z=-0.05)).arrived, "4 kg that count do not disturb")
+        holds(fresh(own).safety_workpiece == "", "there is none after it was detached")
+        try:
+            own.attach_workpiece(Workpiece("scenario-anvil", mass=6.0), safety=True)
+            holds(False, "6 kg are refused")
+        except CommandRejected as error:
+            holds("allows 5 kg" in error.text and fresh(own).workpiece == "", error.text)
+        own.attach_workpiece("Block")
+        try:
+            own.move(lin_rel(z=-0.05))
+            holds(False, "4 kg that do not count stop the arm")
+        except MotionAborted as error:
+            holds(error.cause is Cause.SAFETY, "a safety function stopped 4 kg that it does not count")
+        holds(fresh(own).safety.protective_stop, "the state shows its stop")
 
 
 @scenario(

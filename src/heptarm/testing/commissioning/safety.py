@@ -5,18 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.errors import HeptarmError
-from heptarm.testing.commissioning.person import Person, PersonTask, expect
-from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, same, step
-from heptarm.testing.measure import record
+from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.sim.plant.safety_monitor import LASTING
+from heptarm.testing.commissioning.person import Person, PersonTask, expect, number
+from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, near, same, step
+from heptarm.testing.measure import Unfit, fresh, record
 from heptarm.testing.stage import HOME
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
+from heptarm.values.tool import Workpiece
 
 #: Highest speed of the flange in T1 [m/s], and what is programmed here.
 _T1, _PROGRAMMED = 0.25, 0.3
 _A7 = 6
+#: As light as nothing: the real flange is empty meanwhile.
+_PIECE = Workpiece("heptarm-check", mass=0.01)
 
 
 @step(
@@ -99,3 +103,36 @@ def emergency_stop(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     if lamps:
         compared.insert(0, same("an output during the emergency stop is", refused, "refused"))
     return tuple(compared)
+
+
+@step(needs=("workpieces", "safety_workpieces"))
+def workpiece(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Does the cabinet take a workpiece that no template of the project describes as the safety workpiece?"""
+    try:
+        with arm.attached(_PIECE, safety=True):
+            taken = "taken" if fresh(arm).safety_workpiece == _PIECE.name else "ignored"
+    except CommandRejected as error:
+        taken = f"refused: {error.text}"
+    return (same("a workpiece that a program defines is, as the safety workpiece,", taken, "taken"),)
+
+
+@step(needs=("safety_workpieces",))
+def counted_load(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Which load do the safety functions count, as far as the robot's documents name it?"""
+    lasting = number(person, "Time for which an external torque has to last before the arm is stopped", "ms")
+    found = [] if lasting is None else [near("time until the stop", lasting, LASTING, 1.0, "ms")]
+    asked = (
+        ("Does the safety workpiece count until another one or none is set, even if it is detached", "yes"),
+        ("Are external torques monitored while the arm rests", "no"),
+        (
+            "Text of the error when a safety workpiece is heavier than allowed",
+            "the safety configuration allows",
+        ),
+    )
+    for question, expected in asked:
+        answer = person.reads(question)
+        if answer:
+            found.append(same(question, answer, expected))
+    if not found:
+        raise Unfit("no document names it")
+    return tuple(found)

@@ -64,6 +64,11 @@ final class SunriseRobot {
         } catch (LinkageError e) {
             log.info("this cabinet has no hand guiding: " + e);
         }
+        try {
+            all.add(SunriseTools.capability());
+        } catch (NoSuchMethodException e) {
+            log.info("this cabinet has no safety workpiece: " + e);
+        }
         return all.toArray(new String[0]);
     }
 }

@@ -6,6 +6,7 @@ import java.util.Map;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.LoadData;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.geometricModel.Tool;
@@ -34,6 +35,7 @@ final class SunriseTools implements ToolPort {
     private Tool tool;
     private ToolInfo mounted;
     private Workpiece workpiece;
+    private boolean hasSafetyWorkpiece;
     private Map<String, ObjectFrame> toolFrames = new LinkedHashMap<String, ObjectFrame>();
     private Map<String, ObjectFrame> pieceFrames = new LinkedHashMap<String, ObjectFrame>();
     private volatile ObjectFrame motionFrame;
@@ -50,6 +52,7 @@ final class SunriseTools implements ToolPort {
         this.probe = probe;
         this.listed = names(listed);
         this.motionFrame = robot.getFlange();
+        reset(log);
         for (int i = 0; i < this.listed.length; i++) {
             if (template(this.listed[i]) == null) {
                 log.warn("the process data heptarm.tools names " + this.listed[i] + ", but the project has no such tool template; add it in Sunrise Workbench");
@@ -82,7 +85,7 @@ final class SunriseTools implements ToolPort {
         return describe(robot.getRootFrame(), taught);
     }
 
-        public synchronized ToolInfo template(String name) {
+    public synchronized ToolInfo template(String name) {
         Tool made = templates.get(name);
         if (made == null) {
             try {
@@ -99,8 +102,11 @@ final class SunriseTools implements ToolPort {
     }
 
     private static ToolInfo describe(String name, Tool tool) {
-        return new ToolInfo(name, tool.getLoadData().getMass(), new double[3], new double[6],
-                describe(tool.getRootFrame(), frames(tool)), new Shape[0]);
+        return describe(name, tool.getLoadData(), tool.getRootFrame(), frames(tool));
+    }
+
+    private static ToolInfo describe(String name, LoadData load, ObjectFrame root, Map<String, ObjectFrame> frames) {
+        return new ToolInfo(name, load.getMass(), new double[3], new double[6], describe(root, frames), new Shape[0]);
     }
 
     private static FrameInfo[] describe(ObjectFrame from, Map<String, ObjectFrame> frames) {
@@ -120,8 +126,18 @@ final class SunriseTools implements ToolPort {
         if (main != null && main != tool.getRootFrame()) {
             all.put(main.getName(), main);
         }
-        for (Object child : tool.getRootFrame().getChildren()) {
-            if (child instanceof ObjectFrame && !all.containsKey(((ObjectFrame) child).getName())) {
+        for (Map.Entry<String, ObjectFrame> child : children(tool.getRootFrame()).entrySet()) {
+            if (!all.containsKey(child.getKey())) {
+                all.put(child.getKey(), child.getValue());
+            }
+        }
+        return all;
+    }
+
+    private static Map<String, ObjectFrame> children(ObjectFrame root) {
+        Map<String, ObjectFrame> all = new LinkedHashMap<String, ObjectFrame>();
+        for (Object child : root.getChildren()) {
+            if (child instanceof ObjectFrame) {
                 all.put(((ObjectFrame) child).getName(), (ObjectFrame) child);
             }
         }
@@ -142,45 +158,126 @@ final class SunriseTools implements ToolPort {
         }
         ObjectFrame main = frames.containsKey(frame) ? frames.get(frame)
                 : next == null ? robot.getFlange() : next.getRootFrame();
-        Tool before = tool;
         try {
-            detach(workpiece);
-            detach(before);
+            takeOff();
+            detach(tool);
             if (next != null) {
                 next.attachTo(robot.getFlange());
             }
         } catch (RuntimeException e) {
-            if (before != null) {
-                before.attachTo(robot.getFlange());
+            if (tool != null) {
+                tool.attachTo(robot.getFlange());
             }
+            putBack();
             throw new CommandRejected(Code.EXECUTION_FAILED, "the cabinet refuses the tool: " + e.getMessage());
         }
         tool = next;
         toolFrames = frames;
         workpiece = null;
+        hasSafetyWorkpiece = false;
         pieceFrames = new LinkedHashMap<String, ObjectFrame>();
         motionFrame = main;
         mounted = info;
         mount(null);
     }
 
-    public synchronized void load(ToolInfo info) throws CommandRejected {
-        Map<String, ObjectFrame> frames = new LinkedHashMap<String, ObjectFrame>();
-        Workpiece next = null;
+    public synchronized void load(ToolInfo info, boolean isSafety) throws CommandRejected {
+        Workpiece next = new Workpiece(info.name, LoadConversion.of(info, "load."));
+        take(next, add(next, info), isSafety);
+        mount(info);
+    }
+
+    public synchronized ToolInfo loadTemplate(String name, boolean isSafety) throws CommandRejected {
+        Object made;
         try {
-            if (info != null) {
-                next = new Workpiece(info.name, LoadConversion.of(info, "load."));
-                frames = add(next, info);
-                next.attachTo(motionFrame);
-            } else {
-                detach(workpiece);
-            }
+            made = data.<Object>createFromTemplate(name);
+        } catch (PersistenceException e) {
+            return null;
+        }
+        if (!(made instanceof Workpiece)) {
+            return null;
+        }
+        Workpiece next = (Workpiece) made;
+        take(next, children(next.getRootFrame()), isSafety);
+        ToolInfo info = describe(name, next.getLoadData(), next.getRootFrame(), pieceFrames);
+        mount(info);
+        return info;
+    }
+
+    public synchronized void unload() throws CommandRejected {
+        try {
+            takeOff();
+        } catch (RuntimeException e) {
+            putBack();
+            throw new CommandRejected(Code.EXECUTION_FAILED, "the cabinet does not detach the workpiece: " + e.getMessage());
+        }
+        workpiece = null;
+        hasSafetyWorkpiece = false;
+        pieceFrames = new LinkedHashMap<String, ObjectFrame>();
+        mount(null);
+    }
+
+    private void takeOff() {
+        if (hasSafetyWorkpiece) {
+            robot.setSafetyWorkpiece(null);
+        }
+        detach(workpiece);
+    }
+
+    /** Attaches the workpiece again after a refused change. */
+    private void putBack() {
+        if (workpiece != null) {
+            workpiece.attachTo(motionFrame);
+        }
+        if (hasSafetyWorkpiece) {
+            robot.setSafetyWorkpiece(workpiece);
+        }
+    }
+
+    private void take(Workpiece next, Map<String, ObjectFrame> frames, boolean isSafety) throws CommandRejected {
+        try {
+            next.attachTo(motionFrame);
         } catch (RuntimeException e) {
             throw new CommandRejected(Code.EXECUTION_FAILED, "the cabinet refuses the workpiece: " + e.getMessage());
         }
+        if (isSafety) {
+            count(next);
+        }
+        hasSafetyWorkpiece = isSafety;
         workpiece = next;
         pieceFrames = frames;
-        mount(info);
+    }
+
+    /** Makes an attached workpiece the safety workpiece; detaches it if the cabinet refuses. */
+    private void count(Workpiece next) throws CommandRejected {
+        try {
+            robot.setSafetyWorkpiece(next);
+        } catch (NoSuchMethodError e) {
+            detach(next);
+            throw new CommandRejected(Code.UNSUPPORTED, "safety", "true", "false", "this cabinet has no safety workpiece;"
+                    + " attach the workpiece without it");
+        } catch (RuntimeException e) {
+            detach(next);
+            throw new CommandRejected(Code.OUT_OF_RANGE, "safety", "true", "false", "the cabinet refuses " + next.getName()
+                    + " as the safety workpiece: " + e.getMessage() + "; check its load and the safety configuration, or attach it without safety");
+        }
+    }
+
+    /** Removes the safety workpiece of an earlier application: this one has attached nothing yet. */
+    private void reset(Log log) {
+        try {
+            robot.setSafetyWorkpiece(null);
+        } catch (NoSuchMethodError e) {
+            log.info("this cabinet has no safety workpiece: " + e);
+        } catch (RuntimeException e) {
+            log.warn("the cabinet keeps the safety workpiece of an earlier application: " + e.getMessage());
+        }
+    }
+
+    /** Name of the capability; throws NoSuchMethodException on a cabinet without safety workpieces. */
+    static String capability() throws NoSuchMethodException {
+        LBR.class.getMethod("setSafetyWorkpiece", Workpiece.class);
+        return "safety_workpieces";
     }
 
     private void mount(ToolInfo piece) {

@@ -6,10 +6,16 @@ public final class AttachLoad extends Message {
     public final ToolInfo load;
     /** false: detach the workpiece of that name */
     public final boolean attached;
+    /** true: the workpiece of the project's template of that name; the rest of load does not matter */
+    public final boolean template;
+    /** true: as the safety workpiece: the safety functions of the cabinet count its load, too, until it is detached */
+    public final boolean safety;
 
-    public AttachLoad(ToolInfo load, boolean attached) {
+    public AttachLoad(ToolInfo load, boolean attached, boolean template, boolean safety) {
         this.load = load;
         this.attached = attached;
+        this.template = template;
+        this.safety = safety;
     }
 
     public static final int TYPE = 50;
@@ -21,12 +27,16 @@ public final class AttachLoad extends Message {
     public void write(Encoder out) {
         load.write(out);
         out.putBool(attached);
+        out.putBool(template);
+        out.putBool(safety);
     }
 
     public static AttachLoad read(Decoder in) throws WireException {
         ToolInfo load = ToolInfo.read(in);
         boolean attached = in.getBool();
-        return new AttachLoad(load, attached);
+        boolean template = in.getBool();
+        boolean safety = in.getBool();
+        return new AttachLoad(load, attached, template, safety);
     }
 
     public void validate(String path) throws Violation {

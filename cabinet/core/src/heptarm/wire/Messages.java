@@ -182,6 +182,9 @@ public final class Messages {
             case 105:
                 message = SegmentReached.read(in);
                 break;
+            case 108:
+                message = StatesMissed.read(in);
+                break;
             case 107:
                 message = DialogClosed.read(in);
                 break;

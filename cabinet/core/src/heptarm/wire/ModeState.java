@@ -12,13 +12,16 @@ public final class ModeState {
     public final String workpiece;
     /** default motion frame: a frame of the tool, or flange */
     public final String frame;
+    /** workpiece whose load the safety functions of the cabinet count; empty: none */
+    public final String safety_workpiece;
 
-    public ModeState(long stamp, Mode mode, String tool, String workpiece, String frame) {
+    public ModeState(long stamp, Mode mode, String tool, String workpiece, String frame, String safety_workpiece) {
         this.stamp = stamp;
         this.mode = mode;
         this.tool = tool;
         this.workpiece = workpiece;
         this.frame = frame;
+        this.safety_workpiece = safety_workpiece;
     }
 
     public void write(Encoder out) {
@@ -28,6 +31,7 @@ public final class ModeState {
         out.putStr(tool);
         out.putStr(workpiece);
         out.putStr(frame);
+        out.putStr(safety_workpiece);
     }
 
     public static ModeState read(Decoder in) throws WireException {
@@ -36,7 +40,8 @@ public final class ModeState {
         String tool = in.getStr();
         String workpiece = in.getStr();
         String frame = in.getStr();
-        return new ModeState(stamp, mode, tool, workpiece, frame);
+        String safety_workpiece = in.getStr();
+        return new ModeState(stamp, mode, tool, workpiece, frame, safety_workpiece);
     }
 
     public void validate(String path) throws Violation {

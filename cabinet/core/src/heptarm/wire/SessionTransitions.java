@@ -113,6 +113,7 @@ public final class SessionTransitions {
                     case 103:
                     case 104:
                     case 105:
+                    case 108:
                     case 107:
                     case 112:
                         return SessionState.OPEN;

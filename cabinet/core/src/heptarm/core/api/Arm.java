@@ -20,6 +20,7 @@ import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.ConditionNode;
 import heptarm.wire.DefineTool;
+import heptarm.wire.FrameInfo;
 import heptarm.wire.Item;
 import heptarm.wire.Message;
 import heptarm.wire.Mode;
@@ -40,6 +41,7 @@ import heptarm.wire.SetOverride;
 import heptarm.wire.SetSignal;
 import heptarm.wire.SetSignals;
 import heptarm.wire.SignalInfo;
+import heptarm.wire.Shape;
 import heptarm.wire.Stop;
 import heptarm.wire.StopKind;
 import heptarm.wire.ToolInfo;
@@ -248,15 +250,39 @@ public final class Arm implements EventBus.Listener {
 
     /** Attach a workpiece to the motion frame. */
     public void load(ToolInfo workpiece) throws CommandRejected {
-        command(new AttachLoad(workpiece, true));
+        command(new AttachLoad(workpiece, true, false, false));
+    }
+
+    /** Attach a workpiece to the motion frame, as the safety workpiece: the safety functions of the cabinet count its load, too. */
+    public void loadAsSafety(ToolInfo workpiece) throws CommandRejected {
+        command(new AttachLoad(workpiece, true, false, true));
+    }
+
+    /** Attach the workpiece of a template of the project to the motion frame. */
+    public void load(String template) throws CommandRejected {
+        command(new AttachLoad(named(template), true, true, false));
+    }
+
+    /** Attach the workpiece of a template of the project to the motion frame, as the safety workpiece. */
+    public void loadAsSafety(String template) throws CommandRejected {
+        command(new AttachLoad(named(template), true, true, true));
     }
 
     /** Detach a workpiece. */
     public void unload(ToolInfo workpiece) throws CommandRejected {
-        command(new AttachLoad(workpiece, false));
+        unload(workpiece.name);
     }
 
-    /** Names of the attached tool, of the workpiece (empty: none), and of the motion frame. */
+    /** Detach a workpiece by its name. */
+    public void unload(String workpiece) throws CommandRejected {
+        command(new AttachLoad(named(workpiece), false, false, false));
+    }
+
+    private static ToolInfo named(String workpiece) {
+        return new ToolInfo(workpiece, 0.0, new double[3], new double[6], new FrameInfo[0], new Shape[0]);
+    }
+
+    /** Names of the attached tool, of the workpiece (empty: none), of the motion frame, and of the safety workpiece (empty: none). */
     public String[] attached() {
         return service.tools.attached();
     }

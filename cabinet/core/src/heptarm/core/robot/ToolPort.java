@@ -18,6 +18,16 @@ public interface ToolPort {
     /** Replaces the attached tool (null: none) and removes the workpiece; motions move the named frame from now on. */
     void attach(ToolInfo tool, String motionFrame) throws CommandRejected;
 
-    /** Attaches a workpiece to the motion frame; null: removes it. */
-    void load(ToolInfo workpiece) throws CommandRejected;
+    /**
+     * Attaches a workpiece to the motion frame. If the robot refuses, nothing is attached.
+     *
+     * @param isSafety also as the safety workpiece, whose load the safety functions count
+     */
+    void load(ToolInfo workpiece, boolean isSafety) throws CommandRejected;
+
+    /** The same with the workpiece of a template of the project; returns what is known of it, null if there is no such template. */
+    ToolInfo loadTemplate(String name, boolean isSafety) throws CommandRejected;
+
+    /** Removes the workpiece; afterwards there is no safety workpiece either. */
+    void unload() throws CommandRejected;
 }

@@ -21,6 +21,7 @@ import heptarm.wire.Message;
 import heptarm.wire.Messages;
 import heptarm.wire.Protocol;
 import heptarm.wire.State;
+import heptarm.wire.StatesMissed;
 import heptarm.wire.Welcome;
 
 /**
@@ -61,7 +62,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private long unhurried = Long.MIN_VALUE;
     private volatile boolean open;
     private volatile boolean ending;
-    private long dropped;
+    /** States that were due and were not sent, and those of them that the client has received a report of. */
+    private long missed;
+    private long reported;
 
     private int seq;
     private int expected;
@@ -395,7 +398,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         } finally {
             synchronized (outbox) {
                 writing = false;
-                if (ending || !events.isEmpty() || !states.isEmpty()) {
+                if (ending || !events.isEmpty() || !states.isEmpty() || missed > reported) {
                     outbox.notify(); // only then: waking the writer for nothing costs as much as the whole answer
                 }
             }
@@ -435,7 +438,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         byte[] frame = frames.frame(state, 0);
         long began = System.nanoTime();
         synchronized (outbox) {
-            if (writing || ending || gone || began < unhurried || !events.isEmpty() || !states.isEmpty()) {
+            if (writing || ending || gone || began < unhurried || !events.isEmpty() || !states.isEmpty() || missed > reported) {
                 queue(frame);
                 return;
             }
@@ -447,7 +450,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         } finally {
             synchronized (outbox) {
                 writing = false;
-                if (ending || !events.isEmpty()) {
+                if (ending || !events.isEmpty() || missed > reported) {
                     outbox.notify();
                 }
             }
@@ -467,9 +470,17 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         synchronized (outbox) {
             if (states.size() >= MAX_STATES) {
                 states.poll();
-                dropped++;
+                missed++;
             }
             states.add(frame);
+            outbox.notify();
+        }
+    }
+
+    /** States that were due were not sampled. */
+    public void miss(long count) {
+        synchronized (outbox) {
+            missed += count;
             outbox.notify();
         }
     }
@@ -492,14 +503,17 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             while (!gone) {
                 byte[] frame;
                 synchronized (outbox) {
-                    while (!gone && (writing || events.isEmpty() && states.isEmpty() && !ending)) {
+                    while (!gone && (writing || events.isEmpty() && states.isEmpty() && missed == reported && !ending)) {
                         outbox.wait();
                     }
                     frame = events.poll();
                     if (frame == null && ending) {
                         break;
                     }
-                    if (frame == null) {
+                    if (frame == null && missed > reported) { // one report for all, however many the client has missed
+                        frame = frames.frame(new StatesMissed(missed - reported), 0);
+                        reported = missed;
+                    } else if (frame == null) {
                         frame = states.poll();
                     }
                     writing = frame != null;
@@ -580,8 +594,8 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             log.warn("closing " + address() + ": " + e);
         }
         owner.closed(this, why);
-        if (dropped > 0) {
-            log.info(dropped + " states were dropped for " + name() + ", which reads too slowly");
+        if (missed > 0) {
+            log.info(missed + " states were due for " + name() + " and were not sent: it reads too slowly, or they were sampled late");
         }
     }
 

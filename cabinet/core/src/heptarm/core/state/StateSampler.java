@@ -43,6 +43,9 @@ public final class StateSampler {
 
         /** Takes a state in the sampler's thread as far as that goes; called while there is no other subscriber to delay. */
         void receiveAlone(State state);
+
+        /** Takes the number of states that were due before the next one and were not sampled. */
+        void miss(long count);
     }
 
     /** What reading a group costs, and when to read it next. On a cabinet each getter takes about 2 ms. */
@@ -65,6 +68,9 @@ public final class StateSampler {
         final int groups;
         final long period;
         long due;
+        /** States that were not sampled since the last one that was; before the first one none count. */
+        long missed;
+        boolean hasBegun;
 
         Subscription(int groups, long period, long due) {
             this.groups = groups;
@@ -197,13 +203,19 @@ public final class StateSampler {
             if (one.due > now) {
                 continue;
             }
-            one.due += one.period;
-            if (one.due <= now) { // subscribed while this thread slept: it gets no past states
+            if (one.missed > 0) {
+                entry.getKey().miss(one.missed);
+            }
+            long planned = one.due + one.period;
+            one.due = planned;
+            if (one.due <= now) { // this thread woke too late for past states
                 one.due = now / one.period * one.period + one.period;
             }
             if (clock.nanos() - one.due > TOO_LATE * one.period) {
                 one.due = clock.nanos() / one.period * one.period + one.period;
             }
+            one.missed = one.hasBegun ? (one.due - planned) / one.period : 0;
+            one.hasBegun = true;
             State state = one.groups == due ? all : choose(all, one.groups);
             if (subscriptions.size() == 1) {
                 entry.getKey().receiveAlone(state);
@@ -258,7 +270,7 @@ public final class StateSampler {
         }
         if ((groups & Groups.MODE) != 0) { // needs no reading of the robot
             String[] attached = tools.attached();
-            mode = new ModeState(now, motions.status().mode, attached[0], attached[1], attached[2]);
+            mode = new ModeState(now, motions.status().mode, attached[0], attached[1], attached[2], attached[3]);
         }
         return choose(new State(joints, torques, pose, wrench, motion, safety, io, mode), groups);
     }

@@ -27,7 +27,12 @@ public final class ToolChange implements MotionExecutor.Change {
         } else if (message instanceof AttachTool) {
             tools.attach(((AttachTool) message).name, ((AttachTool) message).frame);
         } else {
-            tools.load(((AttachLoad) message).load, ((AttachLoad) message).attached, "load.");
+            AttachLoad change = (AttachLoad) message;
+            if (change.attached) {
+                tools.load(change.load, change.template, change.safety, "load.");
+            } else {
+                tools.unload(change.load.name, "load.");
+            }
         }
     }
 }

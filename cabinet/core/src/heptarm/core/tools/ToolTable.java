@@ -28,6 +28,7 @@ public final class ToolTable {
     private final Map<String, ToolInfo> defined = new LinkedHashMap<String, ToolInfo>();
     private ToolInfo tool;
     private ToolInfo workpiece;
+    private boolean isSafety;
     private String motionFrame = FLANGE;
 
     /** @param events receives each change of what is attached */
@@ -47,9 +48,10 @@ public final class ToolTable {
         return all.values().toArray(new ToolInfo[all.size()]);
     }
 
-    /** Names of tool, workpiece (empty: none) and motion frame. */
+    /** Names of tool and workpiece (empty: none), of the motion frame, and of the safety workpiece (empty: none). */
     public synchronized String[] attached() {
-        return new String[] {tool == null ? "" : tool.name, workpiece == null ? "" : workpiece.name, motionFrame};
+        String held = workpiece == null ? "" : workpiece.name;
+        return new String[] {tool == null ? "" : tool.name, held, motionFrame, isSafety ? held : ""};
     }
 
     synchronized void define(ToolInfo newer, String path) throws CommandRejected {
@@ -99,26 +101,39 @@ public final class ToolTable {
         tool = chosen;
         motionFrame = main;
         workpiece = null;
+        isSafety = false;
         events.publish(new ToolChanged(tool, workpiece));
     }
 
-    synchronized void load(ToolInfo newer, boolean attached, String path) throws CommandRejected {
+    /** @param isTemplate the workpiece is that of the project's template of the same name */
+    synchronized void load(ToolInfo newer, boolean isTemplate, boolean safety, String path) throws CommandRejected {
         ToolChecks.check(newer, path);
-        String present = workpiece == null ? "" : workpiece.name;
-        if (!attached) {
-            if (!newer.name.equals(present)) {
-                throw new CommandRejected(Code.UNKNOWN_NAME, path + "name", newer.name, present, "workpiece " + newer.name + " is not attached; attached: " + (present.length() == 0 ? "none" : present));
-            }
-            port.load(null);
-            workpiece = null;
-            events.publish(new ToolChanged(tool, workpiece));
-            return;
-        }
         if (workpiece != null) {
-            throw new CommandRejected(Code.BUSY, path + "name", newer.name, "", "workpiece " + present + " is attached; detach it first");
+            throw new CommandRejected(Code.BUSY, path + "name", newer.name, "", "workpiece " + workpiece.name + " is attached; detach it first");
         }
-        port.load(newer);
-        workpiece = newer;
+        ToolInfo held = newer;
+        if (isTemplate) {
+            held = port.loadTemplate(newer.name, safety);
+        } else {
+            port.load(newer, safety);
+        }
+        if (held == null) {
+            throw new CommandRejected(Code.UNKNOWN_NAME, path + "name", newer.name, "", "the project has no workpiece template "
+                    + newer.name + "; add it in Sunrise Workbench, or give the workpiece's mass instead of its name");
+        }
+        workpiece = held;
+        isSafety = safety;
+        events.publish(new ToolChanged(tool, workpiece));
+    }
+
+    synchronized void unload(String name, String path) throws CommandRejected {
+        String present = workpiece == null ? "" : workpiece.name;
+        if (!name.equals(present)) {
+            throw new CommandRejected(Code.UNKNOWN_NAME, path + "name", name, present, "workpiece " + name + " is not attached; attached: " + (present.length() == 0 ? "none" : present));
+        }
+        port.unload();
+        workpiece = null;
+        isSafety = false;
         events.publish(new ToolChanged(tool, workpiece));
     }
 

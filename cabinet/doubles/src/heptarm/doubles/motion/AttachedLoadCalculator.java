@@ -6,12 +6,13 @@ import com.kuka.roboticsAPI.geometricModel.LoadData;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.geometricModel.SceneGraphObject;
+import com.kuka.roboticsAPI.geometricModel.Workpiece;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
 import heptarm.doubles.seam.AttachedLoad;
 
-/** Combines the load data of everything attached to a flange into one body. */
+/** Combines the load data of what is attached to a flange into one body. */
 public final class AttachedLoadCalculator {
     private static final double MM = 1e-3;
 
@@ -22,29 +23,51 @@ public final class AttachedLoadCalculator {
     private AttachedLoadCalculator() {
     }
 
-    /** The payload in the flange's axes. */
+    /** The payload in the flange's axes: everything that is attached. */
     public static AttachedLoad of(ObjectFrame flange, List<SceneGraphObject> attached) {
         AttachedLoadCalculator total = new AttachedLoadCalculator();
-        total.add(flange, attached);
-        AttachedLoad load = new AttachedLoad();
-        load.mass = total.mass;
-        for (int i = 0; i < 3; i++) {
-            load.centre[i] = total.mass > 0 ? total.moment[i] / total.mass : 0.0;
+        total.add(flange, attached, true);
+        return total.load();
+    }
+
+    /**
+     * The payload that safety functions count: what is attached besides workpieces, and the safety workpiece.
+     *
+     * @param workpiece null: none
+     * @param at where the workpiece is, in the flange frame
+     */
+    public static AttachedLoad ofSafety(ObjectFrame flange, List<SceneGraphObject> attached, Workpiece workpiece, Transformation at) {
+        AttachedLoadCalculator total = new AttachedLoadCalculator();
+        total.add(flange, attached, false);
+        if (workpiece != null) {
+            total.add(workpiece.getLoadData(), at.compose(workpiece.getLoadData().centre()));
         }
-        double[][] own = steiner(total.mass, load.centre);
-        double[][] i = total.inertia;
+        return total.load();
+    }
+
+    private AttachedLoad load() {
+        AttachedLoad load = new AttachedLoad();
+        load.mass = mass;
+        for (int i = 0; i < 3; i++) {
+            load.centre[i] = mass > 0 ? moment[i] / mass : 0.0;
+        }
+        double[][] own = steiner(mass, load.centre);
+        double[][] i = inertia;
         load.inertia = new double[] {i[0][0] - own[0][0], i[1][1] - own[1][1], i[2][2] - own[2][2], i[0][1] - own[0][1],
             i[0][2] - own[0][2], i[1][2] - own[1][2]};
         return load;
     }
 
-    private void add(ObjectFrame flange, List<SceneGraphObject> objects) {
+    private void add(ObjectFrame flange, List<SceneGraphObject> objects, boolean withWorkpieces) {
         for (SceneGraphObject one : objects) {
+            if (one instanceof Workpiece && !withWorkpieces) {
+                continue;
+            }
             if (one instanceof PhysicalObject) {
                 LoadData load = ((PhysicalObject) one).getLoadData();
                 add(load, flange.transformationTo(((PhysicalObject) one).getRootFrame()).compose(load.centre()));
             }
-            add(flange, one.getChildren());
+            add(flange, one.getChildren(), withWorkpieces);
         }
     }
 

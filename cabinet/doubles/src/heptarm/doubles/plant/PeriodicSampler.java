@@ -2,7 +2,6 @@ package heptarm.doubles.plant;
 
 import java.util.function.LongConsumer;
 
-import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.Seam;
 
 /**
@@ -10,7 +9,6 @@ import heptarm.doubles.seam.Seam;
  * A thread that is later than the plant's record leaves samples out.
  */
 public final class PeriodicSampler {
-    private final Station station;
     private final long period;
     private final LongConsumer sample;
     private final Thread thread;
@@ -20,8 +18,7 @@ public final class PeriodicSampler {
      * @param period [ns]
      * @param sample called with the time since the first sample [ns]
      */
-    public PeriodicSampler(Station station, long period, LongConsumer sample) {
-        this.station = station;
+    public PeriodicSampler(long period, LongConsumer sample) {
         this.period = period;
         this.sample = sample;
         this.thread = new Thread(this::run, "sampling");

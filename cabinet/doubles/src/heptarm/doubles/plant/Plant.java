@@ -64,6 +64,13 @@ public interface Plant {
     /** Sets the load data of everything attached to the flange. */
     void setAttachedLoad(AttachedLoad load);
 
+    /**
+     * Sets the load that the safety functions count on the flange: tools and the safety workpiece.
+     *
+     * @param workpiece mass of the safety workpiece [kg], 0: none; refused beyond what the safety configuration allows
+     */
+    void setSafetyLoad(AttachedLoad load, double workpiece);
+
     /** Sets the shapes of everything attached to the flange; they collide from the next tick on. */
     void setCarriedBodies(CarriedBodies carried);
 }

@@ -19,6 +19,8 @@ import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.SceneGraphObject;
+import com.kuka.roboticsAPI.geometricModel.Tool;
 import com.kuka.roboticsAPI.geometricModel.Workpiece;
 import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
@@ -64,6 +66,9 @@ public abstract class LBR extends Robot {
     private final ForwardKinematics kinematics;
     private final ObjectFrame root;
     private final ObjectFrame flange;
+    private final Object safetyLock = new Object();
+    private Workpiece safetyWorkpiece;
+    private Transformation safetyPlace = Transformation.IDENTITY; // in the flange frame
     private volatile Object home = new JointPosition(AXES);
     private final AtomicLong ids = new AtomicLong();
     private final Map<MotionContainer, Boolean> open = new LinkedHashMap<>(); // value: asynchronous
@@ -101,8 +106,43 @@ public abstract class LBR extends Robot {
     public void attachTo(AbstractFrame frame) {
     }
 
-    /** Has no effect: the simulation has no safety functions. */
+    /**
+     * Selects the workpiece whose load the safety functions count beside that of the tools; null: none. It counts where it is attached
+     * to the robot, after it was detached where it was; before that at the motion frame of the first tool, or at the flange.
+     *
+     * @throws IllegalArgumentException it is heavier than the safety configuration allows; the one before stays selected
+     */
     public void setSafetyWorkpiece(Workpiece workpiece) {
+        synchronized (safetyLock) {
+            if (workpiece == null && safetyWorkpiece == null) {
+                return;
+            }
+            Transformation at = workpiece == null ? Transformation.IDENTITY : held(workpiece, holding());
+            setSafetyLoad(workpiece, at);
+            safetyWorkpiece = workpiece;
+            safetyPlace = at;
+        }
+        station.settle();
+    }
+
+    /** Where a workpiece is attached, in the flange frame; elsewhere if it is not attached to this robot. */
+    private Transformation held(Workpiece workpiece, Transformation elsewhere) {
+        return workpiece.carrier() == this ? flange.transformationTo(workpiece.getRootFrame()) : elsewhere;
+    }
+
+    /** The frame at which tools hold workpieces, in the flange frame. */
+    private Transformation holding() {
+        for (SceneGraphObject one : getChildren()) {
+            if (one instanceof Tool) {
+                return flange.transformationTo(((Tool) one).getDefaultMotionFrame());
+            }
+        }
+        return Transformation.IDENTITY;
+    }
+
+    private void setSafetyLoad(Workpiece workpiece, Transformation at) {
+        double mass = workpiece == null ? 0.0 : workpiece.getLoadData().getMass();
+        station.plant.setSafetyLoad(AttachedLoadCalculator.ofSafety(flange, getChildren(), workpiece, at), mass);
     }
 
     /** Home position of ptpHome; default: all zeros. */
@@ -124,6 +164,12 @@ public abstract class LBR extends Robot {
     /** Transfers the load to the controller after something was attached or detached; for the simulation. */
     public void carries() {
         station.plant.setAttachedLoad(AttachedLoadCalculator.of(flange, getChildren()));
+        synchronized (safetyLock) {
+            if (safetyWorkpiece != null) {
+                safetyPlace = held(safetyWorkpiece, safetyPlace);
+            }
+            setSafetyLoad(safetyWorkpiece, safetyPlace);
+        }
         station.settle();
     }
 

@@ -197,7 +197,7 @@ public class DataRecorder {
             throw new IllegalStateException("cannot write " + file(), e);
         }
         out.println("time " + String.join(" ", names));
-        sampling = new PeriodicSampler(station, TimeUnit.MILLISECONDS.toNanos(sampleInterval), this::sample);
+        sampling = new PeriodicSampler(TimeUnit.MILLISECONDS.toNanos(sampleInterval), this::sample);
         sampling.start();
     }
 

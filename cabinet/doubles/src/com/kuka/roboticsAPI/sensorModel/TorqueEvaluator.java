@@ -31,7 +31,7 @@ public class TorqueEvaluator {
         java.util.Arrays.fill(most, 0.0);
         int word = measured ? StateWords.TAU : StateWords.TAU_CMD;
         double[] torques = new double[most.length];
-        sampling = new PeriodicSampler(station, PERIOD_NS, nanos -> {
+        sampling = new PeriodicSampler(PERIOD_NS, nanos -> {
             station.sharedState.read(word, torques);
             for (int i = 0; i < most.length; i++) {
                 most[i] = Math.max(most[i], Math.abs(torques[i]));
