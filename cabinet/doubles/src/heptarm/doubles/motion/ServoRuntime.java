@@ -194,7 +194,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     public synchronized void setGoalReachedEventHandler(IServoOnGoalReachedEvent listener) {
         handler = listener;
         if (watching == null) {
-            watching = new PeriodicSampler(station, WATCH_NS, this::watch);
+            watching = new PeriodicSampler(WATCH_NS, this::watch);
             watching.start();
         }
     }
