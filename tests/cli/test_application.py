@@ -93,9 +93,25 @@ def test_its_error_is_reported_and_process_data_can_be_given(lab: Path) -> None:
 
 @needs_javac
 def test_what_does_not_compile_is_reported_with_the_compilers_words(lab: Path) -> None:
-    (lab / "src" / "lab" / "Bad.java").write_text("class Bad { int x = nothing; }")
+    (lab / "src" / "lab" / "Bad.java").write_text("package lab; class Bad { int x = nothing; }")
+    (lab / "src" / "lab" / "Nod.java").write_text(
+        FOREIGN.replace("private LBR", "private Bad bad; private LBR")
+    )
     with pytest.raises(CommandRejected, match=r"(?s)does not compile.*nothing"):
         compile_application(lab, lab)
+
+
+@needs_javac
+def test_what_the_application_does_not_need_may_be_wrong(lab: Path) -> None:
+    folder = lab / "src" / "lab"
+    (folder / "Old.java").write_text("package lab; class Old extends RoboticsAPIApplicatoin { int x = ; }")
+    (folder / "UsesOld.java").write_text("package lab; class UsesOld { Old old = new Old(); }")
+    out = lab.parent / "what is right"
+    out.mkdir()
+    found = compile_application(lab, out)
+    assert (out / "lab" / "Nod.class").exists()
+    assert [line.partition(" ")[0] for line in found.left_out] == ["src/lab/Old.java", "src/lab/UsesOld.java"]
+    assert "illegal start of expression" in found.left_out[0]
 
 
 @needs_javac
@@ -241,7 +257,8 @@ def test_the_hint_of_a_compile_error_fits_the_error(tmp_path: Path) -> None:
     own = wrong(tmp_path, "int x = nothing;")
     assert "please report" not in own
     assert "correct the sources" in own
-    assert "--app-class Wrong" in own
+    gone = wrong(tmp_path, "JAXBContext context;", "import javax.xml.bind.JAXBContext;")
+    assert "no longer offers javax.xml.bind.JAXBContext" in gone
 
 
 @needs_javac
@@ -338,10 +355,11 @@ def test_a_typed_line_answers_a_dialog_that_reports_what_to_type(asking: Path) -
 @pytest.mark.parametrize(
     "options",
     [
-        ("--view",),
+        ("--panel",),
         ("--view-port", "8081"),
+        ("--meshes", "."),
+        ("--count", "2"),
         ("--host", "0.0.0.0"),
-        ("--port", "0"),
         ("--key-file", "cell.key"),
         ("--fri", "1.15"),
         ("--fri-io", "G.S<bool"),

@@ -49,8 +49,8 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
         ("set Cell.Door ajar", "true or false"),
         ("set Cell.Door 1", "unknown or ambiguous"),
         ("press 4", "slot must be"),
-        ("press 1 heptarm third", "the second"),
-        ("press 1", "no user key 1"),
+        ("press 1 heptarm third", "no user key 1 in a bar 'heptarm third'"),
+        ("press 1", "no user key 1 that only one bar has.*there are: none"),
         ("answer 0", "no open dialog"),
     ],
 )
@@ -144,7 +144,8 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
     operator.do("press 2")
     operator.do("press 0 heptarm")
     operator.do("press 1 heptarm second")
-    assert pressed == [("client", 2), ("heptarm", 0), ("heptarm", 5)]
+    operator.do("press 1 My keys")
+    assert pressed == [("", 2), ("heptarm", 0), ("heptarm", 5), ("My keys", 1)]
     assert plant.signals.names == ("Cell.Door", "Flange.Door")
 
 

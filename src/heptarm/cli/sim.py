@@ -30,6 +30,7 @@ from heptarm.values.simulator_options import RealTime, SimulatorOptions
 
 _APP = Group("Your own application")
 
+_PORT = 30001
 #: Most cabinets that one command runs.
 _MOST = 64
 _LAST_PORT = 65535
@@ -47,7 +48,13 @@ def sim(
     *,
     model: Model = "iiwa14",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
+    port: Annotated[
+        int | None,
+        Parameter(
+            help="Port; 0 takes a free one. Default: 30001. With --app: clients may observe it there, as "
+            "`heptarm state` and `heptarm record` do, and stop the arm."
+        ),
+    ] = None,
     count: Annotated[
         int,
         Parameter(
@@ -253,15 +260,14 @@ def sim(
             hint="0 simulates as fast as possible",
         )
     if application is not None:
+        observed = view or port is not None
         defaults = {
-            "--view": (view, False),
             "--panel": (panel, False),
-            "--view-port": (view_port, 8080),
-            "--meshes": (meshes, ""),
-            "--host": (host, "127.0.0.1"),
-            "--port": (port, 30001),
+            "--view-port": (view_port, view_port if view else 8080),
+            "--meshes": (meshes, meshes if view else ""),
+            "--host": (host, host if observed else "127.0.0.1"),
             "--count": (count, 1),
-            "--key-file": (key_file, None),
+            "--key-file": (key_file, key_file if observed else None),
             "--fri": (fri, None),
             "--fri-command": (fri_command, "position"),
             "--fri-client": (fri_client, "127.0.0.1:30200"),
@@ -283,16 +289,24 @@ def sim(
             data=app_data,
             answers=(*_read_answers(answers), *answer),
             addresses=addresses,
-            model=model,
-            speed=speed,
-            real_time=real_time,
-            faults=fault,
-            payload=payload,
-            safety=safety,
-            sensors=sensors,
-            scene=scene,
-            project=project,
-            verbose=verbose,
+            cabinet=SimulatorOptions(
+                model=model,
+                host=host,
+                port=_checked_port(port or 0, "port"),
+                observed=observed,
+                speed=speed,
+                real_time=real_time,
+                fault=fault,
+                payload=payload,
+                safety=safety,
+                sensors=sensors,
+                scene=scene,
+                project=project,
+                parent_pipe=True,
+                verbose=verbose,
+            ),
+            page=_Page("view" if view else "", _checked_port(view_port, "view-port"), meshes),
+            key_file=key_file,
             as_json=as_json,
         )
     given = {
@@ -351,15 +365,13 @@ def sim(
         raise CommandRejected(
             "--view and --panel show the same cabinet", parameter="view", hint="leave out --view"
         )
-    page = "panel" if panel else "view" if view else ""
-    _check_port(port, "port")
-    _check_port(view_port, "view-port")
-    _check_count(count, port, page=page)
-    _check_meshes(meshes, page=page)
+    page = _Page("panel" if panel else "view" if view else "", _checked_port(view_port, "view-port"), meshes)
+    first = _checked_port(_PORT if port is None else port, "port")
+    _check_count(count, first, page=page.name)
     cabinet = SimulatorOptions(
         model=model,
         host=host,
-        port=port,
+        port=first,
         speed=speed,
         real_time=real_time,
         fault=fault,
@@ -373,32 +385,66 @@ def sim(
     )
     if count > 1:
         return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
-    return _cabinet(
-        cabinet, page=page, page_port=view_port, meshes=meshes, key_file=key_file, as_json=as_json
-    )
+    return _cabinet(cabinet, page=page, key_file=key_file, as_json=as_json)
 
 
-def _check_meshes(folder: str, *, page: str) -> None:
-    """Check meshes for the page before anything starts.
+class _Page:
+    """The page in the browser beside a cabinet, in a process of its own.
+
+    Args:
+        name: "panel" or "view", which only shows; empty: no page.
+        port: its TCP port.
+        meshes: folder with meshes of the arm; empty: heptarm's own.
 
     Raises:
-        CommandRejected: there is no page to use them, or they cannot be used.
+        CommandRejected: there is no page to use the meshes, or they cannot be used.
     """
-    if not folder:
-        return
-    if not page:
-        raise CommandRejected("--meshes needs --view or --panel", parameter="meshes", hint="add --view")
-    require_extra("sim")
-    from heptarm.sim.plant.appearance import ArmMeshes
 
-    try:
-        ArmMeshes.of(folder)
-    except ValueError as error:
-        raise CommandRejected(str(error), parameter="meshes", value=folder) from None
+    def __init__(self, name: str, port: int, meshes: str) -> None:
+        self.name = name
+        self._port = port
+        self._meshes = meshes
+        if not meshes:
+            return
+        if not name:
+            raise CommandRejected("--meshes needs --view or --panel", parameter="meshes", hint="add --view")
+        require_extra("sim")
+        from heptarm.sim.plant.appearance import ArmMeshes
+
+        try:
+            ArmMeshes.of(meshes)
+        except ValueError as error:
+            raise CommandRejected(str(error), parameter="meshes", value=meshes) from None
+
+    def positions(self, stack: ExitStack, options: SimulatorOptions) -> SimulatorOptions:
+        """The options of the cabinet, which has to share the positions of a scene with the page."""
+        if not (self.name and options.scene):
+            return options
+        folder = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-")))
+        return replace(options, positions=folder / "positions")
+
+    def open(
+        self, stack: ExitStack, target: str, key: str | None, options: SimulatorOptions
+    ) -> tuple[subprocess.Popen[str], str]:
+        """Open the page of a running cabinet; return its process and its URL.
+
+        Raises:
+            ConnectFailed: it does not start.
+        """
+        command = [sys.executable, "-m", "heptarm.panel.process", "--target", target]
+        command += ["--port", str(self._port)]
+        if options.positions is not None:
+            command += ["--scene", options.scene, "--positions", str(options.positions)]
+        if self._meshes:
+            command += ["--meshes", self._meshes]
+        if self.name == "view":
+            command += ["--read-only"]
+        process = stack.enter_context(_child(command, key))
+        return process, str(_ready(process, f"the {self.name} does not start")["url"])
 
 
-def _check_port(port: int, name: str) -> None:
-    """Check a port to listen on.
+def _checked_port(port: int, name: str) -> int:
+    """A port to listen on.
 
     Raises:
         CommandRejected: there is no such port.
@@ -411,6 +457,7 @@ def _check_port(port: int, name: str) -> None:
             allowed=f"[0, {_LAST_PORT}]",
             hint="0 takes a free one",
         )
+    return port
 
 
 def _check_count(count: int, port: int, *, page: str) -> None:
@@ -513,9 +560,7 @@ def _type_to_all(cabinets: list[subprocess.Popen[str]], as_json: bool) -> None:
 def _cabinet(
     options: SimulatorOptions,
     *,
-    page: str,
-    page_port: int,
-    meshes: str,
+    page: _Page,
     key_file: Path | None,
     as_json: bool,
 ) -> int:
@@ -523,9 +568,7 @@ def _cabinet(
 
     Args:
         options: of the cabinet.
-        page: "panel" or "view", which only shows; empty: no page in the browser.
-        page_port: TCP port of the page.
-        meshes: folder with meshes of the arm for the page; empty: heptarm's own.
+        page: in the browser.
         key_file: file with the key.
         as_json: print JSON.
 
@@ -537,31 +580,19 @@ def _cabinet(
     key = find_key(key_file=key_file, host=host, port=port)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
-        positions = None
-        if page and options.scene:
-            positions = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-"))) / "positions"
-            options = replace(options, positions=positions)
+        options = page.positions(stack, options)
         cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
-        if page:
-            command = [sys.executable, "-m", "heptarm.panel.process", "--target", target]
-            command += ["--port", str(page_port)]
-            if positions is not None:
-                command += ["--scene", options.scene, "--positions", str(positions)]
-            if meshes:
-                command += ["--meshes", meshes]
-            if page == "view":
-                command += ["--read-only"]
-            viewer = stack.enter_context(_child(command, key))
-            ready[page] = _ready(viewer, f"the {page} does not start")["url"]
+        if page.name:
+            viewer, ready[page.name] = page.open(stack, target, key, options)
             threading.Thread(target=_careful, args=(_obey, viewer, cabinet), daemon=True).start()
         if as_json:
             emit(ready | {"target": target})
         else:
             print(f"A virtual {model} is ready. Connect with {target}; Ctrl-C ends it.")
-            if page:
-                print(f"{'See it' if page == 'view' else 'The panel is'} at {ready[page]}")
+            if page.name:
+                print(f"{'See it' if page.name == 'view' else 'The panel is'} at {ready[page.name]}")
             if sys.stdin is not None and sys.stdin.isatty():
                 print("You are the operator: type emergency_stop, clear, start, t1, enable ... or help.")
             sys.stdout.flush()
@@ -588,8 +619,12 @@ def _refuse_beside_app(names: set[str]) -> None:
         CommandRejected: there is such an option.
     """
     for name in sorted(names):
-        if name.startswith(("--view", "--panel")) or name == "--meshes":
-            reason = "the page in the browser needs heptarm's own application in the cabinet"
+        if name == "--panel":
+            reason = "the panel commands the arm, which your application does; --view shows it"
+        elif name in ("--view-port", "--meshes"):
+            reason = "they belong to the page that --view opens"
+        elif name in ("--host", "--key-file"):
+            reason = "your application opens its own connections; for clients that observe it, add --port"
         elif name.startswith("--fri"):
             reason = "an FRI session is opened by the application itself"
         else:
@@ -635,16 +670,9 @@ def _application(
     data: tuple[str, ...],
     answers: tuple[int, ...],
     addresses: tuple[str, ...],
-    model: str,
-    speed: float,
-    real_time: RealTime,
-    faults: tuple[str, ...],
-    payload: str,
-    safety: str,
-    sensors: str,
-    scene: str,
-    project: Path | None,
-    verbose: bool,
+    cabinet: SimulatorOptions,
+    page: _Page,
+    key_file: Path | None,
     as_json: bool,
 ) -> int:
     """Compile another application and run it to its end; return the exit code.
@@ -666,9 +694,9 @@ def _application(
             value=min(answers),
         )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with TemporaryDirectory(prefix="heptarm-") as out:
+    with TemporaryDirectory(prefix="heptarm-") as out, ExitStack() as stack:
         application = compile_application(folder, Path(out), main=main, addresses=mapped)
-        data_file = project or application.project
+        data_file = cabinet.project or application.project
         notes = [*application.left_out]
         for address in unused_addresses(folder, data_file, mapped):
             notes.append(
@@ -677,10 +705,8 @@ def _application(
             )
         for note in notes:
             print(f"heptarm: {note}", file=sys.stderr, flush=True)
-        options = SimulatorOptions(
-            model=model,
-            speed=speed,
-            real_time=real_time,
+        options = replace(
+            cabinet,
             application=application.main,
             background=application.background,
             classpath=(out, *map(str, application.jars)),
@@ -688,30 +714,37 @@ def _application(
             data=data,
             map=addresses,
             answer=answers,
-            fault=faults,
-            payload=payload,
-            safety=safety,
-            sensors=sensors,
-            scene=scene,
-            parent_pipe=True,
-            verbose=verbose,
         )
         failure = ""
-        with _child(_command(options), None) as cabinet:
+        key = find_key(key_file=key_file, host=options.host, port=options.port) if options.observed else None
+        options = page.positions(stack, options)
+        with _child(_command(options), key) as running, ExitStack() as pages:
             try:
-                ready = _first(cabinet, "the virtual cabinet does not start")
+                ready = _first(running, "the virtual cabinet does not start")
                 if not ready.get("ready"):
                     raise ConnectFailed(f"the virtual cabinet does not start: {ready.get('error')}")
                 if not as_json:
-                    print(f"{application.main} runs on a virtual {model}; Ctrl-C deselects it.", flush=True)
+                    print(
+                        f"{application.main} runs on a virtual {options.model}; Ctrl-C deselects it.",
+                        flush=True,
+                    )
                     if sys.stdin is not None and sys.stdin.isatty():
                         print(
                             "You are the operator: type answer 0, press 0, emergency_stop, clear ... or help.",
                             flush=True,
                         )
-                _listen(cabinet, as_json)
-                failure = _answer(cabinet, as_json)  # until it ends; closing its input would end it
-                cabinet.wait()
+                if options.observed:
+                    ready["target"] = f"sim://{options.host}:{ready['port']}"
+                    if page.name:
+                        _, ready[page.name] = page.open(pages, ready["target"], key, options)
+                    if as_json:
+                        emit(ready)
+                    else:
+                        seen = f", or see it at {ready[page.name]}" if page.name else ""
+                        print(f"Observe it with {ready['target']}{seen}", flush=True)
+                _listen(running, as_json)
+                failure = _answer(running, as_json)  # until it ends; closing its input would end it
+                running.wait()
             except KeyboardInterrupt:
                 return 0
         if as_json:
@@ -720,7 +753,7 @@ def _application(
             print(f"heptarm: {application.main} ended with an error: {failure}", file=sys.stderr)
             if _NOT_HERE in failure:
                 print(f"heptarm: {_NOT_HERE_HINT}", file=sys.stderr)
-        return 1 if failure or cabinet.returncode else 0
+        return 1 if failure or running.returncode else 0
 
 
 def _command(options: SimulatorOptions) -> list[str]:

@@ -49,6 +49,10 @@ class SimulatorOptions:
     background: tuple[str, ...] = field(
         default=(), metadata=_about("class of a background task of that application; may be repeated")
     )
+    observed: bool = field(
+        default=False,
+        metadata=_about("also serve clients that observe that application and may stop the arm"),
+    )
     classpath: tuple[str, ...] = field(
         default=(), metadata=_about("folder or jar with its classes; may be repeated")
     )

@@ -41,6 +41,7 @@ import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.ioModel.AbstractIOGroup;
 import com.kuka.roboticsAPI.ioModel.IOTypes;
 import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceControlMode;
@@ -99,6 +100,7 @@ public class Members extends RoboticsAPIApplication {
     public void run() throws Exception {
         String file = getApplicationData().getProcessData("sample.file").getValue();
         out = new PrintWriter(file, "UTF-8");
+        say("process data as text", file.equals(String.valueOf(getApplicationData().getProcessData("sample.file").getValue())));
         say("a robot by its name", lbr != null && NAMED.length == 3);
         lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
         frames();
@@ -163,7 +165,7 @@ public class Members extends RoboticsAPIApplication {
         say("a hold of no length ends at once", true);
     }
 
-    private void conditions() throws InterruptedException {
+    private void conditions() throws Exception {
         final ICondition torque = new JointTorqueCondition(JointEnum.J1, -100, 100);
         ConditionObserver observer = getObserverManager().createConditionObserver(new NotCondition(torque), NotificationType.EdgesOnly,
                 (IRisingEdgeListener) (one, time, missed) -> { });
@@ -173,6 +175,12 @@ public class Members extends RoboticsAPIApplication {
         } catch (UnsupportedOperationException e) {
             say("a condition of one's own", true);
         }
+        IMotionContainer hold = lbr.moveAsync(new PositionHold(new PositionControlMode(), 15, TimeUnit.SECONDS));
+        boolean fired = getObserverManager().waitFor(torque, 5, TimeUnit.SECONDS);
+        say("waiting for a condition takes simulated time", !fired && !hold.isFinished());
+        hold.cancel();
+        hold.await(Long.MAX_VALUE, TimeUnit.DAYS);
+        say("and may have no end", hold.isFinished());
         final AtomicReference<PositionInformation> there = new AtomicReference<>();
         Frame up = lbr.getCurrentCartesianPosition(lbr.getFlange());
         up.setZ(up.getZ() + 100);

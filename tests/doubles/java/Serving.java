@@ -120,7 +120,9 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
                 runtime.setDestination((JointPosition) destination);
             }
             return false;
-        } catch (CommandInvalidException e) {
+        } catch (IllegalStateException e) { // of a destination
+            return true;
+        } catch (CommandInvalidException e) { // of a motion that has ended
             return true;
         }
     }
@@ -165,8 +167,9 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
             aside = Math.max(aside, Math.abs(here.getX() - start.getX() + 20 * fraction));
             aside = Math.max(aside, Math.abs(here.getZ() - start.getZ() + 40 * fraction));
         }
-        runtime.updateWithRealtimeSystem();
-        ThreadUtil.milliSleep(50);
+        for (int i = 0; i < 300 && reached == 0; i++) { // reported without an update, by a thread of the cabinet
+            ThreadUtil.milliSleep(10);
+        }
         Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
         say("SmartServoLIN arrives", here.distanceTo(there) < 0.5 && Math.abs(here.getAlphaRad() - there.getAlphaRad()) < 1e-3);
         say("on a straight line", aside < 1.0);
@@ -175,7 +178,7 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
         boolean refused = false;
         try {
             runtime.setDestination(new Frame(5000, 0, 0));
-        } catch (CommandInvalidException e) {
+        } catch (IllegalStateException e) {
             refused = true;
         }
         say("out of its reach", refused);

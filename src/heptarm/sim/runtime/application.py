@@ -30,8 +30,13 @@ _LEFT_OUT = ("bin", "KUKAJavaLib")
 _PACKAGE = re.compile(r"^\s*package\s+([\w.]+)\s*;", re.MULTILINE)
 #: A comment, or a literal in which the signs of a comment mean nothing.
 _COMMENT = re.compile(r"""("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|/\*.*?\*/|//[^\n]*""", re.DOTALL)
+#: Packages that Java 6 offers and Java 17 does not: internal ones, CORBA, XML binding, web services and a few more.
+_GONE = (
+    r"(?:com\.)?sun\.[\w.]+?|org\.omg(?:\.\w+)+?|javax\.(?:xml\.bind|xml\.ws|xml\.soap|jws|activation|annotation|transaction|"
+    r"activity|rmi)(?:\.\w+)*?|java\.(?:security\.acl|rmi\.activation)"
+)
 _INTERNAL = re.compile(
-    r"^[ \t]*import\s+(?:static\s+)?((?:com\.)?sun\.[\w.]+?|com\.kuka\.[\w.]+?)\.(\w+|\*)\s*;", re.MULTILINE
+    rf"^[ \t]*import\s+(?:static\s+)?({_GONE}|com\.kuka\.[\w.]+?)\.(\w+|\*)\s*;", re.MULTILINE
 )
 #: Packages of these names that a JDK of today still offers.
 _STILL_THERE = re.compile(
@@ -55,7 +60,7 @@ class Application:
         project: the project's `RoboticsAPI.data.xml`; None: there is none.
         background: classes of its background tasks.
         jars: its own libraries.
-        left_out: why a background task or a class of the project file is missing beside a chosen application.
+        left_out: why a class or a file of the project is missing beside the application.
     """
 
     main: str
@@ -155,7 +160,8 @@ def _modern(text: str, own: frozenset[str] = frozenset()) -> str:
                 named = f"{match[1]}.{match[2]}" in known or match[1] in known  # a member of a class
                 unused = not named and re.search(rf"\b{match[2]}\b", code) is None
         elif match[2] == "*":
-            unused = not _STILL_THERE.match(match[1])
+            # a jar of the project may have a public package; internal ones are in no jar
+            unused = re.match(r"(com\.)?sun\.", match[1]) is not None and not _STILL_THERE.match(match[1])
         else:
             unused = re.search(rf"\b{match[2]}\b", code) is None
         return re.sub(r"[^\n]", "", match[0]) if unused else match[0]
@@ -203,7 +209,8 @@ def compile_application(
     with TemporaryDirectory(prefix="heptarm-sources-") as place:
         copies = _Copies(Path(place), folder, sources, addresses)
         if not main:
-            _compile(copies, list(copies.names.values()), out, jars, chosen=chosen)
+            left_out += _compile_all(copies, chosen, out, jars)
+            tasks = [task for task in tasks if task in _compiled(out)]
         else:
             _compile(copies, [copies.of(chosen)], out, jars)
             text = read_source(data) if data is not None else ""
@@ -273,10 +280,38 @@ def _compiled(out: Path) -> set[str]:
     return {".".join(file.relative_to(out).with_suffix("").parts) for file in out.rglob("*.class")}
 
 
+def _compile_all(copies: _Copies, chosen: str, out: Path, jars: tuple[Path, ...]) -> list[str]:
+    """Compile all sources, as Workbench does: one that is wrong, and what needs it, is left out beside the application.
+
+    Returns:
+        Why files are left out.
+
+    Raises:
+        CommandRejected: the application itself is wrong, or it needs a file that is.
+    """
+    files = {copies.original(copy.as_posix()): copy for copy in copies.names.values()}
+    needed = copies.original(copies.of(chosen).as_posix())
+    refused: CommandRejected | None = None
+    left_out: list[str] = []
+    while True:
+        try:
+            _compile(copies, list(files.values()), out, jars, only=refused is not None)
+        except CommandRejected as error:
+            refused = refused or error
+            wrong = {file: text for file, text in reversed(_places(str(error))) if file in files}
+            if not wrong or needed in wrong:
+                raise refused from None
+            for file, text in sorted(wrong.items()):
+                del files[file]
+                left_out.append(f"{file} is left out, it does not compile: {text}")
+        else:
+            return left_out
+
+
 def _compile(
-    copies: _Copies, files: list[Path], out: Path, jars: tuple[Path, ...], *, chosen: str = ""
+    copies: _Copies, files: list[Path], out: Path, jars: tuple[Path, ...], *, only: bool = False
 ) -> None:
-    """Compile some sources and what they need of the others.
+    """Compile some sources and, unless only these, what they need of the others.
 
     Raises:
         CommandRejected: errors of the compiler, with a hint that fits them.
@@ -297,17 +332,15 @@ def _compile(
         *_EVERY_ERROR,
     ]
     # a project's own source counts before a class of the same name in a jar
-    command += ["-cp", path, "-Xprefer:source", "-sourcepath", os.pathsep.join(map(str, copies.roots))]
+    roots = [] if only else copies.roots
+    command += ["-cp", path, "-Xprefer:source", "-sourcepath", os.pathsep.join(map(str, roots))]
     # the hint reads javac's messages, so they have to be English
     command += ["-J-Duser.language=en", "-d", str(out), f"@{listing}"]
     done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
         text = copies.original(done.stderr.strip())
-        hints = _hints(text)
-        if chosen:
-            hints.append(f"--app-class {chosen} compiles only what that class needs")
         raise CommandRejected(
-            f"the application does not compile:\n{text}\n", parameter="app", hint="\n".join(hints)
+            f"the application does not compile:\n{text}\n", parameter="app", hint="\n".join(_hints(text))
         )
 
 
@@ -323,12 +356,14 @@ def _hints(text: str) -> list[str]:
         owner = _sunrise(location)
         if name.startswith("com.kuka."):
             members[f"package {name}"] = None
-        elif re.match(r"(com\.)?sun\.", name):
+        elif re.fullmatch(_GONE, name):
             internal[name] = None
         elif "." in name:
             packages[name] = None
         elif "illegal character" in message or "unmappable character" in message:
             encoding = True
+        elif message == "cannot find symbol" and re.fullmatch(rf"package ({_GONE})", location):
+            internal[f"{location.removeprefix('package ')}.{symbol.removeprefix('class ')}"] = None
         elif message == "cannot find symbol" and owner:
             members[f"{symbol} of {owner}"] = None
         elif (used := re.match(r"(?:method|constructor) (\w+) in \w+ (\w+)", message)) and _sunrise(used[2]):
@@ -341,7 +376,10 @@ def _hints(text: str) -> list[str]:
     if packages:
         found.append(f"put the jar of {', '.join(packages)} into a folder of the project")
     if internal:
-        found.append(f"Java 17 no longer offers {', '.join(internal)}: use a public class instead")
+        found.append(
+            f"Java 17 no longer offers {', '.join(internal)}: use a public class instead, or put a jar with it into a "
+            "folder of the project"
+        )
     if encoding:
         found.append("a character outside comments is neither UTF-8 nor windows-1252: save the file as UTF-8")
     if other or not found:
@@ -358,6 +396,11 @@ def _errors(text: str) -> list[tuple[str, str, str]]:
         elif found and (detail := _DETAIL.match(line)):
             found[-1][1 if detail[1] == "symbol" else 2] = re.sub(r"\s+", " ", detail[2])
     return [(message, symbol, location) for message, symbol, location in found]
+
+
+def _places(text: str) -> list[tuple[str, str]]:
+    """File and message of each error."""
+    return [(match[1], match[3]) for line in text.splitlines() if (match := _ERROR.match(line))]
 
 
 def _sunrise(location: str) -> str:

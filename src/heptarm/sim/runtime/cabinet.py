@@ -50,6 +50,9 @@ REAL_TIME_PRIORITY = 10
 
 _PORT_PROPERTY = "heptarm.port.bound"
 _START_TIMEOUT = 20.0
+_EXITED = (
+    "the application called System.exit, which would end the whole JVM of a cabinet: let run() return instead"
+)
 _HOUSEKEEPING = 0.1
 #: Ticks between two updates of the file of positions.
 _POSITIONS_EVERY = 30
@@ -92,6 +95,8 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
         for name, value in project.read_process_data(options.project).items():
             data[name] = addresses.apply(value) if isinstance(value, str) else value
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
+    if options.observed:
+        data |= {"heptarm.reserved_for": options.application.rpartition(".")[2], "heptarm.verbosity": 0}
     if key := find_key(key_file=options.key_file):
         data["heptarm.key"] = key
     for pair in options.data:
@@ -158,18 +163,28 @@ class VirtualCabinet:
         pad = jpype.JClass("heptarm.doubles.runtime.ApplicationServices")
         self.operator.answer = lambda button: bool(pad.current().pad.dialogs.press(button))
         self.operator.press = lambda bar, slot: bool(pad.current().pad.press(bar, slot))
-        self.host = jpype.JClass("heptarm.doubles.runtime.TaskRunner")(options.application or jvm.APPLICATION)
+        self.operator.keys = lambda: str(pad.current().pad.keys())
+        runner = jpype.JClass("heptarm.doubles.runtime.TaskRunner")
+        self.host = runner(options.application or jvm.APPLICATION)
+        self._server = self.host  # has the port for clients
+        if self.is_foreign:
+            self._server = runner.beside(jvm.APPLICATION) if options.observed else None
+            jpype.JClass("heptarm.doubles.runtime.ExitGuard").install(_failure(_EXITED))
 
     def start(self) -> None:
-        """Start the background tasks that start automatically, then the application."""
+        """Start what serves observers and the background tasks that start automatically, then the application."""
+        if self.is_observed:
+            self._server.start()
         for name in self.options.background:
             self._station.tasks.autoStart(name)
         self.host.start()
 
     def stop(self) -> None:
-        """Deselect the application, then stop the background tasks."""
+        """Deselect the application, then stop the background tasks and what serves observers."""
         self.host.stop()
         self._station.tasks.stopBackground()
+        if self.is_observed:
+            self._server.stop()
 
     def tick(self) -> None:
         """Advance operator, FRI and plant by one millisecond."""
@@ -187,8 +202,13 @@ class VirtualCabinet:
         """Whether another application than heptarm's runs."""
         return bool(self.options.application)
 
+    @property
+    def is_observed(self) -> bool:
+        """Whether clients may observe another application."""
+        return self.is_foreign and self._server is not None
+
     def port(self) -> int:
-        """The port that the application has opened.
+        """The port that heptarm's application has opened, for clients or for observers.
 
         Raises:
             RuntimeError: the application ended before.
@@ -198,10 +218,10 @@ class VirtualCabinet:
             bound = self._system.getProperty(_PORT_PROPERTY)
             if bound is not None:
                 return int(str(bound))
-            if not self.host.isAlive():
+            if not self._server.isAlive():
                 break
             time.sleep(0.002)
-        failure = str(self.host.failure() or "no reason given")
+        failure = str(self._server.failure() or "no reason given")
         if "Address already in use" in failure:
             failure = f"port {self.options.port} is in use by another program"
         raise RuntimeError(
@@ -315,7 +335,15 @@ def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[s
 
 def _wait_for_application(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
     """Run until the foreign application ends."""
-    print(json.dumps({"ready": True, "pid": os.getpid(), "model": cabinet.options.model}), flush=True)
+    ready: dict[str, Any] = {"ready": True, "pid": os.getpid(), "model": cabinet.options.model}
+    if cabinet.is_observed:
+        try:
+            ready["port"] = cabinet.port()
+        except RuntimeError as error:
+            failed.append(str(error))
+            cabinet.loop.stop()
+            return
+    print(json.dumps(ready), flush=True)
     while cabinet.host.isAlive():
         time.sleep(0.01)
     failure = cabinet.host.failure()
@@ -384,15 +412,23 @@ def main(argv: list[str] | None = None) -> int:
         stopping.set()
         failed.insert(0, f"the virtual cabinet has failed: {_described(error)}")
     if failed:
-        print(json.dumps({"ready": False, "error": failed[0]}), flush=True)
+        print(_failure(failed[0]), flush=True)
     # the JVM's shutdown may wait for its own threads; everything is closed, so exit at once
     sys.stdout.flush()
     os._exit(1 if failed else 0)
 
 
+def _failure(error: str) -> str:
+    """The line that reports why the process ends."""
+    return json.dumps({"ready": False, "error": error})
+
+
 def _described(error: Exception) -> str:
     """An error of the host in one line."""
     text = " ".join(str(error).split())
+    # an exception of Java names its class itself
+    if text.startswith(type(error).__name__) and (said := without_java(text)):
+        return said
     return text if isinstance(error, HeptarmError) else f"{type(error).__name__}: {text}"
 
 

@@ -44,6 +44,9 @@ _FOREIGN = (
     "-Dline.separator=\r\n",
     "-Duser.language=en",
     "-Duser.country=US",
+    # its libraries and recordings need more than heptarm's own application; nothing is taken before it is used
+    "-Xmx512m",
+    "-XX:MaxMetaspaceSize=256m",
 )
 
 

@@ -48,7 +48,7 @@ WORDS = {
     "where BODY": "show the pose of a body of the scene in the base: x y z [m] and quaternion x y z w",
     "set SIGNAL VALUE": "set a signal of the cabinet: a number, true or false",
     "answer BUTTON": "press a button of the dialog that is shown, from 0",
-    "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; optionally of another bar",
+    "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; BAR where several have it",
 }
 _ALSO = {
     "estop": "emergency_stop",
@@ -80,7 +80,7 @@ _COUNTS = {
     "push": (3, 4),
     "where": (1, 1),
     "set": (2, 2),
-    "press": (1, 3),
+    "press": (1, 20),  # the name of a bar may have blanks
     "answer": (1, 1),
 }
 #: A tick that began after an action has ended when so many ticks have begun.
@@ -145,11 +145,8 @@ def _named(words: str, name: str) -> list[float | str]:
     if name == "press":
         if first not in ("0", "1", "2", "3"):
             raise ValueError(f"{words!r}: slot must be 0 to 3, got {first}")
-        if rest[1:] not in ([], ["second"]):
-            raise ValueError(
-                f"{words!r}: after the bar only `second` is allowed, for the second half of a double key"
-            )
-        return [float(first), *rest]
+        half = rest[-1:] if rest[-1:] == ["second"] else []
+        return [float(first), " ".join(rest[: len(rest) - len(half)]), *half]
     value = rest[0].lower()
     try:
         return [first, _TRUTH[value] if value in _TRUTH else float(value)]
@@ -191,8 +188,10 @@ class SimulatedOperator:
             "press": self._press,
             "answer": self._answer,
         }
-        #: Presses a key of a bar of the smartPAD; returns whether there is one.
+        #: Presses a key of a bar of the smartPAD, "" for the only one that has it; returns whether there is one.
         self.press: Callable[[str, int], bool] = lambda bar, slot: False
+        #: What can be pressed, for people.
+        self.keys: Callable[[], str] = lambda: ""
         #: Presses a button of the open dialog; returns whether there is one.
         self.answer: Callable[[int], bool] = lambda button: False
         #: Called after each action, in its thread.
@@ -275,9 +274,12 @@ class SimulatedOperator:
     def _where(self, body: str) -> str:
         return " ".join(f"{value:.6f}" for value in self._plant.body_pose(body))
 
-    def _press(self, slot: float, bar: str = "client", half: str = "") -> None:
+    def _press(self, slot: float, bar: str, half: str = "") -> None:
         if not self.press(bar, int(slot) + (SLOTS if half else 0)):
-            raise ValueError(f"there is no user key {int(slot)} in a bar {bar!r}, or it is disabled")
+            where = f"in a bar {bar!r}" if bar else "that only one bar has"
+            raise ValueError(
+                f"there is no user key {int(slot)} {where}, or it is disabled; there are: {self.keys() or 'none'}"
+            )
 
     def _push(self, x: float, y: float, z: float, seconds: float = float("inf")) -> None:
         self._plant.apply_wrench((x, y, z), duration=seconds)

@@ -30,10 +30,14 @@ public class HeptarmApplication extends RoboticsAPIApplication {
         ServerSettings config = new ServerSettings(settings.text("heptarm.bind", "0.0.0.0"),
                 (int) settings.number("heptarm.port", Protocol.PORT), settings.text("heptarm.key", ""),
                 settings.text("heptarm.allow", ""), settings.number("heptarm.heartbeat", 0.5),
-                settings.number("heptarm.max_rate", 200.0), settings.number("heptarm.datagrams", 1) != 0);
+                settings.number("heptarm.max_rate", 200.0), settings.number("heptarm.datagrams", 1) != 0,
+                settings.text("heptarm.reserved_for", ""));
         keyWeakness = config.keyWeakness();
         SunrisePanel panel = new SunrisePanel(getApplicationData(), getApplicationUI(), log);
         server = new CabinetServer(SunriseRobot.of(lbr, this, panel, settings, log), config, Clocks.find(), log);
+        if (config.reservedFor.length() > 0) { // the keys belong to that application
+            return;
+        }
         try {
             panel.use(UserKeys.publish(this, server, log));
         } catch (LinkageError e) { // an old cabinet; everything else works without user keys

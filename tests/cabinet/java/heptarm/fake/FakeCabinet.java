@@ -24,7 +24,7 @@ public final class FakeCabinet {
         Clock clock = rate == 1.0 ? new RealClock() : new ScaledClock(rate);
         Robot robot = robot(clock, Math.round(Double.parseDouble(args[4]) * 1e9));
         CabinetServer server = new CabinetServer(robot, new ServerSettings("127.0.0.1", 0, args[1], args[2], Double.parseDouble(args[3]), 1000.0,
-                !"tcp".equals(args[5])),
+                !"tcp".equals(args[5]), ""),
                 clock, new ErrLog());
         System.out.println(server.start());
         BufferedReader in = new BufferedReader(new InputStreamReader(System.in));

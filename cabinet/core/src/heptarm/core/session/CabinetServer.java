@@ -42,6 +42,9 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         this.places = new Places(service.authority);
         this.datagrams = new DatagramPort(log);
         service.events.add(this);
+        if (settings.reservedFor.length() > 0) {
+            service.authority.reserve(settings.reservedFor);
+        }
         service.watchdog.add("the places of the clients", 5, places);
         service.watchdog.add("the connections", 1, new LinkWatchdog(places.clients, service.authority, settings.heartbeat, clock));
     }

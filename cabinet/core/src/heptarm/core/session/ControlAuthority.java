@@ -14,6 +14,9 @@ import heptarm.wire.OnLost;
 
 /** Who controls the robot: one client at most. A controller that is lost or silent loses control, and the arm stops. */
 public final class ControlAuthority {
+    /** Of a program of the cabinet; sessions of clients count from 1. */
+    private static final int NO_SESSION = 0;
+
     private final MotionPort port;
     private final MotionExecutor executor;
     private final FriMonitors monitors;
@@ -43,11 +46,32 @@ public final class ControlAuthority {
         this.log = log;
     }
 
+    /** Gives control to another program of the cabinet for good: clients may only observe and stop the robot. */
+    synchronized void reserve(final String program) {
+        controller = new Controller() {
+            public String name() {
+                return program;
+            }
+
+            public int session() {
+                return NO_SESSION;
+            }
+
+            public boolean isOpen() {
+                return true;
+            }
+        };
+    }
+
     synchronized void take(Controller client, double watchdogSeconds, OnLost whenLost) throws CommandRejected {
         if (!client.isOpen()) {
             throw new CommandRejected(Code.NOT_IN_CONTROL, "the connection of " + client.name() + " has ended; connect again");
         }
         if (controller != null && (controller != client || leaving)) {
+            if (controller.session() == NO_SESSION) {
+                throw new CommandRejected(Code.CONTROL_TAKEN, "controller", controller.name(), "", "the application "
+                        + controller.name() + " controls this robot: observe it with control=False");
+            }
             throw new CommandRejected(Code.CONTROL_TAKEN, "controller", controller.name(), "",
                     controller.name() + " (session " + controller.session() + ") controls this robot; wait until it releases control");
         }

@@ -26,8 +26,11 @@ public final class ServerSettings {
     public final double maxRate;
     /** Open the UDP port of the same number. */
     public final boolean datagrams;
+    /** The program that controls the robot instead of any client, which may observe and stop; empty: clients may control. */
+    public final String reservedFor;
 
-    public ServerSettings(String bind, int port, String key, String allow, double heartbeat, double maxRate, boolean datagrams) {
+    public ServerSettings(String bind, int port, String key, String allow, double heartbeat, double maxRate, boolean datagrams,
+            String reservedFor) {
         this.bind = bind;
         this.port = port;
         this.key = key;
@@ -35,6 +38,7 @@ public final class ServerSettings {
         this.heartbeat = heartbeat;
         this.maxRate = maxRate;
         this.datagrams = datagrams;
+        this.reservedFor = reservedFor;
     }
 
     /** Why the key is too weak; empty: it is strong enough, or there is none. The Python side has the same rule. */

@@ -1,6 +1,8 @@
 package heptarm.doubles.motion;
 
+import java.util.Arrays;
 import java.util.List;
+import java.util.stream.Collectors;
 
 import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
@@ -26,6 +28,12 @@ public abstract class AbstractCondition implements ICondition {
         }
 
         @Override
+        public String toString() {
+            String all = Arrays.stream(parts).map(String::valueOf).collect(Collectors.joining(kind == Kind.ANY ? " or " : " and "));
+            return kind == Kind.NOT ? "not " + all : "(" + all + ")";
+        }
+
+        @Override
         protected Condition forPlant(LBR robot) {
             Condition[] translated = translate(List.of(parts), robot);
             switch (kind) {
@@ -41,6 +49,12 @@ public abstract class AbstractCondition implements ICondition {
                     return not(translated[0]);
             }
         }
+    }
+
+    /** Its kind, for the log of an application. */
+    @Override
+    public String toString() {
+        return getClass().getSimpleName();
     }
 
     /** The condition in the plant's terms, in SI. */

@@ -211,7 +211,7 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
     }
 
     /** An exception in one listener of the application must not keep the others from being called. */
-    private void dispatch(Runnable event) {
+    void dispatch(Runnable event) {
         station.dispatch.execute(() -> {
             try {
                 event.run();
@@ -276,7 +276,7 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
     @Override
     public synchronized void await(long time, TimeUnit unit) throws TimeoutException {
         Clock clock = station.clock();
-        long deadline = clock.nanos() + unit.toNanos(time);
+        long deadline = station.after(time, unit);
         try {
             while (!isFinished()) {
                 if (!Clocks.await(this, clock, deadline)) {
@@ -341,7 +341,17 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
     @Override
     public synchronized IFiredConditionInfo getFiredBreakConditionInfo() {
         ICondition condition = broken;
-        return condition == null || !isFinished() ? null : () -> condition;
+        return condition == null || !isFinished() ? null : new IFiredConditionInfo() {
+            @Override
+            public ICondition getFiredCondition() {
+                return condition;
+            }
+
+            @Override
+            public String toString() {
+                return "fired condition: " + condition;
+            }
+        };
     }
 
     @Override

@@ -15,7 +15,9 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
+import heptarm.doubles.plant.PeriodicSampler;
 import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.Seam;
 import heptarm.doubles.seam.StateWords;
 
 /**
@@ -25,6 +27,10 @@ import heptarm.doubles.seam.StateWords;
 public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRuntime, ISmartServoLINRuntime {
     /** Remaining time while none is available. */
     private static final double UNKNOWN = -999.0;
+    /** Period of looking for reached goals. */
+    private static final long WATCH_NS = 5 * Seam.TICK_NS;
+    /** After so many ticks the state is that of the newest destination. */
+    private static final long TAKEN = 3;
 
     private final Station station;
     private final LBR robot;
@@ -37,6 +43,8 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     private IServoOnGoalReachedEvent handler;
     private int targets;
     private int reported;
+    private long seenFrom;
+    private PeriodicSampler watching;
 
     public ServoRuntime(Station station, LBR robot, MotionContainer container, ObjectFrame moved, IMotionControlMode mode,
             boolean isStraight) {
@@ -83,7 +91,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         }
         double[] joints = station.plant.inverse(MotionTranslator.pose(flange), Double.NaN, -1, near);
         if (joints == null) {
-            throw new CommandInvalidException("Can not plan motion: the destination of the servo motion is not reachable");
+            throw new IllegalStateException("Can not plan motion: the destination of the servo motion is not reachable");
         }
         JointPosition reached = new JointPosition(joints);
         return isStraight ? post(reached, MotionTranslator.pose(wanted.transformationFromWorld()), null) : post(reached, null);
@@ -103,37 +111,57 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         if (container.isFinished()) {
             throw new CommandInvalidException("cannot set a destination: the servo motion has ended; command a new one");
         }
-        robot.checkLimits(wanted);
+        try {
+            robot.checkLimits(wanted);
+        } catch (CommandInvalidException e) { // a running servo motion refuses a destination by another exception than a command
+            throw new IllegalStateException("the destination of the servo motion is invalid: " + e.getMessage(), e);
+        }
         synchronized (this) {
             destination = new JointPosition(wanted);
             targets++;
+            seenFrom = station.sharedState.newest() + TAKEN;
         }
         station.sharedState.postTarget(container.id, target, velocity);
-        return System.currentTimeMillis();
+        return station.stamp();
     }
 
     @Override
     public long updateWithRealtimeSystem() {
-        IServoOnGoalReachedEvent notified = null;
+        reportGoal();
+        return station.stamp();
+    }
+
+    private void reportGoal() {
+        double[] state = new double[StateWords.REMAINING + 1]; // in one piece: the time that is left belongs to its tick
+        station.sharedState.read(0, state);
+        long tick = Double.doubleToRawLongBits(state[StateWords.SEQ]) / 2 - 1;
+        boolean isReached = state[StateWords.REMAINING] <= 0.0;
+        IServoOnGoalReachedEvent notified;
         int target;
         synchronized (this) {
-            target = targets;
-            if (handler != null && reported < targets && isDestinationReached()) {
-                reported = targets;
-                notified = handler;
+            if (handler == null || reported == targets || tick < seenFrom || container.isFinished() || !isReached) {
+                return;
             }
+            reported = targets;
+            notified = handler;
+            target = targets;
         }
-        if (notified != null) {
-            IServoOnGoalReachedEvent one = notified;
-            double[] position = robot.getCurrentJointPosition().get();
-            station.dispatch.execute(() -> one.onGoalReachedEvent("GOAL_REACHED", position, new int[] {0, 0}, target));
+        double[] position = robot.getCurrentJointPosition().get();
+        container.dispatch(() -> notified.onGoalReachedEvent("GOAL_REACHED", position, new int[] {0, 0}, target));
+    }
+
+    /** Looks for reached goals while the motion runs: an application need not update the runtime to receive them. */
+    private void watch(long nanos) {
+        if (container.isFinished()) {
+            watching.stop();
+        } else {
+            reportGoal();
         }
-        return System.currentTimeMillis();
     }
 
     @Override
     public long getTimeStampOfSetRealtimeDestination() {
-        return System.currentTimeMillis();
+        return station.stamp();
     }
 
     @Override
@@ -165,6 +193,10 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     @Override
     public synchronized void setGoalReachedEventHandler(IServoOnGoalReachedEvent listener) {
         handler = listener;
+        if (watching == null) {
+            watching = new PeriodicSampler(WATCH_NS, this::watch);
+            watching.start();
+        }
     }
 
     @Override

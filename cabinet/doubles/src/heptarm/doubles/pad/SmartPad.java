@@ -2,7 +2,10 @@ package heptarm.doubles.pad;
 
 import java.util.ArrayList;
 import java.util.List;
+import java.util.Objects;
 import java.util.concurrent.CopyOnWriteArrayList;
+import java.util.concurrent.ExecutorService;
+import java.util.concurrent.Executors;
 
 import com.kuka.roboticsAPI.uiModel.ApplicationDialogType;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
@@ -14,14 +17,23 @@ import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyEvent;
 import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLED;
 import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLEDSize;
 
+import heptarm.doubles.runtime.ApplicationServices;
+
 /** User keys and dialogs of the smartPAD, operated by the simulated operator. */
 public final class SmartPad implements IApplicationUI {
     private static final int SLOTS = 4;
+    /** Bar of the keys that heptarm's clients set. */
+    private static final String CLIENT_BAR = "client";
     private static final UserKeyEvent[] SINGLE = {UserKeyEvent.KeyDown, UserKeyEvent.KeyUp};
     private static final UserKeyEvent[] FIRST = {UserKeyEvent.FirstKeyDown, UserKeyEvent.FirstKeyUp};
     private static final UserKeyEvent[] SECOND = {UserKeyEvent.SecondKeyDown, UserKeyEvent.SecondKeyUp};
 
     private final List<Bar> bars = new CopyOnWriteArrayList<>();
+    private final ExecutorService presses = Executors.newSingleThreadExecutor(task -> {
+        Thread thread = new Thread(task, "user-keys");
+        thread.setDaemon(true);
+        return thread;
+    });
 
     public final DialogQueue dialogs = new DialogQueue();
 
@@ -35,14 +47,43 @@ public final class SmartPad implements IApplicationUI {
         return new Bar(name);
     }
 
-    /** Presses and releases a key of a published bar; slots from 4 are second halves of double keys. False if the key is missing or disabled. */
+    /**
+     * Presses and releases a key of a published bar; slots from 4 are second halves of double keys. Without a name: of the bar for
+     * heptarm's clients if there is one, otherwise of the only bar that has the key. Its listener is called by a thread of the smartPAD.
+     *
+     * @return false if the key is missing, disabled, or in several bars
+     */
     public boolean press(String bar, int slot) {
+        String named = bar.isEmpty() && bars.stream().anyMatch(one -> one.name.equals(CLIENT_BAR)) ? CLIENT_BAR : bar;
+        List<Key> found = bars.stream().filter(one -> named.isEmpty() || one.name.equals(named)).map(one -> one.key(slot))
+                .filter(Objects::nonNull).toList();
+        if (found.isEmpty() || named.isEmpty() && found.size() > 1) {
+            return false;
+        }
+        Key pressed = found.get(0);
+        boolean second = slot >= SLOTS;
+        UserKeyEvent[] events = second ? SECOND : pressed.isDouble ? FIRST : SINGLE;
+        presses.execute(() -> {
+            try {
+                pressed.listener.onKeyEvent(pressed, events[0]);
+                pressed.listener.onKeyEvent(pressed, events[1]);
+            } catch (Throwable e) { // of the application: further keys work
+                ApplicationServices.current().logger.error("the listener of a user key ended with an error", e);
+            }
+        });
+        return true;
+    }
+
+    /** What can be pressed: slot, text and bar of each published key, separated by commas. */
+    public String keys() {
+        List<String> all = new ArrayList<>();
         for (Bar one : bars) {
-            if (one.name.equals(bar)) {
-                return one.press(slot);
+            for (Key key : one.keys) {
+                String text = key.text.isEmpty() ? "" : " (" + key.text + ")";
+                all.add("press " + key.slot + " " + one.name + text + (key.enabled ? "" : ", disabled"));
             }
         }
-        return false;
+        return String.join(", ", all);
     }
 
     /** Text on a key of a published bar; null if there is no such key. */
@@ -101,17 +142,14 @@ public final class SmartPad implements IApplicationUI {
             bars.add(this);
         }
 
-        boolean press(int slot) {
-            boolean second = slot >= SLOTS;
+        /** The enabled key of a slot, or with that second half; null: there is none. */
+        Key key(int slot) {
             for (Key key : keys) {
-                if (key.slot == slot % SLOTS && key.enabled && (key.isDouble || !second)) {
-                    UserKeyEvent[] events = second ? SECOND : key.isDouble ? FIRST : SINGLE;
-                    key.listener.onKeyEvent(key, events[0]);
-                    key.listener.onKeyEvent(key, events[1]);
-                    return true;
+                if (key.slot == slot % SLOTS && key.enabled && (key.isDouble || slot < SLOTS)) {
+                    return key;
                 }
             }
-            return false;
+            return null;
         }
     }
 

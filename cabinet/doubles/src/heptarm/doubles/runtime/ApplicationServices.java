@@ -2,6 +2,7 @@ package heptarm.doubles.runtime;
 
 import java.util.ArrayList;
 import java.util.List;
+import java.util.function.Consumer;
 import java.util.logging.Level;
 import java.util.logging.Logger;
 
@@ -29,11 +30,11 @@ public final class ApplicationServices implements IApplicationData, IApplication
     public final SmartPad pad;
     public final ObserverManager observers = new ObserverManager();
     private final Station station;
-    private final Runnable terminate;
+    private final Consumer<String> terminate;
     private volatile IErrorHandler errorHandler;
     private volatile double override = 1.0;
 
-    ApplicationServices(Station station, Runnable terminate) {
+    ApplicationServices(Station station, Consumer<String> terminate) {
         this.station = station;
         this.terminate = terminate;
         this.pad = station.pad;
@@ -69,14 +70,15 @@ public final class ApplicationServices implements IApplicationData, IApplication
     public void failed(IMotionContainer container, List<IMotionContainer> cancelled) {
         IErrorHandler handler = errorHandler;
         if (handler == null) {
-            logger.error("an asynchronous motion failed and no error handler is registered; the application ends: "
-                    + container.getErrorMessage());
-            terminate.run();
+            String why = "an asynchronous motion failed and no error handler is registered; the application ends: "
+                    + container.getErrorMessage();
+            logger.error(why);
+            terminate.accept(why);
             return;
         }
         ErrorHandlingAction action = handler.handleError(station.robot, container, new ArrayList<>(cancelled));
         if (action == ErrorHandlingAction.EndApplication) {
-            terminate.run();
+            terminate.accept("the application's error handler ended it after a motion failed: " + container.getErrorMessage());
         } else if (action == ErrorHandlingAction.PauseMotion) {
             station.plant.pause();
         }
@@ -154,7 +156,7 @@ public final class ApplicationServices implements IApplicationData, IApplication
         return new IProcessData() {
             @Override
             @SuppressWarnings("unchecked")
-            public <T> T getValue() {
+            public <T extends Object & Comparable<?>> T getValue() {
                 return (T) station.processData.get(id);
             }
 

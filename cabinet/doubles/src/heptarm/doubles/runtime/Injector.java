@@ -7,7 +7,9 @@ import java.lang.reflect.Field;
 import java.lang.reflect.Method;
 import java.lang.reflect.Modifier;
 import java.util.HashMap;
+import java.util.HashSet;
 import java.util.Map;
+import java.util.Set;
 
 import javax.annotation.PostConstruct;
 import javax.inject.Inject;
@@ -24,6 +26,7 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseLBR;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
+import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
@@ -38,6 +41,7 @@ final class Injector {
         ITaskLogger.class, IApplicationUI.class, ObserverManager.class, IApplicationControl.class, RoboticsAPIContext.class,
         ITaskManager.class, AutomaticResumeManager.class};
     private final Map<Class<?>, Object> singletons = new HashMap<>();
+    private final Set<Class<?>> underConstruction = new HashSet<>();
 
     Injector(ApplicationServices services, Station station) {
         this.services = services;
@@ -47,7 +51,7 @@ final class Injector {
     }
 
     /** Injects into annotated fields and methods; superclasses first, up to the first class of the cabinet. */
-    void fill(Object target) throws ReflectiveOperationException {
+    private void fill(Object target) throws ReflectiveOperationException {
         fill(target, target.getClass());
         construct(target, target.getClass());
     }
@@ -88,11 +92,15 @@ final class Injector {
         if (named != null && type.isAssignableFrom(SunriseLBR.class) && Device.class.isAssignableFrom(type)) {
             return device(named.value(), where);
         }
-        if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
-            return services.createFromTemplate(named.value());
-        }
-        if (named != null && type == IProcessData.class) {
-            return services.getProcessData(named.value());
+        try {
+            if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
+                return services.createFromTemplate(named.value());
+            }
+            if (named != null && type == IProcessData.class) {
+                return services.getProcessData(named.value());
+            }
+        } catch (PersistenceException e) {
+            throw new PersistenceException("nothing to inject into " + where + ": " + e.getMessage());
         }
         for (int i = 0; i < types.length; i++) {
             if (type.isAssignableFrom(types[i])) {
@@ -103,13 +111,7 @@ final class Injector {
             throw new IllegalArgumentException("nothing to inject into " + where);
         }
         Object made = singletons.get(type);
-        if (made == null) {
-            made = make(type, where);
-            if (type.isAnnotationPresent(Singleton.class)) {
-                singletons.put(type, made);
-            }
-        }
-        return made;
+        return made == null ? make(type, where) : made;
     }
 
     /** The robot, by its name in the station setup. */
@@ -129,7 +131,8 @@ final class Injector {
                 || name.startsWith("com.kuka.") && !name.startsWith("com.kuka.generated.");
     }
 
-    private Object make(Class<?> type, String where) throws ReflectiveOperationException {
+    /** A new object of a class of the project, by its constructor for injection or the one without parameters. */
+    Object make(Class<?> type, String where) throws ReflectiveOperationException {
         Constructor<?> chosen = null;
         for (Constructor<?> one : type.getDeclaredConstructors()) {
             if (one.isAnnotationPresent(Inject.class) || chosen == null && one.getParameterCount() == 0) {
@@ -138,12 +141,23 @@ final class Injector {
         }
         if (chosen == null) {
             throw new IllegalArgumentException("nothing to inject into " + where + ": " + type.getName()
-                    + " has no constructor for that");
+                    + " has neither a constructor with @Inject nor one without parameters");
         }
         chosen.setAccessible(true);
-        Object made = chosen.newInstance(arguments(chosen));
-        fill(made);
-        return made;
+        if (!underConstruction.add(type)) {
+            throw new IllegalArgumentException("nothing to inject into " + where + ": to construct a " + type.getName()
+                    + " takes another one, and so on; inject a field, or mark the class @Singleton");
+        }
+        try {
+            Object made = chosen.newInstance(arguments(chosen));
+            if (type.isAnnotationPresent(Singleton.class)) {
+                singletons.put(type, made); // before its fields: two of them may know each other
+            }
+            fill(made);
+            return made;
+        } finally {
+            underConstruction.remove(type);
+        }
     }
 
     private Object[] arguments(Executable called) throws ReflectiveOperationException {

@@ -5,6 +5,7 @@ import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
+import java.util.concurrent.TimeUnit;
 
 import com.kuka.roboticsAPI.RoboticsAPIContext;
 import com.kuka.roboticsAPI.controllerModel.Controller;
@@ -28,6 +29,8 @@ import heptarm.doubles.seam.Seam;
 /** The virtual cabinet of this JVM: plant, shared state, robot, project data, and the dispatch thread of listeners. */
 public final class Station {
     private static volatile Station current;
+
+    private final long opened = System.currentTimeMillis();
 
     public final Plant plant;
     public final RobotDescription description;
@@ -76,6 +79,18 @@ public final class Station {
     /** Simulation time. */
     public Clock clock() {
         return new PlantClock();
+    }
+
+    /** Simulation time after a duration from now [ns]; the longest durations never end. */
+    public long after(long time, TimeUnit unit) {
+        long now = clock().nanos();
+        long duration = unit.toNanos(time);
+        return duration > Long.MAX_VALUE - now ? Long.MAX_VALUE : now + duration;
+    }
+
+    /** Time stamp of the cabinet [ms]: the machine's time when it was switched on, and simulation time since. */
+    public long stamp() {
+        return opened + TimeUnit.NANOSECONDS.toMillis(clock().nanos());
     }
 
     /** Sleeps for a duration in simulation time [ns], from the present: the newest state may be older while the robot rests. */

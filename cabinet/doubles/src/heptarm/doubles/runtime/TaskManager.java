@@ -53,7 +53,12 @@ public final class TaskManager implements ITaskManager {
         if (category == null || !category.autoStart() || Modifier.isAbstract(type.getModifiers())) {
             return false;
         }
-        start(type);
+        try {
+            start(type);
+        } catch (RuntimeException e) { // the application starts all the same
+            ApplicationServices.current().logger.error("the background task " + className + " does not start", e);
+            return false;
+        }
         return true;
     }
 

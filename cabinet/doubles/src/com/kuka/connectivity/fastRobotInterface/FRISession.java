@@ -32,7 +32,7 @@ public class FRISession implements FriChannel {
     /** Waits until the quality of the connection suffices for an overlay. */
     public void await(long time, TimeUnit unit) throws TimeoutException {
         Clock clock = station.clock();
-        long deadline = clock.nanos() + unit.toNanos(time);
+        long deadline = station.after(time, unit);
         try {
             synchronized (this) {
                 while (information.getFRISessionState() == FRISessionState.IDLE

@@ -2,10 +2,10 @@ package com.kuka.roboticsAPI.conditionModel;
 
 import java.util.Collection;
 import java.util.concurrent.CopyOnWriteArrayList;
-import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 
 import heptarm.doubles.motion.AbstractCondition;
+import heptarm.doubles.plant.Occurrence;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.Condition;
@@ -51,16 +51,16 @@ public class ObserverManager {
 
     /** Waits until a condition is met. */
     public void waitFor(ICondition condition) {
-        waitFor(condition, Long.MAX_VALUE, TimeUnit.NANOSECONDS);
+        waitFor(condition, Long.MAX_VALUE, TimeUnit.DAYS);
     }
 
     /** Waits for a condition; false if it is not met within the time. */
     public boolean waitFor(ICondition condition, long time, TimeUnit unit) {
-        CountDownLatch held = new CountDownLatch(1);
+        Occurrence held = new Occurrence();
         Condition translated = AbstractCondition.translate(condition, station.robot);
         long watch = station.plant.watch(translated, true, holds -> {
             if (holds) {
-                held.countDown();
+                held.happen();
             }
         });
         try {

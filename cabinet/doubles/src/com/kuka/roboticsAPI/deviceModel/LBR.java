@@ -57,6 +57,8 @@ public abstract class LBR extends Robot {
     private static final double LARGEST_EXTERNAL = 10.0;
     private static final double AT_REST = 0.01;
     private static final double SINGULAR = 0.02;
+    private static final int STOPS = SafetyFlags.EMERGENCY_STOP | SafetyFlags.EXTERNAL_STOP | SafetyFlags.SAFEGUARD_OPEN
+            | SafetyFlags.PROTECTIVE_STOP | SafetyFlags.DRIVE_ERROR;
 
     private static final Pattern ESM_STATE = Pattern.compile("[1-9]|10");
 
@@ -367,8 +369,21 @@ public abstract class LBR extends Robot {
         }
         if (error != null) {
             container.finished(EndCause.ERROR, error);
+        } else {
+            reportWait(motion);
         }
         return container;
+    }
+
+    /** A motion that waits for the operator looks like a program that hangs: the log shows what to type, as for dialogs. */
+    private void reportWait(IMotion motion) {
+        long flags = station.sharedState.integer(StateWords.FLAGS);
+        boolean isReleased = getOperationMode() != OperationMode.AUT && (flags & SafetyFlags.ENABLED) == 0;
+        String steps = (flags & STOPS) != 0 ? "`clear` and `start`" : (flags & SafetyFlags.PAUSED) == 0 ? ""
+                : isReleased ? "`enable` and `start`" : "`start`";
+        if (!steps.isEmpty()) {
+            ApplicationServices.current().logger.warn(motion + " waits for the operator, since the arm is paused: type " + steps);
+        }
     }
 
     private void append(MotionContainer container, ObjectFrame moved, IMotion motion) {

@@ -14,6 +14,12 @@ public abstract class Motion<T extends Motion<T>> implements IMotion {
         return (T) this;
     }
 
+    /** Its kind, for the log of an application. */
+    @Override
+    public String toString() {
+        return getClass().getSimpleName();
+    }
+
     /** Write the kind of this motion and its own parameters into an order for the plant, in SI; for the simulation. */
     public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
         throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + getClass().getName());

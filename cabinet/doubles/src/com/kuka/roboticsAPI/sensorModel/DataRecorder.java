@@ -8,7 +8,6 @@ import java.net.URL;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Locale;
-import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 import java.util.function.Supplier;
 
@@ -20,6 +19,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
 
+import heptarm.doubles.plant.Occurrence;
 import heptarm.doubles.plant.PeriodicSampler;
 import heptarm.doubles.runtime.Station;
 
@@ -37,7 +37,7 @@ public class DataRecorder {
     private final Station station = Station.current();
     private final List<String> names = new ArrayList<>();
     private final List<Supplier<double[]>> sources = new ArrayList<>();
-    private final CountDownLatch written = new CountDownLatch(1);
+    private final Occurrence written = new Occurrence();
     private String fileName = "recording.log";
     private long timeout = -1; // [ns]
     private int sampleInterval = 1; // [ms]
@@ -217,7 +217,7 @@ public class DataRecorder {
 
     private void finish() {
         out.close();
-        written.countDown();
+        written.happen();
     }
 
     public synchronized void stopRecording() {
@@ -229,7 +229,7 @@ public class DataRecorder {
     }
 
     public boolean isFileAvailable() {
-        return written.getCount() == 0;
+        return written.hasHappened();
     }
 
     /** Waits for the end of the recording; false if it does not end within the time. */
