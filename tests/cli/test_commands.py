@@ -18,7 +18,7 @@ import pytest
 
 from heptarm.io.plan_box import PlanBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
-from tests.cli.running import objects, run, sim
+from tests.cli.running import HEPTARM, objects, run, sim
 from tests.retry import retry, starved
 
 
@@ -86,6 +86,15 @@ def test_state_as_a_table(target: str) -> None:
     assert done.returncode == 0
     for word in ("q [deg]", "tau_ext [Nm]", "flange", "ready to move"):
         assert word in done.stdout
+
+
+def test_state_watched_into_a_pipe_appears_at_once(target: str) -> None:
+    command = [*HEPTARM, "state", "--watch", "--target", target]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as watching:
+        assert watching.stdout is not None
+        titles = [line for line, _ in zip((one for one in watching.stdout if "LBR" in one), range(2))]
+        watching.kill()
+    assert len(titles) == 2
 
 
 def test_state_watched_for_a_while(target: str) -> None:

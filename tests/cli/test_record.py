@@ -13,6 +13,7 @@ import pytest
 import heptarm as ha
 from tests.cli.running import HEPTARM, objects, run
 from tests.conftest import RunningCabinet
+from tests.drawing import cannot_draw
 from tests.interrupts import ctrl_c_interrupts
 
 pytestmark = pytest.mark.slow
@@ -62,7 +63,9 @@ def test_plotted_and_converted(recorded: Path, tmp_path: Path) -> None:
         assert arrays["q"].shape == (found["states"], 7)
 
 
-def test_for_some_seconds(cabinet: RunningCabinet, tmp_path: Path) -> None:
+def test_for_some_seconds_with_pictures(cabinet: RunningCabinet, tmp_path: Path) -> None:
+    if why := cannot_draw():
+        pytest.skip(why)
     path = tmp_path / "a.mcap"
     (done,) = objects(
         "record", str(path), "--for", "0.5", "--camera-size", "160x120", "--target", cabinet.target

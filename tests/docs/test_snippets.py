@@ -1,7 +1,7 @@
 """Every Python snippet of the documentation runs, page by page, against one virtual cabinet.
 
 The blocks of a page run in order in one process, as a reader would type them. A block whose fence is
-``python no-run`` is only compiled; pages without a block that runs are skipped.
+``python no-run`` is only compiled, and so is a ``python needs-drawing`` where nothing can be drawn; pages without a block that runs are skipped.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.drawing import cannot_draw
 from tests.retry import busy, retry
 from tests.simulators import PATIENT, PATIENT_AND_FASTER
 
@@ -51,7 +52,8 @@ def _blocks(page: Path) -> list[tuple[int, str, bool]]:
     for match in BLOCK.finditer(text):
         indent, info, body = match.groups()
         source = "\n".join(line.removeprefix(indent) for line in body.splitlines()) + "\n"
-        found.append((text[: match.start()].count("\n") + 1, source, "no-run" not in info))
+        run = "no-run" not in info and not ("needs-drawing" in info and cannot_draw())
+        found.append((text[: match.start()].count("\n") + 1, source, run))
     return found
 
 

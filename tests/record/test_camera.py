@@ -23,6 +23,7 @@ from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from tests.arm.peer import Peer
 from tests.conftest import RunningCabinet
+from tests.drawing import cannot_draw
 from tests.processes import running
 from tests.simulators import PATIENT
 
@@ -36,12 +37,8 @@ CHANGED = 60
 @pytest.fixture(scope="module", autouse=True)
 def can_draw() -> None:
     """Skips where the machine has neither EGL nor OSMesa."""
-    feed = CameraFeed(SMALL, CameraSubject("iiwa14", lambda: ()))
-    try:
-        feed.start()
-    except CommandRejected as error:
-        pytest.skip(error.text)
-    feed.close()
+    if why := cannot_draw():
+        pytest.skip(why)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated
 
 import numpy as np
@@ -68,7 +69,13 @@ def _show_repeatedly(arm: Arm, rate: float, duration: float | None, *, as_json: 
         for state in arm.states(rate=rate, duration=duration):
             emit(state_data(state))
         return
-    with Live(auto_refresh=False, console=Console()) as live:
+    console = Console()
+    if not console.is_terminal:  # a live table would appear in a file when it ends
+        for state in arm.states(rate=rate, duration=duration):
+            console.print(table(arm, state))
+            sys.stdout.flush()
+        return
+    with Live(auto_refresh=False, console=console) as live:
         for state in arm.states(rate=rate, duration=duration):
             live.update(table(arm, state), refresh=True)
 
