@@ -1,7 +1,8 @@
 """Every Python snippet of the documentation runs, page by page, against one virtual cabinet.
 
 The blocks of a page run in order in one process, as a reader would type them. A block whose fence is
-``python no-run`` is only compiled, and so is a ``python needs-drawing`` where nothing can be drawn; pages without a block that runs are skipped.
+``python no-run`` is only compiled, and so is a ``python needs-drawing`` where nothing can be drawn; pages without a
+block that runs are skipped.
 """
 
 from __future__ import annotations
