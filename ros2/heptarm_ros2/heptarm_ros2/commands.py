@@ -68,8 +68,9 @@ class Commands:
         for service in self._services:
             self._node.destroy_service(service)
 
-    def _on_message(self, row: Topic) -> Callable[[Any, Any], None]:
-        def callback(message: Any, info: Any) -> None:
+    def _on_message(self, row: Topic) -> Callable[..., None]:
+        # rclpy's executor passes no info to it: that of Humble has none
+        def callback(message: Any, info: Any = None) -> None:
             try:
                 self._topics.handle(row, message, _sent(info))
             except HeptarmError as error:
@@ -85,5 +86,7 @@ class Commands:
 
 
 def _sent(info: Any) -> PublishInfo:
-    """What the middleware knows of the sending of a message: not all number them."""
+    """What the middleware knows of the publishing of a message: not all number them."""
+    if info is None:
+        return PublishInfo()
     return PublishInfo(number=info.get("publication_sequence_number"), time=1e-9 * info["source_timestamp"])
