@@ -104,7 +104,8 @@ def test_the_cabinet_does_what_was_planned(arm: ha.Arm, name: str) -> None:
     earliest, latest = (seen[k][0] * 1e-9 - offsets[0] for k in (before, before + 1))
     within = 0.01 * preview.duration + 0.01
     assert earliest - within < preview.duration < latest + within
-    assert result.duration > 0.99 * preview.duration  # until the arm has settled
+    # until the arm has settled; a busy cabinet notices the begin late
+    assert result.duration > 0.99 * preview.duration - 0.1
     assert end.q == pytest.approx(preview.q[-1], abs=1e-3)
     assert end.pose.distance_to(preview.end) < 1e-3 and end.pose.angle_to(preview.end) < 1e-3
 

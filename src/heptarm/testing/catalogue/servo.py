@@ -55,7 +55,8 @@ def _swing(arm: Arm, servo: JointServo, start: Array) -> float:
             far = max(far, float(state.q[6] - start[6]))
             target((state.stamp - first) * 1e-9)
             late = state.stamp - first > 10e9
-            if late or (abs(state.q[6] - start[6] - end) < 5e-3 and state.stamp - first > 0.8e9):
+            there = abs(state.q[6] - start[6] - end) < 5e-3 and abs(state.dq[6]) < 0.05  # not in passing
+            if late or (there and state.stamp - first > 0.8e9):
                 break
     return far
 
