@@ -59,7 +59,10 @@ class Execution:
         if not self.client.wait_for_result(rospy.Duration.from_sec(stop_after or allowed)):
             self.client.cancel_goal()
             return "PREEMPTED" if stop_after else "TIMED_OUT"
-        return STATUS[self.client.get_state()]
+        status = STATUS[self.client.get_state()]
+        if status == "ABORTED":
+            rospy.logerr(self.client.get_result().error_string)
+        return status
 
     def wait_for_rest(self) -> JointState:
         """Wait for three equal states in a row."""

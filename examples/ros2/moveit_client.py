@@ -77,7 +77,10 @@ class Execution(Node):
         ended = handle.get_result_async()
         rclpy.spin_until_future_complete(self, ended, timeout_sec=stop_after or allowed)
         if ended.done():
-            return STATUS[ended.result().status]
+            status = STATUS[ended.result().status]
+            if status == "ABORTED":
+                self.get_logger().error(ended.result().result.error_string)
+            return status
         cancelled = handle.cancel_goal_async()
         rclpy.spin_until_future_complete(self, cancelled)
         return "PREEMPTED" if stop_after else "TIMED_OUT"
