@@ -34,8 +34,8 @@ def run(command: list[str]) -> str:
 def run_python(script: Path, *arguments: str) -> str:
     """What a script prints. A busy node may send targets too late for the cabinet, which then stops the arm."""
 
-    def late(said: str) -> str:
-        return "servo targets came late" if "no target arrived" in said else ""
+    def late(said: object) -> str:
+        return "servo targets came late" if "no target arrived" in str(said) else ""
 
     return retry(lambda: run([sys.executable, str(script), *arguments]), late)
 

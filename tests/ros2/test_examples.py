@@ -25,7 +25,7 @@ def run(command: list[str]) -> str:
     """What a program prints. A busy node may send targets too late for the cabinet, which then stops the arm."""
     done = retry(
         lambda: subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=ROOT),
-        lambda done: "servo targets came late" if "no target arrived" in done.stderr else "",
+        lambda done: "servo targets came late" if "no target arrived" in str(done) else "",
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
