@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -105,12 +105,12 @@ class StateMessages:
         self._last: Any = None
         self._stamp = 0
 
-    def states(self, state: State, *, full: bool) -> Iterator[tuple[str, Any]]:
+    def states(self, state: State, *, full: Callable[[], bool]) -> Iterator[tuple[str, Any]]:
         """Make the messages of a state by topic, each stamped with the ROS time at which its group was measured.
 
         Args:
             state: the state.
-            full: also the topic with the full state.
+            full: whether the topic with the full state is wanted, too; asked when the others are published.
         """
         ros, groups = self._ros, state.groups
         measured = _measured(ros, state, groups.joints)
@@ -128,7 +128,7 @@ class StateMessages:
         if groups.wrench is not None:
             wrench = self._wrench_stamped(wrench=messages.wrench_message(ros, state))
             yield "wrench", _stamped(wrench, self._time_of(groups.wrench, state), self._base)
-        if full:
+        if full():
             yield "state", _stamped(self._robot_state(state), stamp, self._base)
 
     def controller_state(self, kind: Any, state: State, sample: TrajectorySample | None) -> Any:
