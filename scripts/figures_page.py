@@ -1,4 +1,4 @@
-"""Writes docs/explanation/figures.md from the newest stored run of `make bench` and bench/results/figures.toml."""
+"""Writes docs/explanation/figures.md from the newest stored runs of `make bench` and bench/results/figures.toml."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ $ make bench GROUP=state,fri    # some groups
 $ make bench ONLY=round_trip    # one benchmark
 $ make bench LIST=1             # groups, names and what they measure
 $ make bench STORE=1            # stores the run in bench/results as well
-$ make figures                  # writes this page from the newest stored run
+$ make figures                  # writes this page from the newest stored runs of one machine
 ```
 
 A figure has `name`, `group`, `value`, `unit`, `reference` (its floor, measured in the same run), `ratio`, `limit` (of
@@ -48,7 +48,7 @@ Record = dict[str, Any]
 
 
 def newest() -> tuple[Record, list[Record]]:
-    """Head and figures of the newest stored run.
+    """Head of the newest stored run, with the days of all figures, and each benchmark's newest figures on its machine.
 
     Raises:
         FileNotFoundError: no run is stored.
@@ -59,8 +59,19 @@ def newest() -> tuple[Record, list[Record]]:
         runs.append((head["date"], path.name, head, figures))
     if not runs:
         raise FileNotFoundError("no stored run in bench/results; make one with: make bench STORE=1")
-    _, _, head, figures = max(runs, key=lambda run: run[:2])
-    return head, figures
+    runs.sort(key=lambda run: run[:2], reverse=True)
+    head = runs[0][2]
+    found: list[Record] = []
+    days: list[str] = []
+    for date, _, other, figures in runs:
+        if any(other["machine"][what] != head["machine"][what] for what in ("cpu", "cores")):
+            continue
+        known = {figure["run"]["benchmark"] for figure in found}
+        newer = [figure for figure in figures if figure["run"]["benchmark"] not in known]
+        if newer:
+            found += newer
+            days.append(date)
+    return head | {"date": " and ".join(sorted(days))}, found
 
 
 def groups() -> list[Record]:
@@ -92,7 +103,8 @@ def _machine(head: Record, figures: list[Record]) -> list[str]:
         {f"{name}={value}" for one in figures for name, value in one["run"].get("settings", {}).items()}
     )
     lines = [
-        f"This page shows the run of {head['date']} on {machine['cores']} cores of {machine['cpu']}, "
+        f"This page shows the newest run of each benchmark, of {head['date']}, "
+        f"on {machine['cores']} cores of {machine['cpu']}, "
         f"{machine['kernel']}, Python {machine['python']}, "
         f"{'with' if machine['real_time'] else 'without'} realtime priority, of commit "
         f"{', '.join(f'`{commit}`' for commit in commits)}. Load average before the benchmarks: "

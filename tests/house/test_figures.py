@@ -36,7 +36,7 @@ def figures_page() -> ModuleType:
     return module
 
 
-def test_page_agrees_with_the_newest_stored_run(figures_page: ModuleType) -> None:
+def test_page_agrees_with_the_newest_stored_runs(figures_page: ModuleType) -> None:
     assert figures_page.PAGE.read_text() == figures_page.page(*figures_page.newest()), "run make figures"
 
 
