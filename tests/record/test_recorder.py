@@ -176,7 +176,7 @@ def test_a_motion_of_the_virtual_cabinet(arm: ha.Arm, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_fri_cycles_are_recorded_at_their_own_rate(arm: ha.Arm, tmp_path: Path) -> None:
-    with arm.record(tmp_path / "run.mcap") as rec, arm.fri("position", period_ms=5) as session:
+    with arm.record(tmp_path / "run.mcap"), arm.fri("position", period_ms=5) as session:
         while len(session.history()) < 150 and session.active:
             session.next()
     run = ha.load(tmp_path / "run.mcap")
