@@ -70,7 +70,7 @@ def test_for_some_seconds_with_pictures(cabinet: RunningCabinet, tmp_path: Path)
     (done,) = objects(
         "record", str(path), "--for", "0.5", "--camera-size", "160x120", "--target", cabinet.target
     )
-    assert done["states"] > 10 and done["lost"] >= 0 and done["bytes"] > 1000
+    assert done["states"] > 10 and done["bytes"] > 1000
     pictures = ha.load(path).pictures
     assert len(pictures) == done["pictures"] and done["pictures"] + done["pictures_dropped"] > 0
     out = run("convert", str(path), str(tmp_path / "a.npz"))

@@ -54,7 +54,7 @@ class TopicThread:
         self._subscriptions = list(subscriptions)
         self._ended = GuardCondition(None, None, self._context)
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name="heptarm-topics", daemon=True)
+        self._thread = threading.Thread(target=self._serve, name="heptarm-topics", daemon=True)
         self._thread.start()
 
     def end(self) -> None:
@@ -66,6 +66,14 @@ class TopicThread:
             self._ended.trigger()
         self._thread.join(_PATIENCE)
         self._ended.destroy()
+
+    def _serve(self) -> None:
+        """Serve the topics; an end that nobody asked for is reported."""
+        try:
+            self._run()
+        except Exception:
+            if not self._ending and self._context.ok():
+                self._log.fatal(f"no topic is handled any more; restart the node: {traceback.format_exc()}")
 
     def _run(self) -> None:
         handle = self._context.handle

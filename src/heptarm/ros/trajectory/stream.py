@@ -102,7 +102,10 @@ class PointStream:
         if pause > _LONGEST_GAP or (pause > 0.0 and np.abs(here.dq).max() < _REST):
             self._arrivals.clear()  # nothing was sent: that was no jitter
         self._arrivals.append(now)
-        self._points = deque((then + pause, place) for then, place in self._points if then + pause < time)
+        if pause:
+            self._points = deque((then + pause, place) for then, place in self._points)
+        while self._points and self._points[-1][0] >= time:
+            self._points.pop()  # of an earlier count
         self._points.append((time, q))
         while now - self._arrivals[0] > _HISTORY:
             self._arrivals.popleft()
