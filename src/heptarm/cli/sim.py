@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
@@ -259,6 +260,21 @@ def sim(
             allowed=f"0, [{_SLOWEST:g}, {_FASTEST:g}]",
             hint="0 simulates as fast as possible",
         )
+    simulator = partial(
+        SimulatorOptions,
+        model=model,
+        host=host,
+        speed=speed,
+        real_time=real_time,
+        fault=fault,
+        payload=payload,
+        safety=safety,
+        sensors=sensors,
+        scene=scene,
+        project=project,
+        parent_pipe=True,
+        verbose=verbose,
+    )
     if application is not None:
         observed = view or port is not None
         defaults = {
@@ -289,22 +305,7 @@ def sim(
             data=app_data,
             answers=(*_read_answers(answers), *answer),
             addresses=addresses,
-            cabinet=SimulatorOptions(
-                model=model,
-                host=host,
-                port=_checked_port(port or 0, "port"),
-                observed=observed,
-                speed=speed,
-                real_time=real_time,
-                fault=fault,
-                payload=payload,
-                safety=safety,
-                sensors=sensors,
-                scene=scene,
-                project=project,
-                parent_pipe=True,
-                verbose=verbose,
-            ),
+            cabinet=simulator(port=_checked_port(port or 0, "port"), observed=observed),
             page=_Page("view" if view else "", _checked_port(view_port, "view-port"), meshes),
             key_file=key_file,
             as_json=as_json,
@@ -368,21 +369,7 @@ def sim(
     page = _Page("panel" if panel else "view" if view else "", _checked_port(view_port, "view-port"), meshes)
     first = _checked_port(_PORT if port is None else port, "port")
     _check_count(count, first, page=page.name)
-    cabinet = SimulatorOptions(
-        model=model,
-        host=host,
-        port=first,
-        speed=speed,
-        real_time=real_time,
-        fault=fault,
-        payload=payload,
-        safety=safety,
-        sensors=sensors,
-        scene=scene,
-        project=project,
-        parent_pipe=True,
-        verbose=verbose,
-    )
+    cabinet = simulator(port=first)
     if count > 1:
         return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
     return _cabinet(cabinet, page=page, key_file=key_file, as_json=as_json)
