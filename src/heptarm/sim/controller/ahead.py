@@ -7,6 +7,8 @@ interpolator goes on tick by tick.
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 
 from heptarm.sim.controller.setpoints import SetPoints
@@ -14,8 +16,8 @@ from heptarm.sim.planning.jerk_profile import TimeLaw
 from heptarm.sim.planning.path import JointPath
 from heptarm.values.arrays import Array
 
-#: Ticks that are computed at once.
-MANY = 256
+#: Largest number of ticks that are computed at once: with this many, most motions need it once.
+MANY = 1024
 
 
 class SetPointsAhead:
@@ -34,15 +36,17 @@ class SetPointsAhead:
         places: s at each of them but the first.
         joints: set-points at each of them but the first, shape (7,) each [rad].
         last: the newest set-point that was taken.
+        ends: whether the last of them is the last before the end of the motion, or before one that cannot be followed.
     """
 
-    __slots__ = ("_index", "_size", "joints", "last", "place", "places", "step", "times")
+    __slots__ = ("_index", "_size", "ends", "joints", "last", "place", "places", "step", "times")
 
     def __init__(
         self, path: JointPath, profile: TimeLaw, time: float, step: float, command: SetPoints
     ) -> None:
         self.step, self.last, self._index, self.place = step, command.after, 0, 0.0
-        times = np.full(MANY + 1, step)
+        many = ceil(min(MANY - 1.0, max(0.0, profile.duration - time) / step)) + 1
+        times = np.full(many + 1, step)
         times[0] = time
         times = np.cumsum(times)
         places = np.clip(profile.places(times[1:]), 0.0, 1.0)
@@ -50,8 +54,14 @@ class SetPointsAhead:
         joints = joints[: command.followable(joints)]
         self.joints: list[Array] = list(joints)
         self._size = len(self.joints)
+        self.ends = self._size < MANY
         self.times: list[float] = times.tolist()
         self.places: list[float] = places.tolist()
+
+    @property
+    def used_up(self) -> bool:
+        """Whether every set-point was taken."""
+        return self._index >= self._size
 
     def take(self, time: float, step: float, here: Array) -> float:
         """Take the next set-point, which `last` and `place` then are.

@@ -400,6 +400,9 @@ class Interpolator:
             if step != run.step or step <= 0.0:  # the speed changes, or the motion pauses
                 run.step, run.ahead = step, None
                 return False
+            if ahead is not None and ahead.ends and ahead.used_up:  # the last ticks are computed one by one
+                run.is_direct = False
+                return False
             assert run.path is not None and run.profile is not None
             run.ahead = ahead = SetPointsAhead(run.path, run.profile, run.time, step, command)
             time = ahead.take(run.time, step, command.after)
