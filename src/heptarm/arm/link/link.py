@@ -187,9 +187,12 @@ _TURN = 0.0002
 _POLLING, _STEP = 30_000_000, 0.0005
 #: From this state rate on the link thread never polls, since states must be taken at once [Hz].
 _FAST_STATES = 250.0
-#: For this long after a loop has read its states [ns] the link thread leaves the socket to it, and looks after it once
-#: per step [s].
-_LOOPING, _LOOP_STEP = 5_000_000, 0.002
+#: From this state rate on a loop over states reads the socket itself [Hz].
+_LOOPED_STATES = 100.0
+#: After such a loop has read, the link thread leaves the socket to it for so many periods, and at least so long [ns].
+_LOOPING_PERIODS, _LOOPING = 1.5, 5_000_000
+#: Meanwhile it looks after the socket this many times.
+_LOOKS = 2.5
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
 #: Largest number of a target; they begin again at 0, which counts as newer than all.
@@ -246,7 +249,8 @@ class Link:
         self._requested = clock.nanos()
         self._heartbeat = Heartbeat(self._requested)
         self._polling = _POLLING
-        self._looped = self._requested - _LOOPING
+        self._looping = 0
+        self._looped = self._requested
         self._datagrams: DatagramLine | None = None
         self._targets = 0
         self._pushing = threading.Lock()  # states and pings arrive over TCP and by datagram
@@ -383,6 +387,7 @@ class Link:
     def expect_states(self, rate: float) -> None:
         """Prepare for this many pushed states per second of our clock [Hz]."""
         self._polling = _POLLING if rate <= _FAST_STATES else 0
+        self._looping = 0 if rate < _LOOPED_STATES else max(_LOOPING, round(_LOOPING_PERIODS * 1e9 / rate))
 
     def request(
         self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
@@ -448,7 +453,7 @@ class Link:
             waits: whether it still waits.
             seconds: how long at most [s].
         """
-        if self._polling or self._datagrams is not None or self.is_read_here:
+        if not self._looping or self._datagrams is not None or self.is_read_here:
             return
         if not self._reading.acquire(timeout=_TURN):
             return
@@ -633,9 +638,9 @@ class Link:
                     self.ping()
                     due = now + self._heartbeat.interval
                 rest = max(0.0, (due - now) * 1e-9)
-                if now - self._looped < _LOOPING:
+                if now - self._looped < self._looping:
                     # a loop over states reads, and is back within a moment
-                    clock.sleep(_LOOP_STEP)
+                    clock.sleep(self._looping * 1e-9 / _LOOKS)
                     self._heartbeat.check(clock.nanos(), self.peer)
                 elif self._caller_reads:
                     # a caller reads; most are done within a fraction of a millisecond
