@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +15,7 @@ from heptarm.errors import StaleState
 from heptarm.values.pose import Pose, Redundancy
 from heptarm.values.result import Cause, Result
 from heptarm.values.state import (
+    GROUP_NAMES,
     Cartesian,
     Groups,
     Joints,
@@ -49,6 +54,40 @@ def test_short_names_reach_into_the_groups() -> None:
     assert s.safety.ready_to_move
     assert s.motion is not None
     assert s.motion.active
+
+
+class Received:
+    """A state as it is received: makes its groups when they are asked for."""
+
+    def __init__(self) -> None:
+        self.stamp, self.made = 3_000, list[str]()
+
+    def make(self, name: str) -> object:
+        self.made.append(name)
+        return getattr(full().groups, name)
+
+
+def test_the_groups_of_a_received_state_are_made_once_at_their_first_use() -> None:
+    received = Received()
+    s = State(Groups.of(received), sampled=10_000_000)
+    assert s.stamp == 3_000
+    assert received.made == []
+    assert s.q.tolist() == SEVEN.tolist()
+    assert s.q_cmd[0] == 1
+    assert s.groups.io is None
+    assert s.groups.io is None
+    assert received.made == ["joints", "io"]
+    assert s == State(full().groups, sampled=10_000_000)
+    assert sorted(received.made) == sorted(GROUP_NAMES)
+    with pytest.raises(AttributeError, match="'Groups' object has no attribute 'joint'"):
+        s.groups.joint  # type: ignore[attr-defined]  # noqa: B018
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_received_state_may_be_copied_and_pickled(copied: Callable[[State], State]) -> None:
+    s = State(Groups.of(Received()))
+    assert copied(s) == s == State(full().groups)
+    assert replace(s.groups, io=None).pose is s.groups.pose
 
 
 def test_stamps_and_age() -> None:

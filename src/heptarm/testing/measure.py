@@ -16,7 +16,7 @@ from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
-from heptarm.values.state import GROUP_NAMES, State
+from heptarm.values.state import State
 
 #: A set-point slower than this does not move [rad/s].
 _STILL = 1e-6
@@ -219,8 +219,7 @@ def fresh(arm: Arm, *, after: float = 0.03) -> State:
     due = arm.state.stamp + round(after * 1e9)
 
     def is_fresh(state: State) -> bool:
-        groups = (getattr(state.groups, name) for name in GROUP_NAMES)
-        return all(group.stamp > due for group in groups if group is not None)
+        return all(group.stamp > due for group in state.groups if group is not None)
 
     return arm.wait_until(is_fresh)
 

@@ -6,11 +6,11 @@ consistent in themselves. Reading from a group that is not subscribed raises an 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from math import nan
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -272,9 +272,25 @@ class Control(Value):
     safety_workpiece: str = ""
 
 
+class GroupSource(Protocol):
+    """What the groups of a received state are made of."""
+
+    @property
+    def stamp(self) -> int:
+        """Cabinet time of the newest group [ns]; 0 without any."""
+        ...
+
+    def make(self, name: str) -> Any:
+        """The group of a name; None: there is none. Raises RemoteProtocolError: its numbers are no such group."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups(Value):
     """The groups of a state by the names under which they are subscribed; None: not subscribed, or not received yet.
+
+    Those of a received state are made when they are first used: a loop that reads the joints alone needs a third of the
+    time that all groups take.
 
     Attributes:
         joints: joint positions.
@@ -295,10 +311,43 @@ class Groups(Value):
     safety: Safety | None = None
     mode: Control | None = None
     io: SignalValues | None = None
+    _source: GroupSource | None = field(default=None, init=False, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, source: GroupSource) -> Groups:
+        """The groups of a received state."""
+        groups = object.__new__(cls)
+        object.__setattr__(groups, "_source", source)
+        return groups
+
+    if not TYPE_CHECKING:  # a type checker knows the fields
+
+        def __getattr__(self, name: str) -> Any:
+            """Make a group at its first use."""
+            if name not in GROUP_NAMES:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            group = self._source.make(name)
+            object.__setattr__(self, name, group)
+            return group
+
+    def __reduce__(self) -> tuple[type[Groups], tuple[object, ...]]:
+        """Copies and pickles hold the groups themselves."""
+        return Groups, tuple(self)
+
+    def __iter__(self) -> Iterator[Any]:
+        """All groups in the order of their names; None for those that are missing."""
+        return (getattr(self, name) for name in GROUP_NAMES)
+
+    @property
+    def stamp(self) -> int:
+        """Cabinet time of the newest group [ns]; 0 without any."""
+        if self._source is not None:
+            return self._source.stamp
+        return max((group.stamp for group in self if group is not None), default=0)
 
 
 #: Names of all groups, as in `arm.subscribe(groups=...)`.
-GROUP_NAMES = tuple(one.name for one in fields(Groups))
+GROUP_NAMES = tuple(one.name for one in fields(Groups) if one.init)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -371,8 +420,7 @@ class State(Value):
         Other groups may be older. The velocity of a value follows from the stamps of its own group, such as
         `groups.pose.stamp` for `pose`.
         """
-        groups = (getattr(self.groups, name) for name in GROUP_NAMES)
-        return max((group.stamp for group in groups if group is not None), default=0)
+        return self.groups.stamp
 
     @property
     def age(self) -> float:

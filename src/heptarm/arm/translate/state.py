@@ -28,6 +28,36 @@ _SAFETY = tuple(
 _MODES = {one: values.OperationMode(one.name.lower()) for one in wire.OperationMode}
 
 
+class _Received:
+    """A received state: decoded, and each group made when it is asked for.
+
+    Args:
+        message: has groups under the names of those of a state.
+        signals: of the cabinet, in the order of their indices.
+    """
+
+    __slots__ = ("_message", "_signals", "stamp")
+
+    def __init__(self, message: object, signals: Sequence[Signal]) -> None:
+        self._message, self._signals = message, signals
+        groups = (getattr(message, name, None) for name in values.GROUP_NAMES)
+        self.stamp: int = max((group.stamp for group in groups if group is not None), default=0)
+
+    def make(self, name: str) -> Any:
+        """The group of a name; None: the message has none.
+
+        Raises:
+            RemoteProtocolError: the cabinet sent numbers that no such group can have.
+        """
+        group = getattr(self._message, name, None)
+        if group is None:
+            return None
+        try:
+            return _signals(group, self._signals) if name == "io" else _READERS[name](group)
+        except ValueError as error:
+            raise RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}") from error
+
+
 def read_state(
     body: bytes, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal] = ()
 ) -> values.State:
@@ -37,22 +67,18 @@ def read_state(
         RemoteProtocolError: the bytes are no state.
     """
     try:
-        return _state(wire.State.decode(body), offset, clock, signals)
+        message = wire.State.decode(body)
     except (DecodeError, ValueError) as error:
         raise RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}") from error
+    return _state(message, offset, clock, signals)
 
 
 def _state(
     message: object, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal]
 ) -> values.State:
     """A state from a message that has groups under the same names."""
-    groups: dict[str, Any] = {}
-    for name in values.GROUP_NAMES:
-        group = getattr(message, name, None)
-        if group is not None:
-            groups[name] = _signals(group, signals) if name == "io" else _READERS[name](group)
-    stamp = max((group.stamp for group in groups.values()), default=0)
-    return values.State(values.Groups(**groups), offset.to_ours(stamp), clock)
+    received = _Received(message, signals)
+    return values.State(values.Groups.of(received), offset.to_ours(received.stamp), clock)
 
 
 def read_signals(infos: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
