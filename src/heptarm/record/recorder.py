@@ -26,7 +26,7 @@ from heptarm.values.arrays import instance, within
 _log = logging.getLogger("heptarm.record")
 
 #: Time between two looks at what has arrived [s].
-_PERIOD = 0.02
+_PERIOD = 0.05
 #: States that are encoded at once.
 _BATCH = 64
 #: States that may wait for a slow disk: a minute of them at 1 kHz.
