@@ -66,6 +66,20 @@ def test_a_full_queue_drops_the_oldest() -> None:
     assert queue.get(0) is not None and queue.get(0) is None
 
 
+def test_states_that_never_came_count_where_the_reader_misses_them() -> None:
+    """A slow loop over a motion does not count what was missed after the motion, though it still reads."""
+    queue = SampleQueue(10)
+    queue.put(StateSample(1, b"", 0))
+    queue.skip(5, after=1)
+    queue.put(StateSample(2, b"", 0))
+    queue.skip(7, after=2)
+    assert queue.get(0) is not None and queue.lost == 0
+    assert queue.get(0) is not None and queue.lost == 5
+    assert queue.get(0) is None and queue.lost == 12
+    queue.skip(1, after=2)
+    assert queue.take(5) == [] and queue.lost == 13
+
+
 def test_a_paced_stream_skips_and_never_repeats() -> None:
     clock = StepClock()
     feed = StateFeed(clock)

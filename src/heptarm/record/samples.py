@@ -40,13 +40,14 @@ class SampleQueue:
     """A bounded queue of samples; when it is full the oldest are dropped and counted.
 
     Attributes:
-        lost: number of dropped samples.
+        lost: number of dropped samples, and of those that never arrived, up to the place that the reader has reached.
     """
 
-    __slots__ = ("_changed", "_samples", "_waiting", "lost")
+    __slots__ = ("_changed", "_gaps", "_samples", "_waiting", "lost")
 
     def __init__(self, size: int) -> None:
         self._samples: deque[StateSample] = deque(maxlen=size)
+        self._gaps: deque[tuple[int, int]] = deque()  # the number of the sample before a gap, and its size
         self._changed = threading.Condition(threading.Lock())
         self._waiting = 0
         self.lost = 0
@@ -92,17 +93,30 @@ class SampleQueue:
                     self._changed.wait_for(lambda: bool(self._samples), seconds)
                 finally:
                     self._waiting -= 1
+            self._pass_gaps()
             return self._samples.popleft() if self._samples else None
 
     def take(self, most: int) -> list[StateSample]:
         """Take the oldest samples that are there, at most so many, without waiting."""
         with self._changed:
-            return [self._samples.popleft() for _ in range(min(most, len(self._samples)))]
+            taken = [self._samples.popleft() for _ in range(min(most, len(self._samples)))]
+            self._pass_gaps()
+            return taken
 
-    def skip(self, count: int) -> None:
-        """Count samples that were lost before they came here."""
+    def skip(self, count: int, *, after: int) -> None:
+        """Note samples that were lost before they came here; the reader counts them when it comes to their place.
+
+        Args:
+            count: how many.
+            after: number of the last sample before them.
+        """
         with self._changed:
-            self.lost += count
+            self._gaps.append((after, count))
+
+    def _pass_gaps(self) -> None:
+        """Count what is missing before the sample that is taken next; the caller holds the lock."""
+        while self._gaps and (not self._samples or self._gaps[0][0] < self._samples[0].number):
+            self.lost += self._gaps.popleft()[1]
 
 
 @cache

@@ -120,7 +120,7 @@ class StateFeed:
     def note_gap(self, count: int) -> None:
         """Count states that never arrived as lost by all open streams."""
         for one in self._queues:
-            one.skip(count)
+            one.skip(count, after=self.count)
 
     def after(self, number: int, seconds: float) -> StateSample | None:
         """Wait for a sample newer than `number` and return the newest; None if none arrived in time."""
