@@ -189,10 +189,9 @@ _POLLING, _STEP = 30_000_000, 0.0005
 _FAST_STATES = 250.0
 #: From this state rate on a loop over states reads the socket itself [Hz].
 _LOOPED_STATES = 100.0
-#: After such a loop has read, the link thread leaves the socket to it for so many periods, and at least so long [ns].
-_LOOPING_PERIODS, _LOOPING = 1.5, 5_000_000
-#: Meanwhile it looks after the socket this many times.
-_LOOKS = 2.5
+#: The link thread leaves the socket to such a loop while it reads and for this long after that [ns], and looks after it
+#: once per step [s].
+_LOOPING, _LOOP_STEP = 5_000_000, 0.002
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
 #: Largest number of a target; they begin again at 0, which counts as newer than all.
@@ -249,8 +248,8 @@ class Link:
         self._requested = clock.nanos()
         self._heartbeat = Heartbeat(self._requested)
         self._polling = _POLLING
-        self._looping = 0
-        self._looped = self._requested
+        self._may_loop = self._loop_reads = False
+        self._looped = self._requested - _LOOPING
         self._datagrams: DatagramLine | None = None
         self._targets = 0
         self._pushing = threading.Lock()  # states and pings arrive over TCP and by datagram
@@ -387,7 +386,7 @@ class Link:
     def expect_states(self, rate: float) -> None:
         """Prepare for this many pushed states per second of our clock [Hz]."""
         self._polling = _POLLING if rate <= _FAST_STATES else 0
-        self._looping = 0 if rate < _LOOPED_STATES else max(_LOOPING, round(_LOOPING_PERIODS * 1e9 / rate))
+        self._may_loop = rate >= _LOOPED_STATES
 
     def request(
         self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
@@ -453,7 +452,7 @@ class Link:
             waits: whether it still waits.
             seconds: how long at most [s].
         """
-        if not self._looping or self._datagrams is not None or self.is_read_here:
+        if not self._may_loop or self._datagrams is not None or self.is_read_here:
             return
         if not self._reading.acquire(timeout=_TURN):
             return
@@ -461,13 +460,13 @@ class Link:
         deadline = clock.nanos() + round(seconds * 1e9)
         shield = InterruptShield()
         try:
-            self._caller_reads = True
+            self._caller_reads = self._loop_reads = True
             self._reader = get_ident()
             while waits() and self._error is None and not shield.pending and clock.nanos() < deadline:
                 self._read(wait=True)
         finally:
             self._looped = clock.nanos()
-            self._caller_reads = False
+            self._caller_reads = self._loop_reads = False
             self._reader = 0
             self._reading.release()
             shield.release()
@@ -638,9 +637,9 @@ class Link:
                     self.ping()
                     due = now + self._heartbeat.interval
                 rest = max(0.0, (due - now) * 1e-9)
-                if now - self._looped < self._looping:
-                    # a loop over states reads, and is back within a moment
-                    clock.sleep(self._looping * 1e-9 / _LOOKS)
+                if self._loop_reads or now - self._looped < _LOOPING:
+                    # a loop over states reads, or is back within a moment
+                    clock.sleep(_LOOP_STEP)
                     self._heartbeat.check(clock.nanos(), self.peer)
                 elif self._caller_reads:
                     # a caller reads; most are done within a fraction of a millisecond
@@ -693,7 +692,7 @@ class Link:
         """
         self._error, self._closing = error, True
         self._sending, self._reading = threading.Lock(), threading.Lock()
-        self._caller_reads, self._reader = False, 0
+        self._caller_reads, self._loop_reads, self._reader = False, False, 0
         self._pending.clear()
         if self._datagrams is not None:
             self._datagrams.abandon()
