@@ -170,8 +170,10 @@ def test_a_motion_of_the_virtual_cabinet(arm: ha.Arm, tmp_path: Path) -> None:
     there = run.between("third try", "back")
     assert there["q"][-1, 6] - there["q"][0, 6] == pytest.approx(np.radians(20), abs=1e-3)
     moving = run["motion"] == first.id
-    offset = np.trapezoid(run["dq"][moving, 6], run.t[moving])
-    assert offset == pytest.approx(np.radians(20), rel=0.05)
+    t, q, dq = run.t[moving], run["q"][moving, 6], run["dq"][moving, 6]
+    whole = np.diff(t) < 0.01  # a busy cabinet leaves states out
+    covered = 0.5 * (dq[1:] + dq[:-1]) * np.diff(t)
+    assert covered[whole].sum() == pytest.approx(np.diff(q)[whole].sum(), rel=0.05)
 
 
 @pytest.mark.slow

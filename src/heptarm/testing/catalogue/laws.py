@@ -82,10 +82,10 @@ def free_guiding(arm: Arm) -> None:
     with _session(arm, law, _COMPLIANT) as session:
         arm.operator.push((0.0, force, 0.0), duration=_LONG)
         _run(session, 2.0)
-        beyond = _place(arm, session.state.q)[1] - begin[1] - wall
+        beyond, pushing = _place(arm, session.state.q)[1] - begin[1] - wall, session.memory.force
         arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
         near(beyond, force / 1500.0, 4e-3, "behind the wall it rests", unit="m")
-        near(session.memory.force, (0.0, -force, 0.0), 3.0, "force of the wall", unit="N")
+        near(pushing, (0.0, -force, 0.0), 3.0, "force of the wall", unit="N")
 
 
 @scenario(line=8, rows="E20", risk=Risk.CONTACT, operator=True, space=0.3, needs=("fri_position",))
