@@ -20,8 +20,8 @@ from heptarm.wire import messages
 REQUESTS, PAUSED, PAUSE = 4000, 200, 0.005
 #: Pre-shared key of the session that has one, and the limit of its ratio.
 KEY, KEY_LIMIT = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj", 1.5
-#: Of the ratio; on one core nothing is waited for, and the work of the API itself weighs more.
-LIMITS = {"one_core": 2.5, "two_cores": 2.0}
+#: Largest ratio to a raw echo.
+LIMIT = 1.5
 #: Limit of the ratio of the C++ client to the Python API.
 CPP_LIMIT = 1.2
 
@@ -61,7 +61,7 @@ def round_trip() -> Iterator[Figure]:
                     lambda: _times(bare, count, pause),  # noqa: B023
                     place,
                 ):
-                    limit = None if pause else LIMITS[found.placement.name]
+                    limit = None if pause else LIMIT
                     yield found.figure(f"round_trip{name}", 50, "us", limit=limit, scale=1e6)
                     yield found.figure(f"round_trip{name}_p99", 99, "us", scale=1e6)
     finally:

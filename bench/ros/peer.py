@@ -24,8 +24,10 @@ Floats = npt.NDArray[np.float64]
 SECONDS, POINTS = 10.0, 100
 #: Required accuracy at a point by execution [rad]; longest time until its motion starts [s].
 NEAR, OPENING = {"servo": 2e-3, "fri": 5e-4}, 4.0
-#: States per second, and for how long.
-RATE, WATCHED = 200.0, 60.0
+#: States per second while a trajectory or a stream is followed.
+RATE = 200.0
+#: States per second whose latency is measured, and for how long each.
+RATES, WATCHED = (200.0, 500.0), 40.0
 #: Amplitude of every joint [rad], and how many periods a trajectory has.
 SWING = np.array([0.5, 0.3, 0.5, 0.4, 0.6, 0.4, 0.8])
 TURNS = np.array([1.0, 2.0, 1.5, 1.0, 2.0, 1.5, 2.5])
@@ -141,12 +143,13 @@ def stream(client: Client, rate: float) -> dict[str, float]:
     return asdict(measure(client, begin, here, away, 0.0))
 
 
-def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, Any]:
+def compare(states: Watch, bare: Watch, rate: float, processes: Sequence[int]) -> dict[str, Any]:
     """Regularity of joint states, and their latency beside that of a bare topic in the same windows of time.
 
     Args:
         states: on the node's joint states.
         bare: on a publisher without a robot, of the same rate and type.
+        rate: of both [Hz].
         processes: what serves both: node, publisher, cabinet.
     """
     where = placements()
@@ -173,7 +176,7 @@ def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, A
     every = np.concatenate(gaps)
     return {
         "rate": float(1.0 / every.mean()),
-        "late": float((every > 2.0 / RATE).mean()),
+        "late": float((every > 2.0 / rate).mean()),
         "gap_p999": float(np.percentile(every, 99.9)),
         "blocks": blocks,
     }

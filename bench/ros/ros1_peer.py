@@ -16,7 +16,7 @@ from typing import Any
 import rospy
 from sensor_msgs.msg import JointState
 
-from bench.ros.peer import RATE, Watch, compare, follow, stream
+from bench.ros.peer import RATE, RATES, Watch, compare, follow, stream
 from tests.ros1.peer import Client, Core, NodeProcess, until
 
 
@@ -54,19 +54,23 @@ def streams(target: str) -> dict[str, Any]:
 
 
 def states(target: str, cabinet: int) -> dict[str, Any]:
-    """Measure the regularity of joint states, and their latency beside that of a bare topic."""
-    node = NodeProcess(target, state_rate=RATE)
-    until(lambda: rospy.get_published_topics("/heptarm"), "the node is not there")
-    with subprocess.Popen([sys.executable, "-m", "bench.ros.ros1_peer", "publish"]) as process:
-        both = watched("/joint_states"), watched("/bare")
-        until(lambda: min(map(len, both)) > RATE, "messages come")
-        found = compare(*both, [node.process.pid, process.pid, cabinet])
-        process.terminate()
-    _end(node)
+    """Measure the regularity of joint states, and their latency beside that of a bare topic, by their rate."""
+    both = watched("/joint_states"), watched("/bare")
+    found = {}
+    for rate in RATES:
+        node = NodeProcess(target, state_rate=rate)
+        until(lambda: rospy.get_published_topics("/heptarm"), "the node is not there")
+        with subprocess.Popen([sys.executable, "-m", "bench.ros.ros1_peer", "publish", str(rate)]) as process:
+            for one in both:
+                one.restart()
+            until(lambda: min(map(len, both)) > rate, "messages come")  # noqa: B023  called at once
+            found[f"{rate:g}"] = compare(*both, rate, [node.process.pid, process.pid, cabinet])
+            process.terminate()
+        _end(node)
     return found
 
 
-def publish() -> dict[str, Any]:
+def publish(rate: float) -> None:
     """Publish joint states with nothing behind them, until a signal ends the process."""
     rospy.init_node("bare")
     publisher = rospy.Publisher("/bare", JointState, queue_size=10, tcp_nodelay=True)
@@ -77,15 +81,14 @@ def publish() -> dict[str, Any]:
         message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)
         message.header.stamp = rospy.Time.now()
         publisher.publish(message)
-        following += 1.0 / RATE
+        following += 1.0 / rate
         time.sleep(max(0.0, following - time.monotonic()))
-    return {}
 
 
 if __name__ == "__main__":
     what, _, execution = sys.argv[1].partition("_")
     if what == "publish":
-        publish()
+        publish(float(sys.argv[2]))
     else:
         with Core("bench"):
             if what == "trajectory":

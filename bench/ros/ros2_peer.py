@@ -17,7 +17,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-from bench.ros.peer import RATE, Watch, compare, follow, stream
+from bench.ros.peer import RATE, RATES, Watch, compare, follow, stream
 from tests.ros2.peer import Client, NodeProcess, Ros, stamp, until
 
 
@@ -53,23 +53,27 @@ def streams(target: str) -> dict[str, Any]:
 
 
 def states(target: str, cabinet: int) -> dict[str, Any]:
-    """Measure the regularity of joint states, and their latency beside that of a bare topic."""
+    """Measure the regularity of joint states, and their latency beside that of a bare topic, by their rate."""
     ros = Ros("bench")
-    node = NodeProcess(target, state_rate=RATE)
     client = Client(ros, None)
-    client.ready()
-    ros.forget(0)
-    with subprocess.Popen([sys.executable, "-m", "bench.ros.ros2_peer", "publish"]) as process:
-        both = watched(ros, "/joint_states"), watched(ros, "/bare")
-        until(lambda: min(map(len, both)) > RATE, "messages come")
-        found = compare(*both, [node.process.pid, process.pid, cabinet])
-        process.terminate()
-    node.finish()
+    both = watched(ros, "/joint_states"), watched(ros, "/bare")
+    found = {}
+    for rate in RATES:
+        node = NodeProcess(target, state_rate=rate)
+        client.ready()
+        ros.forget(0)
+        with subprocess.Popen([sys.executable, "-m", "bench.ros.ros2_peer", "publish", str(rate)]) as process:
+            for one in both:
+                one.restart()
+            until(lambda: min(map(len, both)) > rate, "messages come")  # noqa: B023  called at once
+            found[f"{rate:g}"] = compare(*both, rate, [node.process.pid, process.pid, cabinet])
+            process.terminate()
+        node.finish()
     ros.close()
     return found
 
 
-def publish() -> NoReturn:
+def publish(rate: float) -> NoReturn:
     """Publish joint states with nothing behind them, until a signal ends the process."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("bare")
@@ -81,14 +85,14 @@ def publish() -> NoReturn:
         message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)
         message.header.stamp = node.get_clock().now().to_msg()
         publisher.publish(message)
-        following += 1.0 / RATE
+        following += 1.0 / rate
         time.sleep(max(0.0, following - time.monotonic()))
 
 
 if __name__ == "__main__":
     what, _, execution = sys.argv[1].partition("_")
     if what == "publish":
-        publish()
+        publish(float(sys.argv[2]))
     elif what == "stream":
         print(json.dumps(streams(sys.argv[2])))
     elif what == "trajectory":

@@ -211,9 +211,10 @@ def _point(ros: RosAdapter, sample: KinematicState, time: float) -> Any:
 
 def joint_state(ros: RosAdapter, state: State, names: Sequence[str], *, external: bool = False) -> Any:
     """Make a joint state of measured positions, velocities and torques; `external`: of external torques."""
-    message = ros.joint_state(
-        name=list(names), position=state.q.tolist(), velocity=np.nan_to_num(state.dq).tolist()
-    )
+    velocity = [
+        speed if speed == speed else 0.0 for speed in state.dq.tolist()
+    ]  # NaN before the second sample
+    message = ros.joint_state(name=list(names), position=state.q.tolist(), velocity=velocity)
     if state.torques is not None:
         message.effort = (state.tau_ext if external else state.tau).tolist()
     return message
