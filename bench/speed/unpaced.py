@@ -17,10 +17,10 @@ from bench.measure.noise import Noise
 from heptarm.sim.planning.command import TICK, Order
 from heptarm.sim.plant.plant import Plant
 
-#: Joint positions between which the arm moves [rad].
-HERE, THERE = ha.deg(0, 30, 0, -75, 0, 52, 0), ha.deg(34, 40, 11, -57, 17, 40, 23)
-#: Motions of a block: about 40 s of the simulated arm's time with the whole stack, 20 s with the plant alone.
-MOTIONS, ALONE = 60, 30
+#: Joint positions between which the arm moves [rad]; a motion takes 1.5 s.
+HERE, THERE = ha.deg(-50, 30, -20, -75, 10, 52, -60), ha.deg(50, 45, 20, -40, -30, 20, 60)
+#: Motions of a block, of the whole stack and of the plant alone.
+MOTIONS, ALONE = 60, 40
 #: Limits of simulated time per time.
 STACK_LIMIT, PLANT_LIMIT = 30.0, 60.0
 

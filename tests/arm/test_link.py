@@ -147,6 +147,27 @@ def test_a_loop_over_fast_states_reads_the_link_itself_until_it_ends(peer: Peer)
             time.sleep(0.01)
 
 
+def test_a_loop_that_was_held_up_keeps_its_connection(peer: Peer) -> None:
+    """After a standstill of the process the link's own thread may be the first to look: bytes wait to be read."""
+    with peer.arm(rate=200.0) as arm:
+        link = arm.connection.link
+        assert link is not None
+        read, held_up = link._read, []
+
+        def late(*, wait: bool) -> None:
+            if link._loop_reads and len(held_up) < 5:
+                assert link._transport.wait_readable(20.0)
+                link._heartbeat.received -= 10_000_000_000
+                held_up.append(time.sleep(0.02))
+            read(wait=wait)
+
+        link._read = late  # type: ignore[method-assign]
+        states = arm.states()
+        for _ in range(20):
+            next(states)
+        assert len(held_up) == 5
+
+
 def test_requests_from_many_threads(peer: Peer) -> None:
     with peer.arm() as arm:
         problems: list[BaseException] = []
