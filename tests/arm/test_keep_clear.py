@@ -37,7 +37,7 @@ class Wall:
 
     def clearances(self, q: np.ndarray, *, below: float) -> tuple[Clearance, ...]:
         self.asked += 1
-        near = (Clearance("tool", "wall", abs(self._at - q[6])), Clearance("tool", "fence", 1.0 - q[5]))
+        near = (Clearance("tool", "wall", max(0.0, self._at - q[6])), Clearance("tool", "fence", 1.0 - q[5]))
         return tuple(one for one in near if one.distance < below)
 
 

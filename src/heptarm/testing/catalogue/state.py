@@ -48,8 +48,10 @@ def velocity(arm: Arm) -> None:
     reported = np.array([state.dq[6] for state in recording.states])
     peak = 0.3 * arm.robot.dq_max[6] if arm.speed >= 0.3 else arm.speed * arm.robot.dq_max[6]
     near(np.nanmax(reported), peak, 0.05 * peak, "top speed of A7", unit="rad/s")
-    offset = np.nansum(reported[1:] * np.diff(recording.t))
-    near(offset, np.radians(30), 0.05 * np.radians(30), "its integral", unit="rad")
+    steps, moved = np.diff(recording.t), np.diff([state.q[6] for state in recording.states])
+    whole = steps < 0.03  # a busy machine leaves states out
+    offset = np.nansum((reported[1:] * steps)[whole])
+    near(offset, moved[whole].sum(), 0.05 * np.radians(30), "its integral", unit="rad")
 
 
 @scenario(line=9, rows="G10 G11 G18 H18", risk=Risk.CONTACT, operator=True, space=0.02)
