@@ -161,7 +161,7 @@ def test_states_of_a_fast_clock(make: Callable[..., FakeCabinet]) -> None:
         last = clock(peer)
         seen = stamps(peer, "joints")
         comes_at(seen, 100.0)
-        received = last[1] + 5.0e9 * (last[2] - last[0])  # the cabinet's time when the answer had come, at the latest
+        received = last[1] + 5.0e9 * (last[2] - last[0])  # at the latest, by the cabinet's clock
         assert seen[-1] < received and seen[-1] - seen[0] > 0.5 * (last[1] - first[1])
         # however long each question was under way
         passed = (last[1] - first[1]) * 1e-9
