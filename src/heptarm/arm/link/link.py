@@ -640,7 +640,8 @@ class Link:
                 if self._loop_reads or now - self._looped < _LOOPING:
                     # a loop over states reads, or is back within a moment
                     clock.sleep(_LOOP_STEP)
-                    if not transport.wait_readable(0.0):  # after a standstill of this process bytes wait to be read
+                    # after a standstill of this process bytes wait to be read
+                    if not transport.wait_readable(0.0):
                         self._heartbeat.check(clock.nanos(), self.peer)
                 elif self._caller_reads:
                     # a caller reads; most are done within a fraction of a millisecond
