@@ -76,6 +76,7 @@ def _listen() -> None:
         word = line.strip()
         if word in ("follows", "frozen", "lags"):
             _behaviour = word
+            _cabinets[0].operator.on_action()  # an arm that stands still rests, and simulates nothing
         elif word == "press":
             _cabinets[0].plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
         elif word == "release":
