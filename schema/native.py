@@ -24,7 +24,7 @@ def header() -> str:
     if str(SOURCE) not in sys.path:
         sys.path.insert(0, str(SOURCE))
     from heptarm.fri.guard import joint_guard
-    from heptarm.fri.loop import cycle, native
+    from heptarm.fri.loop import cycle, native, wrench
     from heptarm.fri.loop import shared_memory as memory
     from heptarm.fri.protocol import messages, version
     from heptarm.fri.session import statistics
@@ -74,6 +74,7 @@ def header() -> str:
         (cycle, ("GAP_PERIODS", "MIN_GAP", "GRACE", "REPEATS")),
         (statistics, ("LONGEST",)),
         (native, ("LAW_PATIENCE", "LAW_CUT")),
+        (wrench, ("NEARBY",)),
     ):
         lines += [f"#define {name} {_number(getattr(module, name))}" for name in names]
     lines += ["", "struct loop {"]

@@ -25,7 +25,7 @@ from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.law_limit import EndlessLaw, LawLimit
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
-from heptarm.fri.loop.wrench import WrenchEstimator
+from heptarm.fri.loop.wrench import WrenchEstimator, posture
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.version import Version
@@ -515,8 +515,8 @@ class Cycle:
         self._fresh = sample = session.receive(datagram, received)
         if sample is None:
             return None
-        self._differentiate(sample, sample.sequence - previous)
         self._find_wrench(sample)
+        self._differentiate(sample, sample.sequence - previous)
         exchange.update(sample)
         record.signals, record.state.signals = exchange.numbers, exchange.signals
         self._detect_collision(sample, received)
@@ -569,7 +569,7 @@ class Cycle:
         elif self.estimator is None or sample.q is None or sample.tau_ext is None:
             self.record.wrench = NAN6
         else:
-            self.record.wrench = self.estimator.wrench(sample.q, sample.tau_ext)
+            self.record.wrench = self.estimator.wrench(posture(sample.q, self.q_before), sample.tau_ext)
             self.record.flags |= at.ESTIMATED
 
     def _detect_collision(self, sample: Sample, now: int) -> None:

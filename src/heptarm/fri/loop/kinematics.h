@@ -94,21 +94,30 @@ struct chain {
     double origin[N][3], flange[3];
 };
 
-/* External wrench on the flange, base axes [N, Nm], that explains external torques of the joints best (least squares). */
-static int explain_torques(const struct chain *chain, const double *q, const double *tau, double *wrench) {
-    double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3];
-    double axis[N][3], origin[N][3], j[6][N], square[36];
+/* What relates wrenches on the flange to torques of the joints in a posture: its Jacobian, base axes, and the factor of the
+   damped square of that. */
+struct wrench_map {
+    double q[N], j[6][N], factor[36];
+};
+
+/* 0 if the damped square is not positive definite. */
+static int map_wrenches(const struct chain *chain, const double *q, struct wrench_map *map) {
+    double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3], axis[N][3], origin[N][3];
+    memcpy(map->q, q, sizeof map->q);
     for (int i = 0; i < N; i++) {
         advance(i, chain->origin[i], q[i], turn, place, axis[i]);
         memcpy(origin[i], place, sizeof place);
     }
     rotate(turn, chain->flange, offset);
     for (int k = 0; k < 3; k++) place[k] += offset[k];
-    jacobian(axis, origin, place, j);
-    if (!damped_square(j, square)) return 0;
-    for (int r = 0; r < 6; r++) wrench[r] = dot(j[r], tau, N);
-    solve(square, 6, wrench);
-    return 1;
+    jacobian(axis, origin, place, map->j);
+    return damped_square(map->j, map->factor);
+}
+
+/* External wrench on the flange, base axes [N, Nm], that explains external torques of the joints best (least squares). */
+static void explain_torques(const struct wrench_map *map, const double *tau, double *wrench) {
+    for (int r = 0; r < 6; r++) wrench[r] = dot(map->j[r], tau, N);
+    solve(map->factor, 6, wrench);
 }
 
 #endif

@@ -801,10 +801,12 @@ static word *open_slot(struct loop *l) {
 
 int hf_answer(struct loop *l);
 
-/* Velocity by the difference to the previous message. */
+/* Velocity by the difference to the previous message; the posture for the estimate of the wrench. */
 static void differentiate(struct loop *l) {
     double gap = (double)l->period * 1e-9;
-    int known = (l->t_known & KNOWN(S_Q)) != 0;
+    int known = (l->t_known & KNOWN(S_Q)) != 0, is_near = l->q_known;
+    for (int i = 0; i < AXES; i++) is_near = is_near && fabs(ARRAY(S_Q)[i] - l->q_before[i]) <= NEARBY;
+    memcpy(l->posture, is_near ? l->q_before : ARRAY(S_Q), sizeof l->posture);
     for (int i = 0; i < AXES; i++) {
         double q = ARRAY(S_Q)[i];
         l->dq[i] = !known ? NAN : l->q_known && gap > 0.0 ? (q - l->q_before[i]) / gap : 0.0;
@@ -825,11 +827,24 @@ static int is_collision(struct loop *l) {
     return 0;
 }
 
+/* Make the map of a posture, unless it is there. */
+static void map_posture(struct loop *l, const double *q) {
+    struct wrench_map *map = (struct wrench_map *)l->map;
+    if (!l->has_map || memcmp(map->q, q, sizeof map->q)) l->has_map = map_wrenches((const struct chain *)l->chain, q, map);
+}
+
+static int needs_wrench(struct loop *l) {
+    word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
+    return isnan(l->t_wrench[0]) && l->has_chain && (l->t_known & needed) == needed;
+}
+
 /* Estimate the external wrench from the torques where the controller sends none. */
 static void find_wrench(struct loop *l) {
-    word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
-    if (!isnan(l->t_wrench[0]) || !l->has_chain || (l->t_known & needed) != needed) return;
-    if (explain_torques((const struct chain *)l->chain, ARRAY(S_Q), ARRAY(S_TAU_EXT), l->t_wrench)) l->t_flags |= ESTIMATED;
+    if (!needs_wrench(l)) return;
+    map_posture(l, l->posture);
+    if (!l->has_map) return;
+    explain_torques((const struct wrench_map *)l->map, ARRAY(S_TAU_EXT), l->t_wrench);
+    l->t_flags |= ESTIMATED;
 }
 
 /* Process a datagram: HANDBACK, LAW (call hf_answer next), or the size of the answer in t_reply, 0 for none. */
@@ -907,10 +922,11 @@ int hf_answer(struct loop *l) {
     return command(l, l->out_q, l->out_tau, l->out_wrench);
 }
 
-/* Publish the turn; its answer was sent at `now`. */
+/* Publish the turn; its answer was sent at `now`. Then prepare the next one. */
 void hf_finish(struct loop *l, word now) {
     word tick = l->header[H_STATES], *slot = open_slot(l);
-    find_wrench(l);
+    int needs_map = l->t_flags & ESTIMATED || needs_wrench(l);
+    if (!(l->t_flags & ESTIMATED)) find_wrench(l);
     if (l->t_answer) {
         l->t_flags |= ANSWERED;
         count_duration(l, l->latency, now - l->received);
@@ -920,6 +936,7 @@ void hf_finish(struct loop *l, word now) {
     __atomic_store_n(slot, 2 * tick + 2, __ATOMIC_RELEASE);
     __atomic_store_n(&l->header[H_STATES], tick + 1, __ATOMIC_RELEASE);
     l->header[H_BEAT] = now;
+    if (needs_map) map_posture(l, ARRAY(S_Q));
 }
 
 static void reply(struct loop *l, int size) {

@@ -96,9 +96,11 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
     ("real", 6, "wrench_max wrench_step"),
     ("real", 1, "reach step"),
-    # kinematics for the estimate of the wrench: `struct chain`
-    ("word", 1, "has_chain"),
+    # estimate of the wrench: `struct chain`, the posture that counts in this cycle, `struct wrench_map` of a posture
+    ("word", 1, "has_chain has_map"),
     ("real", 24, "chain"),
+    ("real", AXES, "posture"),
+    ("real", AXES + 6 * AXES + 36, "map"),
     # bands of the external torques
     ("word", 1, "has_watch"),
     ("real", AXES, "watch_threshold watch_baseline watch_margin"),

@@ -203,6 +203,7 @@ enum {
 #define LONGEST 1000000000000000LL
 #define LAW_PATIENCE 10LL
 #define LAW_CUT 20000000LL
+#define NEARBY 0.002
 
 struct loop {
     word *header, *latency, *jitter, *states, *commands, *outputs;
@@ -227,8 +228,10 @@ struct loop {
     double low[7], high[7], top_v[7], top_a[7], top_j[7], near[7], dq_max[7], ddq_max[7], dddq_max[7], tau_max[7], tau_step[7];
     double wrench_max[6], wrench_step[6];
     double reach, step;
-    word has_chain;
+    word has_chain, has_map;
     double chain[24];
+    double posture[7];
+    double map[85];
     word has_watch;
     double watch_threshold[7], watch_baseline[7], watch_margin[7];
     double plausible_low[7], plausible_high[7];

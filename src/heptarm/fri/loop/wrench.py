@@ -10,6 +10,9 @@ from heptarm.values.robot import RobotModel
 
 #: Damping of the inverse: near singular postures the estimate becomes too small instead of arbitrarily large.
 DAMPING = 1e-4
+#: The Jacobian of the previous message serves while no joint has moved further since then [rad]. It is computed after
+#: the answer to that message, so that a law does not wait for it. The estimate is then off by a hundredth at most.
+NEARBY = 2e-3
 _DIRECTION = (2, 1, 2, 1, 2, 1, 2)
 _SIGN = (1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0)
 _Vector = Sequence[float]
@@ -18,6 +21,18 @@ _Vector = Sequence[float]
 def chain_of(arm: RobotModel) -> list[float]:
     """Kinematics of a robot, as `struct chain` of kinematics.h: origin of each joint, flange; 24 numbers [m]."""
     return [*arm.links.origin.reshape(-1).tolist(), *arm.links.flange.tolist()]
+
+
+def posture(q: Sequence[float], before: Sequence[float] | None) -> Sequence[float]:
+    """The posture whose Jacobian serves for a message: see `NEARBY`.
+
+    Args:
+        q: measured positions [rad].
+        before: those of the previous message [rad]; None if there was none.
+    """
+    if before is None or any(abs(new - old) > NEARBY for new, old in zip(q, before, strict=True)):
+        return q
+    return before
 
 
 class WrenchEstimator:
@@ -43,7 +58,7 @@ class WrenchEstimator:
         """Estimate the wrench.
 
         Args:
-            q: measured positions [rad].
+            q: positions [rad].
             tau_ext: external torques [Nm].
 
         Returns:
