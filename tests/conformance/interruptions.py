@@ -126,7 +126,8 @@ def cancelling_goes_straight_on_while_it_brakes(client: Client) -> None:
     under_way(client, here, 0.3)
     before = client.place()
     client.cancel(sent)
-    client.result(sent)
+    ended = client.result(sent)
+    assert ended.outcome is GoalOutcome.CANCELED, ended
     rest = rests(client)
     # 0.45 rad/s at 2 rad/s² need 0.05 rad; some time passes between looking and braking
     assert sign * (rest[joint] - before.q[joint]) > 0.02

@@ -166,6 +166,13 @@ def test_the_tcp_turns_about_its_own_origin(model: PanelArm, observer: ha.Arm) -
     assert turned[2, 2] == pytest.approx(1.0, abs=1e-3) and turned[1, 0] > 0.05
 
 
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A button counts as held for so long after each message that a busy machine does not release it."""
+    monkeypatch.setattr("heptarm.panel.jog.HOLD", 5.0)
+
+
+@pytest.mark.usefixtures("patient")
 def test_it_goes_to_a_pose_and_stays_there(model: PanelArm, observer: ha.Arm) -> None:
     goal = observer.state.pose.shifted(0.02, 0.03, -0.02).rotated(a=0.1)
     held(
@@ -173,13 +180,8 @@ def test_it_goes_to_a_pose_and_stays_there(model: PanelArm, observer: ha.Arm) ->
         PoseJog(goal, 0.5),
         lambda: observer.state.pose.distance_to(goal) < 1e-3 and observer.state.pose.angle_to(goal) < 5e-3,
     )
+    model.end_jog()
     assert at_rest(model, observer).pose.distance_to(goal) < 2e-3
-
-
-@pytest.fixture
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A button counts as held for so long after each message that a busy machine does not release it."""
-    monkeypatch.setattr("heptarm.panel.jog.HOLD", 5.0)
 
 
 @pytest.mark.usefixtures("patient")
