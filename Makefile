@@ -120,8 +120,9 @@ MINUTES ?= 3
 soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grows after the first third, what is lost; in build/soak
 	$(PY) -m bench.trust --minutes $(MINUTES)
 
-figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run
+figures: $(STAMPS)/venv  ## docs/explanation/figures.md and the picture of times, from the newest stored runs
 	$(PY) scripts/figures_page.py
+	$(PY) scripts/times_picture.py
 
 ##@ To document and release
 
