@@ -38,7 +38,7 @@ BESIDE_FLOORS = {
 PARTS = {
     "request_encode": "Python: check, encode",
     "request_send": "Python: send",
-    "request_path": "kernel: both ways, wake two threads",
+    "request_path": "kernel: there and back, wake two threads",
     "request_java": "Java: decode, act, answer",
     "request_decode": "Python: decode, return",
 }

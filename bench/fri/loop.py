@@ -36,6 +36,8 @@ _SOURCES = Path(__file__).parent
 _JOINTS = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
 #: Counts as the latency of a missing reply [us].
 _NONE = 1000.0
+#: How long before a message is due a client polls that does [s].
+_POLL = 0.2e-3
 #: Largest ratio of a compiled law's median to the echo's, each side on a processor of its own.
 _LAW_LIMIT = 1.1
 _LIMITS = (("", 50.0, 1.35), ("_p99", 99.0, 1.5))
@@ -80,24 +82,32 @@ def fri_laws() -> Iterator[Figure]:
                 # on one processor the echo does not have to wake up, and a microsecond is a fourth of its latency
                 limit = _LAW_LIMIT if found.placement.name == "two_cores" else None
                 yield found.figure(f"fri_law_{label}", 50.0, "us", limit=limit, detail=detail)
+            for found, detail in _compare(folder, CYCLES // BLOCKS, busy=True, law=law, busy_poll=_POLL):
+                yield found.figure(f"fri_law_{label}_polled", 50.0, "us", limit=_LAW_LIMIT, detail=detail)
 
 
 def _compare(
-    folder: Path, cycles: int, *, busy: bool, law: CompiledLaw | None = None
+    folder: Path, cycles: int, *, busy: bool, law: CompiledLaw | None = None, busy_poll: float = 0.0
 ) -> list[tuple[Comparison, dict[str, Any]]]:
-    """Latencies of client and echo under each placement, and facts of the last block."""
-    comparisons = [Comparison(placement, cap=_NONE) for placement in placements()]
+    """Latencies of client and echo under each placement, and facts of the last block.
+
+    A client that polls needs a core of its own, so that it is only measured across two.
+    """
+    where = [one for one in placements() if one.name == "two_cores" or not busy_poll]
+    comparisons = [Comparison(placement, cap=_NONE) for placement in where]
     facts: list[dict[str, Any]] = [{} for _ in comparisons]
     for _ in range(BLOCKS):
         for number, found in enumerate(comparisons):
             with Noise() as noise:
-                replies, echoes, facts[number] = _run(folder, cycles, found.placement, busy=busy, law=law)
+                replies, echoes, facts[number] = _run(
+                    folder, cycles, found.placement, busy=busy, law=law, busy_poll=busy_poll
+                )
             found.add(np.nan_to_num(replies, nan=_NONE), np.nan_to_num(echoes, nan=_NONE), noise)
     return list(zip(comparisons, facts, strict=True))
 
 
 def _run(
-    folder: Path, cycles: int, placement: Placement, *, busy: bool, law: CompiledLaw | None
+    folder: Path, cycles: int, placement: Placement, *, busy: bool, law: CompiledLaw | None, busy_poll: float
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Latencies of the client and of the echo [us], NaN where no reply came within half a millisecond."""
     (near,), (far,) = placement.near, placement.far
@@ -113,7 +123,7 @@ def _run(
         assert echo.stdout is not None
         if echo.stdout.readline() != "ready\n":
             raise RuntimeError("the echo did not start")
-        client = stack.enter_context(Client(0, cpu=near, law=law))
+        client = stack.enter_context(Client(0, cpu=near, law=law, busy_poll=busy_poll))
         words = (client.port, port, far, cycles, folder / "datagrams", results)
         sender = subprocess.Popen([str(folder / "sender"), *map(str, words)])
         stack.callback(sender.kill)

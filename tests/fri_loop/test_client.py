@@ -27,6 +27,7 @@ from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.version import Version
+from heptarm.io.compiled import SWITCH
 from heptarm.values.pose import Pose
 
 from .controller import IPO, Controller
@@ -36,11 +37,12 @@ ACTIVE = SessionState.COMMANDING_ACTIVE
 
 
 @pytest.fixture
-def client() -> Iterator[Client]:
-    with Client(0, realtime=False) as one:
+def client(request: pytest.FixtureRequest) -> Iterator[Client]:
+    with Client(0, realtime=False, busy_poll=getattr(request, "param", 0.0)) as one:
         yield one
 
 
+@pytest.mark.parametrize("client", [0.0, 1e-4], ids=["sleeping", "polling"], indirect=True)
 def test_from_nothing_to_commanding_and_a_second_session_without_restarting(client: Client) -> None:
     assert client.session is SessionState.IDLE and "no message received" in client.trouble
     with pytest.raises(NotReady, match="firewall"):
@@ -333,6 +335,8 @@ def test_a_taken_port_and_bad_arguments_are_refused_in_words(client: Client) -> 
         Client(0, version="1.9")
     with pytest.raises(CommandRejected, match=r"history must be in \[16, 1048576\], got 1"):
         Client(0, history=1)
+    with pytest.raises(CommandRejected, match=r"busy_poll must be in \[0, 0.00025\] s, got 0.001"):
+        Client(0, busy_poll=1e-3)
     with pytest.raises(ShapeError, match="q must have shape"):
         client.command(q=[1.0])
     client.close()
@@ -431,3 +435,10 @@ def test_what_the_system_refuses_is_said_plainly() -> None:
             assert "limits.conf" in line
         policy = os.sched_getscheduler(int(client._header[PID]))
         assert policy == os.SCHED_FIFO or "no real-time priority" in client.refused[0]
+
+
+def test_without_the_native_part_polling_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(SWITCH, "1")
+    with Client(0, realtime=False, busy_poll=1e-4) as client:
+        (line,) = client.refused
+    assert line.startswith("no busy polling: ") and SWITCH in line

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import REPEATS
-from heptarm.fri.loop.native import HANDBACK, LAW, Native, library
+from heptarm.fri.loop.native import HANDBACK, LAW, TIMEOUT, Native, library
 from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
@@ -22,6 +23,7 @@ from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
 from heptarm.io.compiled import Unavailable
+from heptarm.io.udp import UdpSocket
 from tests.long import longer
 
 from .controller import IPO
@@ -34,6 +36,22 @@ except Unavailable as reason:
     pytest.skip(f"no native part: {reason}", allow_module_level=True)
 
 EXAMPLES = longer(25, 1000)
+
+
+@pytest.mark.parametrize("busy_poll", [0, 15_000_000])
+def test_it_polls_around_the_moment_at_which_a_message_is_due_and_sleeps_else(busy_poll: int) -> None:
+    twins = Twins()
+    twins.activate()
+    native, sock = twins.native, UdpSocket(0, host="127.0.0.1", patience=0.1)
+    native.listen(sock.sock, None)
+    memory = native.memory
+    memory.busy_poll, memory.period, memory.received = busy_poll, 20_000_000, time.monotonic_ns()
+    begin, used = time.monotonic(), time.thread_time()
+    assert native.library.hf_run(native.reference, 1, native.sender) == TIMEOUT
+    used, taken = time.thread_time() - used, time.monotonic() - begin
+    sock.close()
+    assert used > 3e-3 if busy_poll else used < 3e-3
+    assert taken >= 0.1  # after the last poll it waits as ever
 
 
 class Twins:

@@ -101,8 +101,8 @@ def test_native_and_python_loop_estimate_the_same_where_none_is_sent(wire: Versi
     twins.check()
 
 
-@pytest.mark.parametrize("share", [0.5, 3.0])
-def test_native_and_python_loop_estimate_the_same_of_a_moving_arm(share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.5, 3.0])
+def test_native_and_python_loop_estimate_the_same_of_a_moving_arm(fraction: float) -> None:
     """Below the bound with the posture of the message before, beyond it with its own."""
     twins = Twins()
     twins.pure.controller.__class__ = Pushed
@@ -110,7 +110,7 @@ def test_native_and_python_loop_estimate_the_same_of_a_moving_arm(share: float) 
     controller = twins.pure.controller
     still = controller.position
     controller.position = lambda: tuple(  # type: ignore[method-assign]
-        angle + share * NEARBY * (controller.sequence % 7) for angle in still()
+        angle + fraction * NEARBY * (controller.sequence % 7) for angle in still()
     )
     for _ in range(20):
         twins.step()

@@ -789,6 +789,8 @@ class Arm:
             host: address at which the cabinet reaches this machine; empty: that of this connection.
             port: own UDP port; 0: any free one; None: the first free one of FRI's.
             realtime: request real-time priority and locked memory. cpu: processor of the loop; None: any.
+            busy_poll: how long before a message is due the loop polls for it instead of sleeping, see
+                `heptarm.fri.Client` [s]; 0: never.
             history: messages that are kept. timeout: longest time until the session is open [s].
 
         Raises:

@@ -76,6 +76,7 @@ class FriKeywords(TypedDict, total=False):
     port: int | None
     realtime: bool
     cpu: int | None
+    busy_poll: float
     history: int
     timeout: float
 
@@ -117,6 +118,7 @@ def request(
     port: int | None = None,
     realtime: bool = True,
     cpu: int | None = None,
+    busy_poll: float = 0.0,
     history: int = 2048,
     timeout: float = 10.0,
 ) -> FriRequest:
@@ -159,6 +161,7 @@ def request(
         history=history,
         realtime=realtime,
         cpu=cpu,
+        busy_poll=busy_poll,
     )
     message = wire.FriOpen(
         host=host,
@@ -189,6 +192,7 @@ def request(
                 history=history,
                 realtime=realtime,
                 cpu=cpu,
+                busy_poll=busy_poll,
             ),
         )
 

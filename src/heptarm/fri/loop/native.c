@@ -8,6 +8,7 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <math.h>
+#include <poll.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdint.h>
@@ -952,12 +953,12 @@ void hf_send(struct loop *l) {
 }
 
 /* Receive a datagram of at most BUFFER bytes, its sender and the time of receipt by the kernel; its size, or -1. */
-static ssize_t receive(int sock, uint8_t *into, struct sockaddr_in *from, word *received) {
+static ssize_t receive(int sock, int flags, uint8_t *into, struct sockaddr_in *from, word *received) {
     char control[128];
     struct iovec part = {into, BUFFER};
     struct msghdr message = {.msg_name = from, .msg_namelen = sizeof *from, .msg_iov = &part, .msg_iovlen = 1,
                              .msg_control = control, .msg_controllen = sizeof control};
-    ssize_t size = recvmsg(sock, &message, 0);
+    ssize_t size = recvmsg(sock, &message, flags);
     if (size < 0) return size;
     *received = clock_now(CLOCK_MONOTONIC);
     for (struct cmsghdr *head = CMSG_FIRSTHDR(&message); head; head = CMSG_NXTHDR(&message, head)) {
@@ -977,12 +978,28 @@ word hf_echo(int sock, word turns, word *took) {
     for (word turn = 0; turn < turns; turn++) {
         struct sockaddr_in from;
         word received;
-        ssize_t size = receive(sock, datagram, &from, &received);
+        ssize_t size = receive(sock, 0, datagram, &from, &received);
         if (size < 0) return turn;
         sendto(sock, datagram, (size_t)size, 0, (struct sockaddr *)&from, sizeof from);
         took[turn] = clock_now(CLOCK_MONOTONIC) - received;
     }
     return turns;
+}
+
+/* Receive the next datagram into t_datagram. With `busy_poll` the thread sleeps until shortly before the message is due and
+   then asks for it again and again: no waking of the thread adds to the latency. It sleeps again if the message is late. */
+static ssize_t next_message(struct loop *l, struct sockaddr_in *from, word *received) {
+    if (l->busy_poll && l->hot && l->period) {
+        word due = l->received + l->period, now = clock_now(CLOCK_MONOTONIC), asleep = due - l->busy_poll - now;
+        struct pollfd sock = {.fd = (int)l->sock, .events = POLLIN};
+        struct timespec rest = {.tv_sec = asleep / 1000000000LL, .tv_nsec = asleep % 1000000000LL};
+        if (asleep > 0) ppoll(&sock, 1, &rest, NULL);
+        do {
+            ssize_t size = receive((int)l->sock, MSG_DONTWAIT, l->t_datagram, from, received);
+            if (size >= 0 || (errno != EAGAIN && errno != EWOULDBLOCK)) return size;
+        } while (clock_now(CLOCK_MONOTONIC) < due + l->busy_poll);
+    }
+    return receive((int)l->sock, 0, l->t_datagram, from, received);
 }
 
 /* Receive and answer at most `turns` datagrams. A datagram that is handed back is in t_datagram, with its size, time and
@@ -991,7 +1008,7 @@ int hf_run(struct loop *l, word turns, word *sender) {
     while (turns-- > 0) {
         struct sockaddr_in from;
         word received;
-        ssize_t size = receive((int)l->sock, l->t_datagram, &from, &received);
+        ssize_t size = next_message(l, &from, &received);
         if (size < 0) {
             if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNREFUSED) return TIMEOUT;
             l->t_size = errno;

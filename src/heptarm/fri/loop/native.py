@@ -71,7 +71,8 @@ class LawStatus(enum.IntEnum):
 STRUCT: tuple[tuple[str, int, str], ...] = (
     ("pointer", 1, "header latency jitter states commands outputs"),
     ("word", 1, "history bins sock address port"),
-    # session
+    # session; busy_poll: how long before a message is due the loop polls for it [ns]
+    ("word", 1, "busy_poll"),
     ("word", 1, "hot framed echoes state quality mode sequence received period"),
     ("word", 1, "multiplier waiting sent reflected"),
     ("word", 1, "overlay safety operation control drive receive_multiplier"),
@@ -181,6 +182,7 @@ class Native:
 
     Args:
         cycle: the Python cycle with which it alternates.
+        busy_poll: how long before a message is due the loop polls for it instead of sleeping [ns].
 
     Attributes:
         memory: `struct loop`.
@@ -189,7 +191,7 @@ class Native:
         Unavailable: the native part is not available.
     """
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: Cycle, *, busy_poll: int = 0) -> None:
         self.library = library()
         self._cycle = cycle
         self.memory = memory = _Memory()
@@ -217,6 +219,7 @@ class Native:
             for name in ("threshold", "baseline", "margin"):
                 getattr(memory, f"watch_{name}")[:] = getattr(cycle.watch, name)
         memory.f_missing = MISSING.index(policy.missing)
+        memory.busy_poll = busy_poll
         memory.patience, memory.over = policy.patience, policy.over
 
     def set_law(self, address: int, kept: object, *, success: int) -> None:

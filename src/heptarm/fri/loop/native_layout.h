@@ -208,6 +208,7 @@ enum {
 struct loop {
     word *header, *latency, *jitter, *states, *commands, *outputs;
     word history, bins, sock, address, port;
+    word busy_poll;
     word hot, framed, echoes, state, quality, mode, sequence, received, period;
     word multiplier, waiting, sent, reflected;
     word overlay, safety, operation, control, drive, receive_multiplier;

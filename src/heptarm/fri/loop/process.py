@@ -236,6 +236,10 @@ class Loop:
         config: configuration that `heptarm.fri.loop.client` wrote.
         law: overrides the law of the configuration.
 
+    Attributes:
+        layout, config, socket, cycle: its parts.
+        refused: a text for each setting that has no effect here.
+
     Raises:
         CommandRejected: the law cannot be compiled or loaded.
         ConnectFailed: the port cannot be bound.
@@ -285,7 +289,12 @@ class Loop:
         )
         if in_python is not None:
             self.cycle.limit = LawLimit(layout.header)
-        self._native = None if self._why_python else Native(self.cycle)
+        polls, self.refused = config["busy_poll"], list[str]()
+        if polls and (self._why_python or os.cpu_count() == 1):
+            why = self._why_python or "this machine has one processor, which the sender needs meanwhile"
+            self.refused.append(f"no busy polling: {why}")
+            polls = 0.0
+        self._native = None if self._why_python else Native(self.cycle, busy_poll=round(polls * 1e9))
         layout.header[at.NATIVE] = self._native is not None
         if compiled is not None and self._native is not None:
             address, kept = compiled.load(schema, memory)
@@ -498,7 +507,7 @@ def main(path: str) -> int:
         has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
         header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT
         return 1
-    refused = request_realtime(cpu=config["cpu"]) if config["realtime"] else []
+    refused = (request_realtime(cpu=config["cpu"]) if config["realtime"] else []) + loop.refused
     first.refused.write("\n".join(refused))
     header[at.STATUS] = at.Status.RUNNING
     try:
