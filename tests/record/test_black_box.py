@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,13 +16,6 @@ from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
-
-
-@pytest.fixture
-def peer() -> Iterator[Peer]:
-    peer = Peer()
-    yield peer
-    peer.close()
 
 
 @pytest.fixture(autouse=True)

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -39,13 +39,6 @@ def can_draw() -> None:
     """Skips where the machine has neither EGL nor OSMesa."""
     if why := cannot_draw():
         pytest.skip(why)
-
-
-@pytest.fixture
-def peer() -> Iterator[Peer]:
-    peer = Peer()
-    yield peer
-    peer.close()
 
 
 def until(condition: Callable[[], bool]) -> None:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +26,6 @@ from tests.fri_loop.controller import Controller
 from tests.simulators import PATIENT
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
-
-
-@pytest.fixture
-def peer() -> Iterator[Peer]:
-    peer = Peer()
-    yield peer
-    peer.close()
 
 
 def until(condition: Callable[[], bool]) -> None:
