@@ -170,6 +170,23 @@ def test_a_stale_state_is_refused(peer: Peer) -> None:
             _ = arm.state
 
 
+def test_after_a_standstill_the_states_that_wait_are_read_first(
+    peer: Peer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process that the system held up looks at its newest state before its link has read those that came meanwhile."""
+    monkeypatch.setattr("heptarm.arm.link.connection._CATCH_UP", 20.0)
+    with peer.arm(control=False) as arm:
+        for client in peer.clients:
+            client.rate = 0.0
+        last = arm.state
+        while last.age < 1.1:
+            time.sleep(0.02)
+        timer = threading.Timer(0.03, lambda: setattr(peer.clients[0], "rate", 100.0))
+        timer.start()
+        assert arm.state.stamp > last.stamp
+        timer.join()
+
+
 def test_wait_until_gives_up(peer: Peer) -> None:
     with peer.arm() as arm, pytest.raises(ha.Timeout):
         arm.wait_until(lambda s: False, timeout=0.1)

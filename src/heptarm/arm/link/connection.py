@@ -263,6 +263,9 @@ _STOPPED = (
 )
 #: A state older than this many periods, and than this [s], is stale.
 _STALE_PERIODS, _STALE = 10.0, 1.0
+#: How long to wait for a newer state when the newest is stale [s]: after a standstill of this process or of its machine
+#: newer ones wait to be read.
+_CATCH_UP = 0.1
 
 
 class Connection:
@@ -547,7 +550,7 @@ class Connection:
         Raises:
             LocalProtocolError: it runs a callback; nothing arrives before the callback returns.
         """
-        if self._link is not None and self._link.is_read_here:
+        if self._is_read_here:
             raise LocalProtocolError(
                 f"{call} was called from a callback of the link's thread, which would wait for itself",
                 hint="return from the callback and wait in another thread, for example with a threading.Event or "
@@ -638,7 +641,9 @@ class Connection:
         if rate <= 0:
             raise StaleState("no states are subscribed", hint="arm.subscribe(rate=100)")
         limit = max(_STALE, _STALE_PERIODS / (rate * self.real_time_factor))
-        age = float("inf") if sample is None else (self.clock.nanos() - sample.received) * 1e-9
+        if sample is not None and self._age(sample) > limit and not self._is_read_here:
+            sample = self.feed.after(sample.number, _CATCH_UP) or sample
+        age = float("inf") if sample is None else self._age(sample)
         if sample is not None and age <= limit:
             return self.build(sample)
         error = self.final_error()
@@ -651,6 +656,15 @@ class Connection:
             allowed=f"[0, {limit:g}] s",
             hint="check the connection and the load of this machine",
         )
+
+    def _age(self, sample: StateSample) -> float:
+        """Time since the receipt of a sample [s]."""
+        return (self.clock.nanos() - sample.received) * 1e-9
+
+    @property
+    def _is_read_here(self) -> bool:
+        """Whether the calling thread runs a callback of the link: nothing arrives before it returns."""
+        return self._link is not None and self._link.is_read_here
 
     def stream(
         self, *, rate: float | None, duration: float | None, size: int, until: Followed | None = None
