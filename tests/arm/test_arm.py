@@ -173,7 +173,7 @@ def test_a_stale_state_is_refused(peer: Peer) -> None:
 def test_after_a_standstill_the_states_that_wait_are_read_first(
     peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A process that the system held up looks at its newest state before its link has read those that came meanwhile."""
+    """A process that was held up looks at its newest state before its link has read those that came meanwhile."""
     monkeypatch.setattr("heptarm.arm.link.connection._CATCH_UP", 20.0)
     with peer.arm(control=False) as arm:
         for client in peer.clients:
