@@ -25,6 +25,7 @@ HEAD = """// heptarm: a client of the wire protocol in C++17, in one header.
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cmath>

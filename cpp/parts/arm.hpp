@@ -378,6 +378,10 @@ public:
 
     const Options& options() const { return options_; }
 
+    /// Notes whether the subscribed states show if the arm rests.
+    void expect_states(bool showing_rest) { shows_rest_ = showing_rest; }
+    bool shows_rest() const { return shows_rest_; }
+
 private:
     struct Program {
         bool started = false;
@@ -598,6 +602,7 @@ private:
     std::string controller_;
     StateSample newest_;
     double watchdog_ = infinite;
+    std::atomic<bool> shows_rest_{false};
     std::thread thread_;
 };
 
@@ -876,8 +881,14 @@ public:
     /// Name of the client in control; empty: none.
     std::string controller() const { return link_->controller(); }
 
-    /// Runs motions and waits for their end.
-    Result move(const std::vector<wire::Item>& items) { return start(items).wait(); }
+    /// Runs motions and waits for their end. `state()` then shows the arm at rest, unless another program waits or somebody
+    /// pushes the arm.
+    Result move(const std::vector<wire::Item>& items) {
+        const Motion motion = start(items);
+        const Result result = motion.wait();
+        settle(motion.id());
+        return result;
+    }
     Result move(const wire::Item& item) { return move(std::vector<wire::Item>{item}); }
 
     /// Starts motions, as one program, and returns at once.
@@ -912,6 +923,8 @@ public:
         message.groups = groups & welcome().groups;
         message.rate = std::min(rate, welcome().max_rate);
         link_->submit(message);
+        constexpr std::uint16_t needed = wire::Groups::joints | wire::Groups::motion;
+        link_->expect_states(rate > 0 && (message.groups & needed) == needed);
     }
 
     /// The newest state; the first call waits for one.
@@ -956,6 +969,24 @@ public:
 
 private:
     static constexpr double AT_REST = 0.01;  // [rad/s]
+    static constexpr double SETTLING = 0.5;  // longest wait for a state of the arm at rest after a motion [s]
+
+    /// Waits shortly until a state shows the arm at rest after the end of a program.
+    void settle(std::uint32_t program) const {
+        if (!link_->shows_rest()) return;
+        const std::int64_t deadline = now() + static_cast<std::int64_t>(SETTLING * 1e9);
+        try {
+            StateSample sample = link_->state(0, SETTLING);
+            const std::int64_t first = sample.state.joints ? sample.state.joints->stamp : 0;
+            while (now() < deadline) {
+                sample = link_->state(sample.number, 1e-9 * static_cast<double>(deadline - now()));
+                const auto& motion = sample.state.motion;
+                if (motion && (motion->queued != 0 || (motion->motion != 0 && motion->motion != program))) return;
+                if (is_at_rest(sample.state, first)) return;
+            }
+        } catch (const Timeout&) {  // the motion has ended well, however late the states are
+        }
+    }
 
     static bool is_at_rest(const wire::State& state, std::int64_t after) {
         if (!state.joints || !state.motion || state.joints->stamp <= after) return false;

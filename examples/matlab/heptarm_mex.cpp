@@ -51,12 +51,6 @@ mxArray* row(const Numbers& numbers) {
     return made;
 }
 
-/// Moves, and waits for states of the arm at rest, so that "q" and "pose" behind it are those of the end.
-void move(const heptarm::wire::Item& motion) {
-    arm().move(motion);
-    arm().wait_for_rest();
-}
-
 mxArray* execute(const std::string& command, const mxArray* const* given, int count) {
     const auto argument = [&](int number) { return number < count ? given[number] : nullptr; };
     if (command == "connect") {
@@ -70,10 +64,10 @@ mxArray* execute(const std::string& command, const mxArray* const* given, int co
         return mxCreateString(connected->welcome().robot.title.c_str());
     }
     if (command == "ptp") {
-        move(heptarm::ptp(numbers_of<7>(argument(0), "q [rad]"), numbers_of<1>(argument(1), "the speed")[0]));
+        arm().move(heptarm::ptp(numbers_of<7>(argument(0), "q [rad]"), numbers_of<1>(argument(1), "the speed")[0]));
     } else if (command == "lin_rel") {
-        move(heptarm::lin_rel(numbers_of<3>(argument(0), "the offset [m]"), text_of(argument(1), "the frame"),
-                              numbers_of<1>(argument(2), "the speed [m/s]")[0]));
+        arm().move(heptarm::lin_rel(numbers_of<3>(argument(0), "the offset [m]"), text_of(argument(1), "the frame"),
+                                    numbers_of<1>(argument(2), "the speed [m/s]")[0]));
     } else if (command == "q") {
         return row(arm().state().joints->q);
     } else if (command == "pose") {
