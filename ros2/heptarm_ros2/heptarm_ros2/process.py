@@ -6,10 +6,11 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import rclpy
-from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import Executor, InvalidHandle, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -54,7 +55,10 @@ def run(
 
     def spin() -> None:
         try:
-            executor.spin_until_future_complete(over)
+            while not over.done():
+                # while rclpy collects what to wait for, another thread may destroy a publisher: a node is cleaned up
+                with suppress(InvalidHandle):
+                    executor.spin_until_future_complete(over)
         finally:
             if not over.done():
                 failed.set()
