@@ -56,7 +56,7 @@ def run(
     def spin() -> None:
         try:
             while not over.done():
-                # while rclpy collects what to wait for, another thread may destroy a publisher: a node is cleaned up
+                # while rclpy collects what to wait for, a clean-up may destroy a publisher: ros2/rclpy issue 1284
                 with suppress(InvalidHandle):
                     executor.spin_until_future_complete(over)
         finally:
