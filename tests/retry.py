@@ -15,10 +15,14 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import pytest
+
+if TYPE_CHECKING:
+    import heptarm as ha
 
 T = TypeVar("T")
 
@@ -26,6 +30,8 @@ T = TypeVar("T")
 LIMIT = 8
 #: Most retries in a row.
 IN_A_ROW = 2
+#: Longest time of the cabinet between two states of it that shows nothing about this machine [s].
+HELD_UP = 0.06
 #: Pause before a retry, in which the load of the machine may end [s].
 PAUSE = 1.0
 
@@ -84,6 +90,19 @@ def silent(outcome: object) -> str:
         return ""
     said = str(outcome.stderr)
     return "one side was silent" if "its watchdog time is" in said or "nothing received from" in said else ""
+
+
+def held_up(arm: ha.Arm, since: int) -> str:
+    """The cause, if the cabinet of an arm did not sample states for a while, so that what happened then was not seen.
+
+    Args:
+        arm: connected to a virtual cabinet that runs faster than time.
+        since: when its measurement began, our monotonic clock [ns].
+    """
+    connection = arm.connection
+    stamps = [connection.decode(one).stamp for one in connection.feed.kept() if one.received >= since]
+    longest = max((after - before for before, after in pairwise(stamps)), default=0) * 1e-9
+    return f"no states of {longest:.2f} s of the cabinet's time" if longest > HELD_UP else ""
 
 
 def busy(outcome: object) -> str:
