@@ -31,6 +31,7 @@ BESIDE_FLOORS = {
     "fri_reply_busy": "an FRI reply | C echo",
     "fri_law_c": "reply of a law in C | C echo",
     "fri_law_numba": "reply of a law by Numba | C echo",
+    "fri_law_c_polled": "reply of a law in C, busy_poll | C echo",
     "ros2_states_200hz": "ROS 2 joint states | bare topic",
     "ros1_states_200hz": "ROS 1 joint states | bare topic",
 }
@@ -51,13 +52,15 @@ def main() -> None:
     """Draw the picture."""
     head, found = newest()
     figures = {figure["name"]: figure for figure in found}
-    picture = plt.figure(figsize=(11, 6.2), constrained_layout=True)
-    upper, lower = picture.subfigures(2, 1, height_ratios=(5, 1.3))
+    picture = plt.figure(figsize=(11, 6.6), constrained_layout=True)
+    upper, lower = picture.subfigures(2, 1, height_ratios=(5, 1.5))
     one, two = upper.subplots(1, 2, sharex=True, sharey=True)
     _beside_floors(one, figures, "one_core", "everything on one core")
     _beside_floors(two, figures, "two_cores", "each side on a core of its own")
-    one.legend(loc="lower right", fontsize=8)
+    one.invert_yaxis()  # of both
+    one.legend(loc="upper right", fontsize=8)
     _parts(lower.subplots(), figures)
+    lower.legend(ncol=5, fontsize=7, loc="outside lower center", frameon=False)
     machine = head["machine"]
     picture.suptitle(
         f"Medians and their floors, {machine['cpu']}, {machine['cores']} cores, {head['date']}", fontsize=9
@@ -79,7 +82,6 @@ def _beside_floors(axis: plt.Axes, figures: dict[str, Record], placement: str, t
     axis.set_yticks(range(len(rows)), [text for _, text in rows], fontsize=8)
     axis.set_xscale("log")
     axis.set_xlim(1.0, 2e4)
-    axis.invert_yaxis()
     axis.set_title(title, fontsize=9)
     axis.set_xlabel("median [µs]")
     axis.grid(alpha=0.3, axis="x")
@@ -89,12 +91,10 @@ def _parts(axis: plt.Axes, figures: dict[str, Record]) -> None:
     """The parts of a request, in the fastest tenth, which a busy machine changes least."""
     times = [figures[name]["detail"]["fastest_tenth"] for name in PARTS]
     begins = np.concatenate([[0.0], np.cumsum(times)])
-    colours = ("#f3b48f", "#e58a57", FLOOR, "#6fa3c7", "#f3b48f")
+    colours = ("#f3b48f", "#e58a57", FLOOR, "#6fa3c7", "#f7d3bd")
     for begin, time, text, colour in zip(begins, times, PARTS.values(), colours, strict=False):
-        axis.barh(0, time, left=begin, color=colour, edgecolor="white")
-        axis.annotate(
-            f"{text}\n{time:.1f} µs", (begin + time / 2, 0), ha="center", va="center", fontsize=7, wrap=True
-        )
+        axis.barh(0, time, left=begin, color=colour, edgecolor="white", label=text)
+        axis.text(begin + time / 2, 0, f"{time:.1f}", ha="center", va="center", fontsize=8)
     axis.set_yticks([])
     axis.set_xlim(0.0, begins[-1])
     axis.set_title("parts of a request across two cores, fastest tenth", fontsize=9)
