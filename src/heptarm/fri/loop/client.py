@@ -134,8 +134,8 @@ class Client(Reader):
         realtime: request real-time priority and locked memory.
         cpu: processor of the loop; None for any.
         busy_poll: how long before a message is due the loop polls for it instead of sleeping [s], at most 0.25 ms;
-            0.1 ms serves most machines. The answer then waits for no thread to wake, and a processor is busy
-            meanwhile. 0: never.
+            0.2 ms is longer than most machines take to wake a thread. The answer then waits for no thread to wake, and
+            a processor is busy meanwhile. 0: never.
         timeout: time limit for the start of the loop's process [s], beside the compilation of a law.
 
     Attributes:

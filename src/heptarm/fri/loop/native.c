@@ -834,14 +834,10 @@ static void map_posture(struct loop *l, const double *q) {
     if (!l->has_map || memcmp(map->q, q, sizeof map->q)) l->has_map = map_wrenches((const struct chain *)l->chain, q, map);
 }
 
-static int needs_wrench(struct loop *l) {
-    word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
-    return isnan(l->t_wrench[0]) && l->has_chain && (l->t_known & needed) == needed;
-}
-
 /* Estimate the external wrench from the torques where the controller sends none. */
 static void find_wrench(struct loop *l) {
-    if (!needs_wrench(l)) return;
+    word needed = KNOWN(S_Q) | KNOWN(S_TAU_EXT);
+    if (!isnan(l->t_wrench[0]) || !l->has_chain || (l->t_known & needed) != needed) return;
     map_posture(l, l->posture);
     if (!l->has_map) return;
     explain_torques((const struct wrench_map *)l->map, ARRAY(S_TAU_EXT), l->t_wrench);
@@ -926,8 +922,7 @@ int hf_answer(struct loop *l) {
 /* Publish the turn; its answer was sent at `now`. Then prepare the next one. */
 void hf_finish(struct loop *l, word now) {
     word tick = l->header[H_STATES], *slot = open_slot(l);
-    int needs_map = l->t_flags & ESTIMATED || needs_wrench(l);
-    if (!(l->t_flags & ESTIMATED)) find_wrench(l);
+    find_wrench(l);
     if (l->t_answer) {
         l->t_flags |= ANSWERED;
         count_duration(l, l->latency, now - l->received);
@@ -937,7 +932,7 @@ void hf_finish(struct loop *l, word now) {
     __atomic_store_n(slot, 2 * tick + 2, __ATOMIC_RELEASE);
     __atomic_store_n(&l->header[H_STATES], tick + 1, __ATOMIC_RELEASE);
     l->header[H_BEAT] = now;
-    if (needs_map) map_posture(l, ARRAY(S_Q));
+    if (l->t_flags & ESTIMATED) map_posture(l, ARRAY(S_Q));
 }
 
 static void reply(struct loop *l, int size) {
