@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 
 import heptarm as ha
+from heptarm.arm.link.link import Heartbeat
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
@@ -166,6 +167,23 @@ def test_a_loop_that_was_held_up_keeps_its_connection(peer: Peer) -> None:
         while len(held_up) < 5:
             next(states)
         next(states)
+
+
+def test_a_standstill_of_this_process_is_no_silence_of_the_cabinet() -> None:
+    second = 1_000_000_000
+    heartbeat = Heartbeat(0)
+    for now in range(0, 10 * second, second // 10):  # looked after, but nothing is heard
+        heartbeat.look(now)
+        if now <= 2 * second:
+            heartbeat.check(now, "cabinet")
+    with pytest.raises(ha.ConnectionLost, match=r"nothing received from cabinet for 9.9 s"):
+        heartbeat.check(now, "cabinet")
+    heartbeat.received = now
+    heartbeat.look(now)
+    heartbeat.check(now + 60 * second, "cabinet")  # it stood still for a minute, and hears again from now on
+    with pytest.raises(ha.ConnectionLost):
+        for later in range(61 * second, 64 * second, second // 10):
+            heartbeat.check(now + later, "cabinet")
 
 
 def test_requests_from_many_threads(peer: Peer) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from dataclasses import fields
 
 import pytest
 from hypothesis import given
@@ -12,7 +13,8 @@ from hypothesis import strategies as st
 import sample_bodies
 import spec as schema
 from heptarm.wire.codec import DecodeError
-from heptarm.wire.messages import MESSAGES
+from heptarm.wire.messages import MESSAGES, State
+from heptarm.wire.state_groups import StateGroups
 from tests.schema.python_side import recoded
 
 SPEC = schema.load()
@@ -41,6 +43,32 @@ def test_a_damaged_body_is_refused_or_read_but_nothing_else(
             MESSAGES[SPEC.messages[name].id].decode(candidate)
         except DecodeError as error:
             assert str(error)
+
+
+def _group_by_group(body: bytes) -> State:
+    groups = StateGroups(body)
+    state = State(**{one.name: groups.get(one.name) for one in fields(State)})
+    stamps = [group.stamp for one in fields(State) if (group := getattr(state, one.name)) is not None]
+    assert groups.stamp == max(stamps, default=0) and groups.get("no such group") is None
+    return state
+
+
+@given(seed=st.integers(0, 2**32), size=st.integers(0, 5), data=st.data())
+def test_the_groups_of_a_state_one_by_one_are_those_of_the_whole(
+    seed: int, size: int, data: st.DataObject
+) -> None:
+    body = sample_bodies.body(SPEC, "State", str(seed), size)
+    assert _group_by_group(body).encode() == body
+    damaged = bytearray(body)
+    damaged[data.draw(st.integers(0, len(body) - 1))] = data.draw(st.integers(0, 255))
+    for candidate in (bytes(damaged), body[: data.draw(st.integers(0, len(body)))], body + b"\0"):
+        try:
+            whole = State.decode(candidate)
+        except DecodeError:
+            with pytest.raises(DecodeError):
+                _group_by_group(candidate)
+        else:
+            assert str(_group_by_group(candidate)) == str(whole)  # a damaged number may be NaN
 
 
 def _damaged(count: int) -> list[tuple[int, bytes]]:

@@ -123,6 +123,37 @@ def test_beside_an_fri_session_no_ticks_follow_each_other_without_a_pause(room: 
     assert shortest >= 0.0004 if room else shortest < 0.0004  # however late the machine wakes the loop
 
 
+_EARLY = """
+import time
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.runtime.realtime_loop import RealtimeLoop
+from heptarm.sim.seam import TICK_NS, HeaderWords
+shared, begun, shown = SharedState(), [], []
+def tick():
+    number = int(shared.header[HeaderWords.NEWEST]) + 1
+    due = int(shared.header[HeaderWords.ANCHOR]) + number * TICK_NS
+    begun.append(time.monotonic_ns() - due)
+    while time.monotonic_ns() < due + begun[-1] + 50_000:  # what a tick computes
+        pass
+    loop.wait_until_due()
+    shown.append(time.monotonic_ns() - due)
+    shared.header[HeaderWords.NEWEST] = number
+    if len(begun) == 600:
+        loop.stop()
+loop = RealtimeLoop(shared, tick)
+loop.run()
+print(min(begun[300:]), min(shown))
+"""
+
+
+def test_a_tick_begins_early_and_its_state_is_shown_when_it_is_due() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _EARLY], capture_output=True, text=True, check=True, timeout=60
+    )
+    earliest, shown = map(int, done.stdout.split())
+    assert -200_000 <= earliest < 0 <= shown  # [ns]
+
+
 def test_a_plant_needs_no_jvm() -> None:
     code = "import sys; from heptarm.sim.plant.plant import Plant; Plant().step(5); print('jpype' in sys.modules)"
     done = subprocess.run(
@@ -131,7 +162,6 @@ def test_a_plant_needs_no_jvm() -> None:
     assert done.stdout.strip() == "False"
 
 
-def test_models_are_two() -> None:
-    assert (
-        Plant("iiwa7").robot.title == "LBR iiwa 7 R800" and Plant("iiwa14").robot.title == "LBR iiwa 14 R820"
-    )
+def test_a_plant_knows_the_title_of_its_robot() -> None:
+    assert Plant("iiwa7").robot.title == "LBR iiwa 7 R800"
+    assert Plant("iiwa14").robot.title == "LBR iiwa 14 R820"

@@ -133,6 +133,12 @@ class MotionStates:
         return _times([state.groups.pose.stamp for state in self.states if state.groups.pose is not None])
 
     @property
+    def begin(self) -> float:
+        """When a state first showed its program [s since the first state]: a busy cabinet begins later."""
+        ids = [0 if state.motion is None else state.motion.id for state in self.states]
+        return float(self.t[ids.index(max(ids))])
+
+    @property
     def q(self) -> Array:
         """Measured joint positions, shape (n, 7) [rad]."""
         return np.array([state.q for state in self.states])

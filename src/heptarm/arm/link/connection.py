@@ -265,7 +265,7 @@ _STOPPED = (
 _STALE_PERIODS, _STALE = 10.0, 1.0
 #: How long to wait for a newer state when the newest is stale [s]: after a standstill of this process or of its machine
 #: newer ones wait to be read.
-_CATCH_UP = 0.1
+_CATCH_UP = 0.3
 
 
 class Connection:

@@ -144,17 +144,29 @@ class Heartbeat:
         datagram: our clock when a datagram last arrived [ns].
     """
 
-    __slots__ = ("datagram", "received", "timeout", "watchdog")
+    __slots__ = ("_looked", "datagram", "received", "timeout", "watchdog")
 
     def __init__(self, now: int) -> None:
         self.timeout = 1.0
         self.watchdog = float("inf")
-        self.received = self.datagram = now
+        self.received = self.datagram = self._looked = now
 
     @property
     def interval(self) -> int:
         """Time between pings [ns]: a quarter of the shorter timeout, so that one late ping costs nothing."""
         return round(min(self.timeout, self.watchdog) / 4 * 1e9)
+
+    def look(self, now: int) -> None:
+        """Note that the link is looked after now, as it is at least once per interval while this process runs.
+
+        If it was not for longer, this process or its machine stood still: then nobody could have heard anything, and
+        that time is no silence.
+        """
+        still = now - self._looked - self.interval
+        if still > 0:
+            self.received = min(now, self.received + still)
+            self.datagram = min(now, self.datagram + still)
+        self._looked = now
 
     def check(self, now: int, peer: str) -> None:
         """Check the silence so far.
@@ -163,6 +175,7 @@ class Heartbeat:
             ConnectionLost: the cabinet has been silent for two timeouts, and for at least a second; or TCP has been
                 silent for much longer while datagrams arrive.
         """
+        self.look(now)
         allowed = max(2 * self.timeout, _MIN_SILENCE)
         silence = (now - max(self.received, self.datagram)) * 1e-9
         over_tcp = (now - self.received) * 1e-9
@@ -633,6 +646,7 @@ class Link:
         while self._error is None:
             try:
                 now = clock.nanos()
+                self._heartbeat.look(now)
                 if now >= due:
                     self.ping()
                     due = now + self._heartbeat.interval

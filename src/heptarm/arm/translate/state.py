@@ -20,7 +20,7 @@ from heptarm.values.result import Cause, Result
 from heptarm.values.robot import ROBOTS, RobotModel
 from heptarm.wire import messages as wire
 from heptarm.wire.clock_sync import ClockOffset
-from heptarm.wire.codec import DecodeError
+from heptarm.wire.state_groups import StateGroups
 
 _SAFETY = tuple(
     (int(bit), bit.name.lower()) for bit in wire.SafetyBits if bit.name is not None and bit.name != "NONE"
@@ -29,33 +29,36 @@ _MODES = {one: values.OperationMode(one.name.lower()) for one in wire.OperationM
 
 
 class _Received:
-    """A received state: decoded, and each group made when it is asked for.
+    """A received state: each group is decoded and made when it is asked for.
 
     Args:
-        message: has groups under the names of those of a state.
+        message: the message of each group by its name; None: there is none.
+        stamp: cabinet time of the newest group [ns].
         signals: of the cabinet, in the order of their indices.
     """
 
     __slots__ = ("_message", "_signals", "stamp")
 
-    def __init__(self, message: object, signals: Sequence[Signal]) -> None:
-        self._message, self._signals = message, signals
-        groups = (getattr(message, name, None) for name in values.GROUP_NAMES)
-        self.stamp: int = max((group.stamp for group in groups if group is not None), default=0)
+    def __init__(self, message: Callable[[str], Any], stamp: int, signals: Sequence[Signal]) -> None:
+        self._message, self.stamp, self._signals = message, stamp, signals
 
     def make(self, name: str) -> Any:
-        """The group of a name; None: the message has none.
+        """The group of a name; None: the state has none.
 
         Raises:
-            RemoteProtocolError: the cabinet sent numbers that no such group can have.
+            RemoteProtocolError: the cabinet sent bytes or numbers that no such group can have.
         """
-        group = getattr(self._message, name, None)
-        if group is None:
-            return None
         try:
+            group = self._message(name)
+            if group is None:
+                return None
             return _signals(group, self._signals) if name == "io" else _READERS[name](group)
         except ValueError as error:
-            raise RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}") from error
+            raise _undecodable(error) from error
+
+
+def _undecodable(error: Exception) -> RemoteProtocolError:
+    return RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}")
 
 
 def read_state(
@@ -67,18 +70,11 @@ def read_state(
         RemoteProtocolError: the bytes are no state.
     """
     try:
-        message = wire.State.decode(body)
-    except (DecodeError, ValueError) as error:
-        raise RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}") from error
-    return _state(message, offset, clock, signals)
-
-
-def _state(
-    message: object, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal]
-) -> values.State:
-    """A state from a message that has groups under the same names."""
-    received = _Received(message, signals)
-    return values.State(values.Groups.of(received), offset.to_ours(received.stamp), clock)
+        groups = StateGroups(body)
+    except ValueError as error:
+        raise _undecodable(error) from error
+    received = _Received(groups.get, groups.stamp, signals)
+    return values.State(values.Groups.of(received), offset.to_ours(groups.stamp), clock)
 
 
 def read_signals(infos: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
@@ -99,7 +95,12 @@ def read_firing(
     message: wire.ConditionFired | wire.TriggerFired, offset: ClockOffset, clock: Callable[[], int]
 ) -> values.State | None:
     """The state of the robot when a condition or a trigger fired, as far as the cabinet reported it."""
-    return None if message.joints is None else _state(message, offset, clock, ())
+    if message.joints is None:
+        return None
+    groups = (getattr(message, name, None) for name in values.GROUP_NAMES)
+    stamp = max((group.stamp for group in groups if group is not None), default=0)
+    received = _Received(lambda name: getattr(message, name, None), stamp, ())
+    return values.State(values.Groups.of(received), offset.to_ours(stamp), clock)
 
 
 def read_result(message: wire.MotionFinished, state: values.State | None) -> Result:

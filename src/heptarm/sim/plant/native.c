@@ -134,11 +134,11 @@ static int posture(const struct tick *t, const double *q, double *e1, word *stat
     return 1;
 }
 
-/* Write a state into the shared memory. Returns WAKE if a reader waits for it, ASK if the arm angle has to be computed
-   elsewhere: then nothing is written before the next call with that angle in `e1` and `has_e1` set. */
-word ht_publish(struct tick *t, word tick, word flags, word mode, word order, double progress, double remaining) {
+/* Write a state into its slot of the shared memory; `ht_publish` has to follow. Returns ASK if the arm angle has to be
+   computed elsewhere: then nothing is written before the next call with that angle in `e1` and `has_e1` set. */
+word ht_write(struct tick *t, word tick, word flags, word mode, word order, double progress, double remaining) {
     const double *q = t->shown;
-    word *words = t->memory + STATES + tick % SLOTS * SIZE, *header = t->memory + HEADER;
+    word *words = t->memory + STATES + tick % SLOTS * SIZE;
     double *reals = (double *)words, angle;
     word status, turns = 0;
     if (!posture(t, q, &angle, &status)) {
@@ -166,7 +166,13 @@ word ht_publish(struct tick *t, word tick, word flags, word mode, word order, do
     words[STATUS] = status;
     for (int i = 0; i < AXES; i++) turns |= (word)(q[i] < 0.0) << i;
     words[TURN] = turns;
+    return 0;
+}
+
+/* Let readers see the state that was written last. Returns whether one of them waits for it. */
+word ht_publish(struct tick *t, word tick) {
+    word *words = t->memory + STATES + tick % SLOTS * SIZE, *header = t->memory + HEADER;
     __atomic_store_n(words + SEQ, 2 * tick + 2, __ATOMIC_RELEASE);
     __atomic_store_n(header + NEWEST, tick, __ATOMIC_SEQ_CST);
-    return tick * TICK_NS >= __atomic_load_n(header + WAKE_AT, __ATOMIC_SEQ_CST) ? WAKE : 0;
+    return tick * TICK_NS >= __atomic_load_n(header + WAKE_AT, __ATOMIC_SEQ_CST);
 }

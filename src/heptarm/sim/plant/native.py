@@ -23,7 +23,7 @@ from heptarm.values.robot import RobotModel
 
 AXES = 7
 #: What the functions return.
-LOADED, WAKE, ASK = 1, 1, 2
+LOADED, ASK = 1, 1
 
 _SOURCE = Path(__file__).with_name("native.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
@@ -63,7 +63,6 @@ def _header() -> str:
     constants = {
         "AXES": AXES,
         "LOADED": LOADED,
-        "WAKE": WAKE,
         "ASK": ASK,
         "SLOTS": SLOTS,
         "TICK_NS": TICK_NS,
@@ -94,11 +93,13 @@ def tick_library() -> ctypes.CDLL:
         Unavailable: this system is not supported, or has no compiler.
     """
     made = compiled_library("tick", _header().encode() + _SOURCE.read_bytes(), holds_gil=True)
-    made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = made.ht_publish.restype = _WORD
+    made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
+    made.ht_write.restype = made.ht_publish.restype = _WORD
     made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
     made.ht_command.restype = None
     made.ht_strained.argtypes = (_POINTER, _WORD)
-    made.ht_publish.argtypes = (_POINTER, _WORD, _WORD, _WORD, _WORD, _REAL, _REAL)
+    made.ht_write.argtypes = (_POINTER, _WORD, _WORD, _WORD, _WORD, _REAL, _REAL)
+    made.ht_publish.argtypes = (_POINTER, _WORD)
     if made.ht_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct tick` must have {ctypes.sizeof(_Memory)} bytes, got {made.ht_size()}")
     return made
@@ -131,7 +132,7 @@ class NativeTick:
     ) -> None:
         library = tick_library()
         self._command, self._sense = library.ht_command, library.ht_sense
-        self._strained, self._publish = library.ht_strained, library.ht_publish
+        self._strained, self._write, self._publish = library.ht_strained, library.ht_write, library.ht_publish
         self._memory = memory = _Memory()
         self._at = ctypes.addressof(memory)
         self._kept = (shared, ranges, arrays)
@@ -169,7 +170,7 @@ class NativeTick:
         self._points[2] = after
         return bool(self._strained(self._at, is_stiff))
 
-    def publish(
+    def write(
         self,
         tick: int,
         after: Array,
@@ -177,8 +178,8 @@ class NativeTick:
         *,
         words: tuple[int, int, int],
         times: tuple[float, float],
-    ) -> bool:
-        """Publish the state of a tick.
+    ) -> None:
+        """Write the state of a tick into the shared memory; readers see it after `publish`.
 
         Args:
             tick: its number.
@@ -186,13 +187,12 @@ class NativeTick:
             e1: computes the arm angle [rad] where that is not simple.
             words: flags, mode and order.
             times: progress and remaining time.
-
-        Returns:
-            Whether a reader waits for it.
         """
         self._points[2] = after
-        done = self._publish(self._at, tick, *words, *times)
-        if done == ASK:
+        if self._write(self._at, tick, *words, *times) == ASK:
             self._memory.e1, self._memory.has_e1 = e1(), 1
-            done = self._publish(self._at, tick, *words, *times)
-        return bool(done == WAKE)
+            self._write(self._at, tick, *words, *times)
+
+    def publish(self, tick: int) -> bool:
+        """Let readers see the state of a tick that was written; returns whether one waits for it."""
+        return bool(self._publish(self._at, tick))

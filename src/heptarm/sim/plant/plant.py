@@ -197,7 +197,8 @@ class Plant:
         )
         self.safety = SafetyController()
         self.on_safety: Callable[[int, int], None] | None = None  # called with changed flags and mode
-        self._flags = 0
+        # safety flags, and the operation mode above them: as reported, and of the newest state
+        self._flags = self._seen = 0
         self._brakes: PositionLaw | None = None  # closed
         self._braked = self._sensed
         self._halted = 0  # ticks for which a stop on the path has been in force
@@ -210,7 +211,9 @@ class Plant:
         self.condition_monitor = self.interpolator.condition_monitor
         self.submit = self.interpolator.queue.submit
         self._take_loads()
-        self._write(0, 0.0, nan)
+        self.tick_count = -1
+        self._write(0.0, nan)
+        self.publish()
 
     def _views(self) -> None:
         d = self.data
@@ -390,6 +393,11 @@ class Plant:
 
     def tick(self) -> None:
         """Advance by one millisecond: set-point, control law, dynamics, state."""
+        self.compute()
+        self.publish()
+
+    def compute(self) -> None:
+        """Compute the next tick: set-point, control law, dynamics; `publish` has to follow."""
         m, d, interpolator = self.model, self.data, self.interpolator
         if self._changes:
             self._take_loads()
@@ -411,8 +419,24 @@ class Plant:
             self._watch(watched)
         if self._monitor is not None and not self._tripped:
             self._supervise(self._monitor)
-        self.tick_count += 1
-        self._write(interpolator.order, progress, remaining)
+        self._write(progress, remaining)
+
+    def publish(self) -> None:
+        """Let readers see the state of the tick that was computed, and wake those that wait for it."""
+        self.tick_count = k = self.tick_count + 1
+        if self._native is not None:
+            is_awaited = self._native.publish(k)
+        else:
+            header = self.shared.header
+            self.shared.ints[k % SLOTS, StateWords.SEQ] = 2 * k + 2
+            header[HeaderWords.NEWEST] = k
+            is_awaited = k * TICK_NS >= header[HeaderWords.WAKE]
+        if is_awaited and self.on_wake is not None:
+            self.on_wake(k * TICK_NS)
+        if self._seen != self._flags:
+            self._flags = self._seen
+            if self.on_safety is not None:
+                self.on_safety(self._flags, self._flags >> 32)
 
     def _drive(self) -> None:
         """The control law in force: torques of the motors."""
@@ -515,37 +539,24 @@ class Plant:
         self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
         self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
 
-    def _write(self, order: int, progress: float, remaining: float) -> None:
-        k, shared, mode = self.tick_count, self.shared, int(self.safety.mode)
-        flags = self._safety_flags()
-        words = (flags | _MOVING if order else flags, mode, order)
-        if self._native is not None:
-            after, times = self.interpolator.command.after, (progress, remaining)
-            is_awaited = self._native.publish(k, after, self._e1, words=words, times=times)
-        else:
-            self._publish(shared.ints[k % SLOTS], shared.floats[k % SLOTS], words, (progress, remaining))
-            is_awaited = k * TICK_NS >= shared.header[HeaderWords.WAKE]
-        if is_awaited and self.on_wake is not None:
-            self.on_wake(k * TICK_NS)
-        flags |= mode << 32  # a change of the mode alone is reported, too
-        if flags != self._flags:
-            self._flags = flags
-            if self.on_safety is not None:
-                self.on_safety(flags, mode)
-
     def _e1(self) -> float:
         return posture(self.robot, self._measured.tolist())[0]
 
-    def _publish(
-        self, words: Array, reals: Array, given: tuple[int, int, int], times: tuple[float, float]
-    ) -> None:
-        """Write a state: flags, mode and order, progress and remaining time are given."""
-        k = self.tick_count
+    def _write(self, progress: float, remaining: float) -> None:
+        """Write the state after the next tick into its slot; readers see it after `publish`."""
+        k, shared, after = self.tick_count + 1, self.shared, self.interpolator.command.after
+        flags, mode, order = self._safety_flags(), int(self.safety.mode), self.interpolator.order
+        self._seen = flags | mode << 32  # a change of the mode alone is reported, too
+        given = (flags | _MOVING if order else flags, mode, order)
+        if self._native is not None:
+            self._native.write(k, after, self._e1, words=given, times=(progress, remaining))
+            return
+        words, reals = shared.ints[k % SLOTS], shared.floats[k % SLOTS]
         words[StateWords.SEQ] = 2 * k + 1
         words[StateWords.TIME] = k * TICK_NS
         q = self._measured
         reals[StateWords.Q] = q
-        reals[StateWords.Q_CMD] = self.interpolator.command.after
+        reals[StateWords.Q_CMD] = after
         reals[StateWords.DQ] = self._dq
         reals[StateWords.TAU] = self._tau
         reals[StateWords.TAU_EXT] = self._load.torque
@@ -555,11 +566,9 @@ class Plant:
         reals[StateWords.POSE] = (*p, *_quaternion(x, y, z))
         reals[StateWords.WRENCH] = self._load.wrench
         words[StateWords.FLAGS], words[StateWords.MODE], words[StateWords.ORDER] = given
-        reals[StateWords.PROGRESS], reals[StateWords.REMAINING] = times
+        reals[StateWords.PROGRESS], reals[StateWords.REMAINING] = progress, remaining
         reals[StateWords.E1], words[StateWords.STATUS] = posture(self.robot, values)
         words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
-        words[StateWords.SEQ] = 2 * k + 2
-        self.shared.header[HeaderWords.NEWEST] = k
 
     def _safety_flags(self) -> int:
         safety = self.safety

@@ -191,7 +191,9 @@ class VirtualCabinet:
         self.operator.tick()
         self.sessions.tick()
         self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
-        self.plant.tick()
+        self.plant.compute()
+        self.loop.wait_until_due()
+        self.plant.publish()
         if self._trace is not None:
             self._trace.append()
         if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:

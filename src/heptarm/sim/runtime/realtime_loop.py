@@ -4,6 +4,9 @@ The loop sleeps until a tick is due. After a late wake-up it catches up, since a
 after more than 20 missed ticks it re-bases its schedule and counts that. With an FRI session open it leaves
 `answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
 that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
+A sensor's reading is there at once, a simulated one has to be computed: so a tick begins early, by about as long as it
+takes, and its state is published when it is due, see `RealtimeLoop.wait_until_due`. With an FRI session open it begins
+when it is due, since the answer to the state before is one of its inputs.
 While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
 every few seconds, in the pause between two ticks.
@@ -42,6 +45,11 @@ ANSWER_GAP = 0.4
 SPIN_NS = 60_000
 #: At most this fraction of a period is spun.
 SPIN_FRACTION = 0.1
+#: A tick begins at most this long before it is due, as a fraction of a period.
+EARLIEST = 0.2
+#: After a tick that is late the next one begins so much earlier [ns]; after one in time, by this fraction of what was
+#: left later.
+EARLIER_NS, LATER = 10_000, 1 / 32
 #: No real-time priority above this speed: Linux throttles a loop that never sleeps for 50 ms in each second.
 REAL_TIME_SPEED = 5.0
 #: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that other threads run.
@@ -167,6 +175,8 @@ class RealtimeLoop:
         self._rested = 0
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
+        self._due = self._waited = 0
+        self._early, self._earliest = 0.0, EARLIEST * self._period
         self._speed = speed
         self.answer_gap = 0.0
         self._stop = False
@@ -197,6 +207,16 @@ class RealtimeLoop:
             # otherwise the plant outlives its modules, and the bindings of its libraries report leaks
             gc.enable()
             gc.unfreeze()
+
+    def wait_until_due(self) -> None:
+        """Wait for the moment at which the present tick is due; called between computing a state and publishing it."""
+        begin = now = time.monotonic_ns()
+        spare = self._due - begin
+        if self.answer_gap == 0.0:
+            self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
+        while now < self._due:
+            now = time.monotonic_ns()
+        self._waited = now - begin
 
     def _refuse(self, text: str) -> None:
         if text and text not in self._refused:
@@ -250,7 +270,8 @@ class RealtimeLoop:
                 time.sleep(YIELD_TIME)
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
-            start = max(due, end + gap)
+            early = 0 if gap else int(self._early)
+            start = max(due - early, end + gap)
             if now < start:
                 if start - now > spin:
                     time.sleep((start - now - spin) * 1e-9)
@@ -262,11 +283,12 @@ class RealtimeLoop:
                     end, is_second = now, True
                     continue
             begin, is_second = now_ns(), False
+            self._due, self._waited = due, 0
             self._tick()
             end = now_ns()
             at = self._count % _HISTORY
-            self._late[at] = begin - due
-            self._cost[at] = end - begin
+            self._late[at] = begin - due + early
+            self._cost[at] = end - begin - self._waited
             self._count += 1
             due += period
             if rest is not None and rest.begins():

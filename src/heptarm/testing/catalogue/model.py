@@ -15,7 +15,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import ROBOTS
 
-#: Time between two states whose difference makes a velocity here [s].
+#: States on each side of a place whose difference makes a velocity there.
 _GAP = 4
 
 
@@ -91,11 +91,13 @@ def in_bulk(arm: Arm) -> None:
 def jacobian(arm: Arm) -> None:
     """The Jacobian maps measured joint velocities to the measured velocity of the flange and of a point on it."""
     recording = record(arm, ptp(HOME + deg(12, 4, -6, 5, 6, 8, 10), speed=0.25))
-    middle = len(recording.states) // 2
-    a, b = recording.states[middle - _GAP], recording.states[middle + _GAP]
-    seconds = float(recording.t_pose[middle + _GAP] - recording.t_pose[middle - _GAP])
+    spans = recording.t[2 * _GAP :] - recording.t[: -2 * _GAP]
+    speeds = np.abs(recording.q_cmd[2 * _GAP :] - recording.q_cmd[: -2 * _GAP]).max(axis=1) / spans
+    first = int(np.argmax(speeds))  # at full speed the velocity changes least
+    a, b = recording.states[first], recording.states[first + 2 * _GAP]
+    seconds = float(recording.t_pose[first + 2 * _GAP] - recording.t_pose[first])
     q = (a.q_cmd + b.q_cmd) / 2
-    dq = (b.q_cmd - a.q_cmd) / float(recording.t[middle + _GAP] - recording.t[middle - _GAP])
+    dq = (b.q_cmd - a.q_cmd) / float(spans[first])
     matrix = model.jacobian(arm.robot, q)
     velocity = (b.pose_cmd.xyz - a.pose_cmd.xyz) / seconds
     above(float(np.linalg.norm(velocity)), 0.005, "speed of the flange", unit="m/s")
