@@ -158,7 +158,7 @@ class Ros:
             )
             self._actions[name] = self.wait(made, f"no client of {name} can be made")
             until(self._actions[name].server_is_ready, f"there is no action {name}")
-            self._meet(name)
+            self.meet(name)
         client = self._actions[name]
         until(client.server_is_ready, f"there is no action {name}")
         return client
@@ -167,17 +167,17 @@ class Ros:
         """A client of an available service."""
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
-            self._meet(name)
+            self.meet(name)
         client = self._clients[name]
         until(client.service_is_ready, f"there is no service {name}")
         return client
 
-    def _meet(self, name: str) -> None:
-        """Wait until the node of a service or an action has discovered all clients of this process.
+    def meet(self, name: str) -> None:
+        """Wait until the node of a service or an action has discovered all clients and subscriptions of this process.
 
         A client knows that it has discovered a server, but not whether the server has discovered it, and until then
-        answers are lost. Discovery goes in the order in which clients are made. So one that is made now asks for
-        nothing, and again after a second: when it is answered, all those before it can be.
+        answers and messages are lost. Discovery goes in the order in which clients are made. So one that is made now
+        asks for nothing, and again after a second: when it is answered, all those before it can be.
         """
         nodes = [f"{above}/get_parameters" for above in map(str, PurePosixPath(name).parents)]
 
