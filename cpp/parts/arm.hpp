@@ -488,12 +488,15 @@ private:
                 }
                 const std::size_t size = socket_->receive(buffer_.data(), buffer_.size(), due);
                 const std::int64_t at = now();
+                // the call ends when the ping is due: if it ended later, this process or its machine stood still,
+                // and that time is no silence of the cabinet
+                received_ = std::min(at, received_ + std::max<std::int64_t>(at - due, 0));
                 session_.feed(buffer_.data(), size);
                 while (const auto frame = session_.next()) {
                     received_ = at;
                     handle(*frame, at);
                 }
-                const double silence = 1e-9 * static_cast<double>(now() - received_);
+                const double silence = 1e-9 * static_cast<double>(at - received_);
                 const double allowed = std::max(2 * welcome_.heartbeat, 1.0);
                 if (silence > allowed)
                     throw ConnectionLost("nothing received from " + peer_ + " for " + wire::text_of(silence) +

@@ -1,4 +1,4 @@
-"""A cabinet that follows a script, over a transport in memory. `close` fails if a step was not consumed."""
+"""A cabinet that follows a script, over a transport in memory or TCP. `close` fails if a step was not consumed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.link.connection import Connection, Options
 from heptarm.errors import ConnectionLost
 from heptarm.io.clock import RealClock
-from heptarm.io.transport import MemoryTransport, memory_pair
+from heptarm.io.transport import MemoryTransport, Transport, memory_pair
 from heptarm.wire import messages as wire
 from heptarm.wire.session import Received, Session, Side
 from heptarm.wire.states import SessionState
@@ -34,7 +34,7 @@ class Served:
     """One client's connection."""
 
     peer: Peer
-    transport: MemoryTransport
+    transport: Transport
     session: Session
     lock: threading.Lock = field(default_factory=threading.Lock)
     rate: float = 0.0
@@ -102,13 +102,17 @@ class Peer:
             self.refuses_dials -= 1
             raise ConnectionLost("nobody there")
         ours, theirs = memory_pair(chunk=self.chunk)
-        session = Session(Side.CABINET, key=self.key)
-        client = Served(self, theirs, session)
+        self.serve(theirs)
+        return ours
+
+    def serve(self, transport: Transport) -> Served:
+        """Begin to serve a client."""
+        client = Served(self, transport, Session(Side.CABINET, key=self.key))
         self.clients.append(client)
-        thread = threading.Thread(target=self._serve, args=(client,), name=f"peer-{self.dials}")
+        thread = threading.Thread(target=self._serve, args=(client,), name=f"peer-{len(self.clients)}")
         self.threads.append(thread)
         thread.start()
-        return ours
+        return client
 
     def drop(self) -> None:
         """Break all connections."""

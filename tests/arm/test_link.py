@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -14,6 +15,7 @@ from heptarm.arm.link.link import Heartbeat
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
+from tests.arm.standstill import stand_still
 from tests.interrupts import ctrl_c_interrupts
 
 HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
@@ -184,6 +186,20 @@ def test_a_standstill_of_this_process_is_no_silence_of_the_cabinet() -> None:
     with pytest.raises(ha.ConnectionLost):
         for later in range(61 * second, 64 * second, second // 10):
             heartbeat.check(now + later, "cabinet")
+
+
+def test_a_client_that_the_system_stops_for_a_while_keeps_its_connection() -> None:
+    program = """if True:
+        import sys
+        import heptarm as ha
+        with ha.connect(sys.argv[1], control=False, timeout=60.0) as arm:
+            first = arm.state.stamp
+            print("ready", flush=True)
+            sys.stdin.readline()
+            print("alive" if arm.state.stamp > first else "old")
+        """
+    done = stand_still([sys.executable, "-c", program])
+    assert (done.returncode, done.stdout) == (0, "alive\n"), done.stderr
 
 
 def test_requests_from_many_threads(peer: Peer) -> None:

@@ -220,6 +220,17 @@ void observe(const std::string& address, double rate, std::uint64_t count) {
               << (arm.controller().empty() ? "nobody" : arm.controller()) << "\n";
 }
 
+// Says when it has a state, waits for a line, and says whether newer states come.
+void wait_for_line(const std::string& address) {
+    Arm arm(address, options_of(""));
+    const auto number = arm.next_state(0).number;
+    std::cout << "ready" << std::endl;
+    std::string line;
+    std::getline(std::cin, line);
+    arm.next_state(number + 1);
+    std::cout << "alive\n";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -232,6 +243,7 @@ int main(int argc, char** argv) {
         if (word(0) == "servo") serve(word(1), std::stod(word(2)));
         if (word(0) == "errors") errors(word(1));
         if (word(0) == "observe") observe(word(1), std::stod(word(2)), std::stoul(word(3)));
+        if (word(0) == "wait") wait_for_line(word(1));
         if (word(0) == "connect") expect("connect", [&] { Arm(word(1), options_of(word(2))); });
     } catch (const Error& error) {
         std::cerr << error.what() << "\n";

@@ -18,6 +18,7 @@ import pytest
 
 from heptarm.wire.codes import Code
 from heptarm.wire.messages import MAJOR
+from tests.arm.standstill import stand_still
 from tests.cli.running import sim
 from tests.retry import retry, silent
 from tests.schema.python_side import recoded
@@ -186,6 +187,11 @@ def test_observes_states_in_order(probe: Path, address: str) -> None:
     assert (
         int(words[3]) >= 200 and int(words[5]) >= 200 and int(words[1]) > 1
     )  # a slow reader leaves states out
+
+
+def test_a_client_that_the_system_stops_for_a_while_keeps_its_connection(probe: Path) -> None:
+    done = stand_still([str(probe), "wait"])
+    assert (done.returncode, done.stdout) == (0, "alive\n"), done.stderr
 
 
 def test_errors_have_the_text_of_the_cabinet(probe: Path, address: str) -> None:
