@@ -15,6 +15,8 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import ROBOTS
 
+#: With A2, A4 or A6 nearer to zero, the noise of a sensor decides about Status, and E1 is that of any posture [rad].
+_SINGULAR = 0.01
 #: States on each side of a place whose difference makes a velocity there.
 _GAP = 4
 
@@ -44,19 +46,23 @@ def forward(arm: Arm) -> None:
 @scenario(line=11, rows="K4 K5", risk=Risk.STILL)
 def inverse(arm: Arm) -> None:
     """Inverse kinematics finds the current joint positions, all other configurations, and the one nearest to a hint."""
-    q = arm.wait_for_rest().q
+    here = arm.wait_for_rest()
+    q, reported = here.q, here.redundancy
     pose = Pose.from_matrix(model.forward(arm.robot, q))
     near(
         model.solve(arm.robot, pose, near=q.tolist()), q, 1e-9, "joints from the pose and a hint", unit="rad"
     )
-    reported = arm.state.redundancy
+    again = model.solve(arm.robot, pose, e1=reported.e1, status=reported.status)
     near(
-        model.solve(arm.robot, pose, e1=reported.e1, status=reported.status),
-        q,
-        2e-3,
-        "joints from the pose, E1 and Status as the cabinet reports them",
-        unit="rad",
+        model.forward(arm.robot, again),
+        pose.matrix,
+        1e-6,
+        "E1 and Status of the cabinet lead to the same pose",
     )
+    if np.abs(q[[1, 3, 5]]).min() > _SINGULAR:
+        near(again, q, 2e-3, "joints from the pose, E1 and Status as the cabinet reports them", unit="rad")
+    else:
+        note("A2, A4 or A6 is near 0 here: E1 and Status belong to more than one posture")
     bent = HOME + deg(10, 5, 15, 10, -10, 5, 20)
     pose = Pose.from_matrix(model.forward(arm.robot, bent))
     found = model.solve_all(arm.robot, pose)
