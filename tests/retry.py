@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 #: Most retries in a run.
-LIMIT = 8
+LIMIT = 12
 #: Most retries in a row.
 IN_A_ROW = 2
 #: Longest time of the cabinet between two states of it that shows nothing about this machine [s].

@@ -59,6 +59,7 @@ class Peer:
         self.dials = 0
         self.refuses_dials = 0
         self.motion = 0
+        self.pushed = 0
         self.progress = 0.5
         self.q = (0.1,) * 7
         self.dq = (0.0,) * 7
@@ -157,6 +158,7 @@ class Peer:
                 if client.rate and now >= due and is_open and not client.is_mute:
                     due = now + 1.0 / client.rate
                     client.say(self.state())
+                    self.pushed += 1
         except ConnectionLost:
             pass
         except BaseException as error:

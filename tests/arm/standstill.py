@@ -1,4 +1,4 @@
-"""A client in a process that the system stops for a while, in front of a cabinet that says nothing in that time."""
+"""A client in a process that the system stops for a while, in front of a cabinet that sends nothing in that time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AFTER = 0.3
 
 
 def stand_still(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
-    """Run a client that says "ready" when it has states and waits for a line; its output and its exit code.
+    """Run a client that prints "ready" when it has states and waits for a line; its output and its exit code.
 
     Client and cabinet stand still together, as when their machine does, and the client runs again first.
     """

@@ -15,7 +15,7 @@ PROGRAM = """
 import heptarm as ha
 from heptarm.wire import messages as wire
 
-with ha.connect("sim://iiwa14") as arm:
+with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
     assert "hold" in arm.capabilities and not [c for c in arm.capabilities if c.startswith("fri")]
     for ask in (
         lambda: arm.fri("position"),

@@ -283,7 +283,7 @@ def test_bad_velocities_are_refused_and_change_nothing(arm: ha.Arm, bad: Any) ->
 
 _KILLED = """
 import sys, heptarm
-with heptarm.connect(sys.argv[1], watchdog=5.0) as arm, arm.servo("velocity", watchdog=0.5) as sv:
+with heptarm.connect(sys.argv[1], watchdog=5.0) as arm, arm.servo("velocity", watchdog=2.0) as sv:
     while sv.tick() is not None:
         sv.set([0, 0, 0, 0, 0, 0, 0.2])
         if arm.state.dq[6] > 0.1:

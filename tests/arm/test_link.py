@@ -252,13 +252,11 @@ def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:
 
 
 def test_an_interrupted_request_leaves_a_sound_link(peer: Peer) -> None:
-    peer.expect(wire.Stop)  # the first stop is never answered, so the caller waits in receive_into
+    timer = threading.Timer(0.1, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT))
+    # the first stop is never answered, so the caller waits in receive_into
+    peer.expect(wire.Stop, lambda *_: timer.start())
     with peer.arm() as arm:
-        timer = threading.Timer(
-            0.1, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
-        )
         with ctrl_c_interrupts(), pytest.raises(KeyboardInterrupt):
-            timer.start()
             arm.stop()
         timer.join()
         arm.stop()

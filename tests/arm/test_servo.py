@@ -218,7 +218,7 @@ def test_a_servo_does_not_begin_in_impedance_at_a_singularity(arm: ha.Arm) -> No
 
 _KILLED = """
 import sys, time, numpy, heptarm
-arm = heptarm.connect(sys.argv[1])
+arm = heptarm.connect(sys.argv[1], watchdog=5.0, timeout=30.0)
 with arm.servo("joint", rate=100, speed=0.3, watchdog=2.0) as sv:
     while sv.tick():
         sv.set(sv.start.q + [0, 0, 0, 0, 0, 0, 0.5])

@@ -20,8 +20,11 @@ HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 
 def begin(peer: Peer, number: int) -> None:
     """From now on the cabinet's states report this program; 0: none."""
-    peer.motion = number
-    time.sleep(0.1)  # twenty states
+    peer.motion, enough = number, peer.pushed + 21
+    deadline = time.monotonic() + 60.0
+    while peer.pushed < enough:
+        assert time.monotonic() < deadline, "the cabinet pushes no states"
+        time.sleep(0.005)
 
 
 def running(peer: Peer, arm: ha.Arm, number: int) -> ha.MotionHandle:

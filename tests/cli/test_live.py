@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 def test_to_a_file_for_some_seconds(cabinet: RunningCabinet, tmp_path: Path) -> None:
     pytest.importorskip("rerun")
     file = tmp_path / "run.rrd"
-    (done,) = objects("live", "--save", str(file), "--for", "0.5", "--target", cabinet.target)
+    (done,) = objects("live", "--save", str(file), "--for", "3", "--target", cabinet.target)
     assert done["states"] > 10 and done["bytes"] == file.stat().st_size > 100_000
     refused = run("live", "--rerun", "--target", cabinet.target, DISPLAY="", WAYLAND_DISPLAY="")
     assert refused.returncode == 1 and refused.stderr.count("\n") == 1 and "--save FILE.rrd" in refused.stderr

@@ -68,7 +68,7 @@ def test_for_some_seconds_with_pictures(cabinet: RunningCabinet, tmp_path: Path)
         pytest.skip(why)
     path = tmp_path / "a.mcap"
     (done,) = objects(
-        "record", str(path), "--for", "0.5", "--camera-size", "160x120", "--target", cabinet.target
+        "record", str(path), "--for", "3", "--camera-size", "160x120", "--target", cabinet.target
     )
     assert done["states"] > 10 and done["bytes"] > 1000
     pictures = ha.load(path).pictures

@@ -68,7 +68,7 @@ def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) 
         browser.get(ready["view"])
         first = _settled(browser)
         browser.save_screenshot(str(tmp_path / "view.png"))
-        with ha.connect(ready["target"]) as arm:
+        with ha.connect(ready["target"], watchdog=5.0, timeout=30.0) as arm:
             arm.move(ha.ptp(ha.deg(60, 50, 0, -60, 0, 60, 0)))
         second = _settled(browser)
         assert np.abs(second - first).mean() > 5e-3, "the picture did not change after a motion"

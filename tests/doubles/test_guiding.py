@@ -23,7 +23,7 @@ OPERATOR = ("guide@2.5", "push 20 40 -20 1.5@3", "let_go@5", "guide@10", "let_go
 def test_an_application_is_led_by_hand(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Guiding.java", tmp_path)
     said = tmp_path / "said.txt"
-    command = _command("sample.Guiding", tmp_path, f"sample.file={said}")
+    command = _command("sample.Guiding", tmp_path, f"sample.file={said}", speed=1.0)  # an operator has time
     for words in OPERATOR:
         command += ["--fault", words]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)

@@ -23,7 +23,7 @@ FAULTS = ("emergency_stop@3", "clear@4", "drive_error 2@6.5", "t2@8.5", "enable@
 def test_an_application_lives_through_stops(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Stopping.java", tmp_path)
     said = tmp_path / "said.txt"
-    command = _command("sample.Stopping", tmp_path, f"sample.file={said}")
+    command = _command("sample.Stopping", tmp_path, f"sample.file={said}", speed=1.0)  # an operator has time
     for fault in FAULTS:
         command += ["--fault", fault]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

@@ -45,13 +45,17 @@ def test_it_polls_around_the_moment_at_which_a_message_is_due_and_sleeps_else(bu
     native, sock = twins.native, UdpSocket(0, host="127.0.0.1", patience=0.1)
     native.listen(sock.sock, None)
     memory = native.memory
-    memory.busy_poll, memory.period, memory.received = busy_poll, 20_000_000, time.monotonic_ns()
-    begin, used = time.monotonic(), time.thread_time()
-    assert native.library.hf_run(native.reference, 1, native.sender) == TIMEOUT
-    used, taken = time.thread_time() - used, time.monotonic() - begin
+    memory.busy_poll, memory.period = busy_poll, 20_000_000
+    for _ in range(5):  # a busy machine takes the processor away while it polls
+        memory.received = time.monotonic_ns()
+        begin, used = time.monotonic(), time.thread_time()
+        assert native.library.hf_run(native.reference, 1, native.sender) == TIMEOUT
+        used, taken = time.thread_time() - used, time.monotonic() - begin
+        assert taken >= 0.1  # after the last poll it waits as ever
+        if (used > 3e-3) is (busy_poll > 0):
+            break
     sock.close()
-    assert used > 3e-3 if busy_poll else used < 3e-3
-    assert taken >= 0.1  # after the last poll it waits as ever
+    assert (used > 3e-3) is (busy_poll > 0)
 
 
 class Twins:

@@ -18,7 +18,7 @@ def pytest_sessionstart():
     from tests import processes
     from tests import hangs
     processes.GRACE = 0.3
-    hangs.AHEAD = 57.0
+    hangs.AHEAD = 45.0
 """
 _HEAD = """
 import os, pathlib, signal, subprocess, sys, time

@@ -20,7 +20,7 @@ import numpy as np
 import heptarm as ha
 
 target = ha.deg(0, 20, 0, -60, 0, 40, 0)
-with ha.connect("sim://iiwa14") as arm:
+with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
     result = arm.move(ha.ptp(target))
     error = np.abs(arm.state.q - np.asarray(target)).max()
     runtimes = set()

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.arm.watchdog import TARGETS
 from heptarm.errors import CommandRejected, LimitError, ModeConflict, MotionAborted
 from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
@@ -29,7 +31,13 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PanelArm]:
     options = PanelOptions(
         recordings=tmp_path_factory.mktemp("recordings"), gripper="open=MediaFlange.OutputX3Pin1"
     )
-    with ha.connect("sim://iiwa14?speed=2", control=False, watchdog=5.0, timeout=PATIENCE) as arm:
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        ha.connect("sim://iiwa14?speed=2", control=False, watchdog=5.0, timeout=PATIENCE) as arm,
+    ):
+        patch.setattr(
+            "heptarm.arm.motion.servo.TARGETS", replace(TARGETS, default=2.0)
+        )  # as on a busy machine
         model = model_of(arm, "sim://iiwa14?speed=2", options)
         yield model
         model.close()

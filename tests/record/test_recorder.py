@@ -21,6 +21,7 @@ from heptarm.record import recorder as recording
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.wire import messages as wire
 from tests.arm.peer import Peer
+from tests.arm.test_fri import patient
 from tests.conftest import RunningCabinet
 from tests.fri_loop.controller import Controller
 from tests.simulators import PATIENT
@@ -170,8 +171,9 @@ def test_a_motion_of_the_virtual_cabinet(arm: ha.Arm, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@patient
 def test_fri_cycles_are_recorded_at_their_own_rate(arm: ha.Arm, tmp_path: Path) -> None:
-    with arm.record(tmp_path / "run.mcap"), arm.fri("position", period_ms=5) as session:
+    with arm.record(tmp_path / "run.mcap"), arm.fri("position", period_ms=10) as session:
         while len(session.history()) < 150 and session.active:
             session.next()
     run = ha.load(tmp_path / "run.mcap")
@@ -188,6 +190,8 @@ def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
         with controller.running():
             client.wait("MONITORING_WAIT")
             with ha.record_client(client, tmp_path / "fri.mcap") as rec:
+                for _ in range(20):  # each has some messages that a held-up client does not miss
+                    controller.settle()
                 controller.active()
                 begin = client.wait("COMMANDING_ACTIVE")
                 rec.note("commands are effective")

@@ -40,7 +40,7 @@ def peer(cabinet: PrivateCabinet) -> Iterator[Peer]:
         assert picture(cabinet) == before
         assert not peer.all(wire.MotionStarted)
         peer.ask(wire.ReleaseControl())
-    with ha.connect(f"sim://{cabinet.host}:{cabinet.port}", timeout=PATIENCE) as arm:
+    with ha.connect(f"sim://{cabinet.host}:{cabinet.port}", timeout=PATIENCE, watchdog=5.0) as arm:
         assert arm.move(ha.ptp(arm.state.q_cmd + 0.01)).arrived
 
 

@@ -16,6 +16,7 @@ import heptarm as ha
 from heptarm import devices, skills
 from heptarm.errors import NotReady
 from tests.conftest import RunningCabinet
+from tests.retry import busy, retry
 from tests.simulators import FASTER
 
 pytestmark = pytest.mark.slow
@@ -153,26 +154,34 @@ def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict, word: str
 
 
 def test_heptarm_jog_moves_by_the_keys_of_a_terminal(arm: ha.Arm, cabinet: RunningCabinet) -> None:
-    y = arm.state.pose.y
-    arm.release_control()
-    person, terminal = os.openpty()
     command = [sys.executable, "-m", "heptarm.cli.main", "jog", "--target", cabinet.target, "--scale", "0.1"]
-    child = subprocess.Popen(
-        command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-    )
+
+    def attempt() -> subprocess.CompletedProcess[str]:
+        y = arm.state.pose.y
+        person, terminal = os.openpty()
+        child = subprocess.Popen(
+            command, stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            assert child.stdout is not None and "w s: x" in child.stdout.readline()
+            deadline = time.monotonic() + 60.0
+            while arm.state.pose.y < y + 0.02 and time.monotonic() < deadline and child.poll() is None:
+                os.write(person, b"a")
+                select.select([person], [], [], 0.04)
+            moved = arm.state.pose.y > y + 0.02
+            os.write(person, b"q")
+            output, complaint = child.communicate(timeout=60.0)
+            assert moved or child.returncode != 0
+            return subprocess.CompletedProcess(command, child.returncode, output, complaint)
+        finally:
+            child.kill()
+            child.wait()
+            os.close(person)
+            os.close(terminal)
+
+    arm.release_control()
     try:
-        assert child.stdout is not None and "w s: x" in child.stdout.readline()
-        deadline = time.monotonic() + 60.0
-        while arm.state.pose.y < y + 0.02 and time.monotonic() < deadline:
-            os.write(person, b"a")
-            select.select([person], [], [], 0.04)
-        assert arm.state.pose.y > y + 0.02
-        os.write(person, b"q")
-        output, _ = child.communicate(timeout=60.0)
-        assert child.returncode == 0 and "sent" in output
+        done = retry(attempt, busy)
+        assert done.returncode == 0 and "sent" in done.stdout, done.stderr
     finally:
-        child.kill()
-        child.wait()
-        os.close(person)
-        os.close(terminal)
         arm.take_control()

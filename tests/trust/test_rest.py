@@ -57,10 +57,14 @@ def test_states_at_rest_are_on_the_grid_of_their_rate_and_all_the_same(
 
 
 def test_the_clock_goes_on_at_rest(resting: Arm) -> None:
-    began, first = time.monotonic(), resting.state.stamp
-    time.sleep(1.0)
-    last = resting.wait_until(lambda s: s.stamp > first + 500_000_000, timeout=PATIENCE).stamp
-    assert 1e-9 * (last - first) <= time.monotonic() - began + 0.1
+    def ahead() -> float:
+        """How much more time has passed on its clock than on ours [s]; a state that waited makes it larger."""
+        began, first = time.monotonic(), resting.state.stamp
+        time.sleep(1.0)
+        last = resting.wait_until(lambda s: s.stamp > first + 500_000_000, timeout=PATIENCE).stamp
+        return 1e-9 * (last - first) - (time.monotonic() - began)
+
+    assert min(ahead() for _ in range(3)) <= 0.1
 
 
 def test_a_motion_from_rest_arrives_and_the_arm_rests_again(resting: Arm, cabinet: Cabinet) -> None:
