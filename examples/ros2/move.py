@@ -5,7 +5,9 @@ import math
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
+from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 
@@ -20,6 +22,11 @@ class Mover(Node):
         self.create_subscription(PoseStamped, "/heptarm/pose", self.on_pose, 1)
         self.to_joints = self.create_publisher(JointState, "/heptarm/command/joint", 1)
         self.to_pose = self.create_publisher(PoseStamped, "/heptarm/command/lin", 1)
+        # until the node has discovered these, what they send is lost: ask for nothing, and again after a second
+        probe, answer = self.create_client(GetParameters, "/heptarm/get_parameters"), Future()
+        while not answer.done():
+            answer = probe.call_async(GetParameters.Request())
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=1.0)
         self.until(lambda: self.to_joints.get_subscription_count() and self.to_pose.get_subscription_count())
         self.until(lambda: self.joints.name and self.pose.header.frame_id)
 

@@ -5,14 +5,16 @@ A case takes a client; the arm is at rest, follows commands, and all parameters 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
 
+import heptarm as ha
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal, TrajectoryPoint
 from heptarm.values.arrays import Array
-from tests.conformance.client import Client, ReceivedResult, SentGoal
+from tests.conformance.client import Client, ReceivedFeedback, ReceivedResult, SentGoal
 
 Case = Callable[[Client], None]
 Found = TypeVar("Found")
@@ -162,6 +164,38 @@ def rests(client: Client) -> Array:
         if np.abs(after.q - before.q).max() < 2e-4 and np.abs([before.dq, after.dq]).max() < 0.01:
             return after.q
     raise AssertionError("the arm does not come to rest")
+
+
+def newest(arm: ha.Arm) -> ha.State:
+    """The state of an arm that a test has connected; a busy machine may hand it over late."""
+    for _ in range(1000):
+        try:
+            return arm.state
+        except ha.StaleState:
+            time.sleep(0.02)
+    raise AssertionError("no states come")
+
+
+def undisturbed(client: Client, measure: Callable[[], Found]) -> Found:
+    """Discard measurements during stalls of the machine, which the stamps of joint states reveal."""
+    for _ in range(30):
+        begin = client.now()
+        found = measure()
+        times = [time for time, _ in client.track(begin)]
+        if np.diff(times).max() < STALL:
+            return found
+    raise AssertionError("the machine stands still again and again")
+
+
+def feedback_of(
+    client: Client, sent: SentGoal, enough: Callable[[list[ReceivedFeedback]], bool] = bool
+) -> list[ReceivedFeedback]:
+    """Wait for feedback of a goal that has ended: it takes another path than the result."""
+    for _ in range(1000):
+        if enough(found := client.feedback(sent)):
+            return found
+        client.sleep(0.02)
+    raise AssertionError("the feedback does not come")
 
 
 def aborted(ended: ReceivedResult, code: ErrorCode) -> None:

@@ -42,7 +42,7 @@ def wide_path_tolerances(client: Client) -> None:
 def a_frozen_arm_leaves_its_path(client: Client) -> None:
     here = client.place().q
     client.behave("frozen")
-    sent = client.send(step(client, time=1.0, path_tolerance=tolerances(client, 0.01)))
+    sent = client.send(step(client, time=4.0, path_tolerance=tolerances(client, 0.01)))
     assert sent.accepted
     ended = client.result(sent)
     aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
@@ -53,7 +53,7 @@ def a_frozen_arm_leaves_its_path(client: Client) -> None:
 @case
 def a_lagging_arm_leaves_a_narrow_path(client: Client) -> None:
     client.behave("lags")
-    sent = client.send(step(client, time=1.0, size=2.0, path_tolerance=tolerances(client, 0.01)))
+    sent = client.send(step(client, time=4.0, size=2.0, path_tolerance=tolerances(client, 0.01)))
     aborted(client.result(sent), ErrorCode.PATH_TOLERANCE_VIOLATED)
 
 
@@ -70,7 +70,7 @@ def a_lagging_arm_may_on_a_wide_path(client: Client) -> None:
 def one_joints_path_tolerance(client: Client) -> None:
     client.behave("frozen")
     only = (Tolerance(client.joints[6], 0.01),)
-    sent = client.send(step(client, time=1.0, path_tolerance=only))
+    sent = client.send(step(client, time=4.0, path_tolerance=only))
     ended = client.result(sent)
     aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
@@ -159,7 +159,7 @@ def tolerances_in_any_order(client: Client) -> None:
         Tolerance(client.joints[0], 0.5),
         Tolerance(client.joints[3], 0.5),
     )
-    ended = client.result(client.send(step(client, time=1.0, path_tolerance=mixed)))
+    ended = client.result(client.send(step(client, time=4.0, path_tolerance=mixed)))
     aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
 
@@ -167,7 +167,7 @@ def tolerances_in_any_order(client: Client) -> None:
 @case
 def a_goals_tolerances_are_forgotten_after_it(client: Client) -> None:
     client.behave("lags")
-    sent = client.send(step(client, time=1.0, size=2.0, path_tolerance=tolerances(client, 0.005)))
+    sent = client.send(step(client, time=4.0, size=2.0, path_tolerance=tolerances(client, 0.005)))
     aborted(client.result(sent), ErrorCode.PATH_TOLERANCE_VIOLATED)
     rests(client)
     sent = client.send(step(client, time=0.8, goal_time=20.0))
@@ -194,7 +194,7 @@ def a_tolerance_of_an_unknown_joint_means_the_defaults(client: Client) -> None:
 def default_tolerances_can_change(client: Client) -> None:
     client.behave("frozen")
     assert client.set(constraints__A7__trajectory=0.01)
-    ended = client.result(client.send(step(client, time=1.0)))
+    ended = client.result(client.send(step(client, time=4.0)))
     aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
 
@@ -203,5 +203,5 @@ def default_tolerances_can_change(client: Client) -> None:
 def velocity_tolerance_on_the_path(client: Client) -> None:
     client.behave("frozen")
     fast = (Tolerance(client.joints[6], 0.0, 0.05),)
-    ended = client.result(client.send(step(client, time=0.6, path_tolerance=fast)))
+    ended = client.result(client.send(step(client, time=2.0, path_tolerance=fast)))
     aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome
 from heptarm.values.arrays import Array
 from tests.conformance.case import (
     REST,
-    STALL,
     TOUCH,
-    Found,
     case,
     goal,
     last,
@@ -24,21 +20,11 @@ from tests.conformance.case import (
     succeeds,
     swing,
     under_way,
+    undisturbed,
 )
 from tests.conformance.client import Client, SentGoal
 
 # ------------------------------------------------------------------------------------- preemption
-
-
-def undisturbed(client: Client, measure: Callable[[], Found]) -> Found:
-    """Discard measurements during stalls of the machine, which the stamps of joint states reveal."""
-    for _ in range(10):
-        begin = client.now()
-        found = measure()
-        times = [time for time, _ in client.track(begin)]
-        if np.diff(times).max() < STALL:
-            return found
-    raise AssertionError("the machine stands still again and again")
 
 
 @case

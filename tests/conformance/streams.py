@@ -13,6 +13,7 @@ from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, 
 from heptarm.values.arrays import Array
 from tests.conformance.case import (
     REST,
+    STALL,
     TOUCH,
     arrives,
     case,
@@ -120,15 +121,23 @@ def follows(
 ) -> None:
     """Stream a swing: the arm follows it without lag and without stops."""
     found: list[Followed] = []
-    for _ in range(1 if client.timely else ATTEMPTS):
+    counted = 0
+    for _ in range(1 if client.timely else 3 * ATTEMPTS):
         here = rests(client)
         away = swing(client)
         begin = client.now()
         late = paced(client, rate, round(DURATION * rate), lambda k: message(k, here, away))  # noqa: B023
+        rest = rests(client)
+        stood = not client.timely and np.diff([time for time, _ in client.track(begin)]).max() >= STALL
+        if stood and np.abs(rest - here - away).max() >= TOUCH:
+            continue  # messages that have become too old are left out
         arrives(client, here + away)
         found.append(measure(client, begin, here, away, delay))
         if found[-1].is_good(disturbed=is_busy(client, late)):
             return
+        counted += not stood  # an attempt in which the machine stood still does not count
+        if counted == ATTEMPTS:
+            break
     raise AssertionError(f"the arm does not follow: {found}")
 
 
@@ -389,8 +398,7 @@ def cancelled(client: Client, sent: SentGoal) -> None:
 @case
 def an_empty_trajectory_on_the_topic_does_as_upstreams_controller(client: Client) -> None:
     here = client.place().q
-    wanted = step(client, time=2.0, size=2.0)
-    sent = client.send(wanted)
+    sent = client.send(long(client))
     under_way(client, here)
     client.topic(TrajectoryGoal((), ()))
     if client.empty_stops:

@@ -35,7 +35,7 @@ from tests.conformance.stage import ROOT, Stage
 #: Time limit of quick operations on a busy machine [s].
 PATIENCE = 120.0
 #: Watchdogs must not trip within it.
-PATIENT = {"watchdog": 5.0, "servo__watchdog": 1.0, "constraints__goal_time": 20.0}
+PATIENT = {"watchdog": 5.0, "servo__watchdog": 2.0, "constraints__goal_time": 20.0}
 #: Goals that an action client keeps until they are sent. With actionlib's default of 10, a client that sends 20 at
 #: once on a busy machine loses the oldest without an error.
 QUEUE = 200
@@ -326,6 +326,9 @@ class Client:
     def cancel(self, sent: SentGoal) -> bool:
         handle: Any = sent.handle
         handle.cancel()
+        # the next goal is another topic with a thread of its own, and may be quicker
+        before = (actionlib.CommState.ACTIVE, actionlib.CommState.WAITING_FOR_CANCEL_ACK)
+        until(lambda: handle.get_comm_state() not in before, "cancelling is not answered")
         return True
 
     def result(self, sent: SentGoal, timeout: float = PATIENCE) -> ReceivedResult:

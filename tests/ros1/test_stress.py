@@ -23,7 +23,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 import heptarm as ha
-from tests.conformance.case import long, rests, step, succeeds, under_way
+from tests.conformance.case import long, newest, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
 from tests.conformance.stress import preempted_without_growth, refused_in_flight, status
 from tests.ros1.peer import Client, NodeProcess, collect, stamp, until
@@ -127,9 +127,15 @@ def test_twenty_subscribers_at_200_hz(spare: Stage, crowd: NodeProcess, seconds:
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             succeeds(client, step(client, time=1.0, size=0.5))
-        received = [after - before for before, after in zip(first, members.received)]
-        # a busy machine delivers fewer of them, but all subscribers are served alike
-        assert min(received) > 0.2 * 200.0 * seconds and min(received) > 0.5 * max(received), received
+
+        def received() -> list[int]:
+            return [after - before for before, after in zip(first, members.received)]
+
+        # a busy machine delivers them later, but all subscribers are served alike
+        until(lambda: min(received()) > 0.2 * 200.0 * seconds, "messages do not come")
+        until(
+            lambda: min(found := received()) > 0.5 * max(found), "some come to few subscribers", timeout=5.0
+        )
         assert 1024 * (status(crowd.process.pid, "VmRSS") - memory) < 30e6
     finally:
         members.close()
@@ -145,10 +151,10 @@ def test_a_node_that_is_killed_in_mid_goal_and_its_successor(ros: None, spare: S
         assert client.send(long(client)).accepted
         under_way(client, here, 0.03)
         node.end(signal.SIGKILL)
-        with ha.connect(spare.target, control=False) as arm:
-            moved = arm.state.q
-            until(lambda: np.abs(arm.state.dq).max() < 1e-3, "the cabinet does not brake the arm")
-            assert np.abs(arm.state.q - moved).max() < 1.0
+        with ha.connect(spare.target, control=False, watchdog=5.0, timeout=30.0) as arm:
+            moved = newest(arm).q
+            until(lambda: np.abs(newest(arm).dq).max() < 1e-3, "the cabinet does not brake the arm")
+            assert np.abs(newest(arm).q - moved).max() < 1.0
         successor = NodeProcess(spare.target, ns="/fate", watchdog=2.0)
         heir = Client(spare, "/fate/heptarm")
         heir.ready()

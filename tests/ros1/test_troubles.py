@@ -111,10 +111,11 @@ def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: Nod
     sent = other.send(step(other, time=9.0, size=6.0))
     until(lambda: other.feedback(sent), "the goal does not begin")
     spare_node.process.send_signal(signal.SIGSTOP)
-    time.sleep(3.0)  # a busy cabinet forgives as long as it was late itself
+    time.sleep(4.5)  # a busy cabinet forgives as long as it was late itself
     spare_node.process.send_signal(signal.SIGCONT)
     ended = other.result(sent)
     assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended
+    other.ready()
     rests(other)
     assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 

@@ -23,7 +23,18 @@ from std_srvs.srv import Trigger
 
 import heptarm as ha
 from heptarm.ros.node import parameters
-from tests.conformance.case import TOUCH, arrives, goal, long, point, rests, step, succeeds, under_way
+from tests.conformance.case import (
+    TOUCH,
+    arrives,
+    goal,
+    long,
+    newest,
+    point,
+    rests,
+    step,
+    succeeds,
+    under_way,
+)
 from tests.conformance.stage import Stage
 from tests.conformance.streams import streamed
 from tests.ros2.peer import Client, NodeProcess, Ros, fresh, parameter, until
@@ -57,7 +68,7 @@ def test_the_life_cycle_from_unconfigured_and_back(sleeper: Client, spare: Stage
     assert sleeper.change(Transition.TRANSITION_DEACTIVATE)
     assert sleeper.change(Transition.TRANSITION_CLEANUP)
     assert sleeper.life() == "unconfigured"
-    with ha.connect(spare.target) as arm:
+    with ha.connect(spare.target, watchdog=5.0, timeout=30.0) as arm:
         assert arm.in_control, "the node has let go of the robot"
         sleeper.change(Transition.TRANSITION_CONFIGURE)
         assert sleeper.life() == "unconfigured", "another client controls the robot"
@@ -85,10 +96,10 @@ def test_asked_to_end_in_mid_air_it_leaves_the_arm_at_rest(
     assert client.send(long(client)).accepted
     under_way(client, here, 0.03)
     assert node.end(number) == 0, node.said
-    with ha.connect(spare.target) as arm:
+    with ha.connect(spare.target, watchdog=5.0, timeout=30.0) as arm:
         assert arm.in_control
-        assert np.abs(arm.state.q - here).max() > 0.01, "it was under way"
-        assert np.abs(arm.state.dq).max() < 0.05
+        assert np.abs(newest(arm).q - here).max() > 0.01, "it was under way"
+        assert np.abs(newest(arm).dq).max() < 0.05
 
 
 # ------------------------------------------------------------------------------------- parameters
@@ -227,9 +238,7 @@ def test_the_status_is_kept_for_late_subscribers(client: Client, ros: Ros) -> No
 
 
 def publish(client: Client, kind: type, name: str, message: object) -> None:
-    publisher = client.ros.node.create_publisher(kind, name, 1)
-    until(publisher.get_subscription_count, f"nobody listens to {name}")
-    publisher.publish(message)
+    client.ros.publisher(kind, name).publish(message)
 
 
 def joint_state(client: Client, q: np.ndarray) -> JointState:
@@ -247,7 +256,13 @@ def test_a_joint_command_moves_and_a_stop_stops(client: Client, ros: Ros) -> Non
     answer = ros.call(Trigger, "/heptarm/stop", Trigger.Request())
     assert answer.success and answer.message
     assert np.abs(rests(client) - there).max() < 2.0
-    publish(client, Empty, "/heptarm/stop", Empty())
+    stop = ros.publisher(Empty, "/heptarm/stop")
+    here = client.place().q
+    sent = client.send(long(client))
+    under_way(client, here)
+    stop.publish(Empty())
+    assert client.result(sent).code != 0
+    rests(client)
 
 
 def test_pose_and_line_commands(client: Client, ros: Ros) -> None:
@@ -272,8 +287,7 @@ def test_a_pose_in_another_frame_is_refused(client: Client, node: NodeProcess) -
 def test_servo_topics_and_their_watchdog(client: Client) -> None:
     here = client.place().q
     sign = -1.0 if here[6] > 0 else 1.0
-    publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/velocity", 1)
-    until(publisher.get_subscription_count, "nobody listens")
+    publisher = client.ros.publisher(JointState, "/heptarm/servo/velocity")
     message = JointState(name=[client.joints[6]], velocity=[sign * 0.2])
 
     def away() -> bool:
@@ -283,8 +297,7 @@ def test_servo_topics_and_their_watchdog(client: Client) -> None:
     until(away, "it does not follow")
     rest = rests(client)  # silence
     assert np.abs((rest - here)[:6]).max() < 5e-3
-    publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/joint", 1)
-    until(publisher.get_subscription_count, "nobody listens")
+    publisher = client.ros.publisher(JointState, "/heptarm/servo/joint")
 
     def back() -> bool:
         publisher.publish(joint_state(client, here))
@@ -296,8 +309,7 @@ def test_servo_topics_and_their_watchdog(client: Client) -> None:
 
 def test_a_goal_after_a_servo_topic_starts_from_rest(client: Client) -> None:
     here = client.place().q
-    publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/joint", 1)
-    until(publisher.get_subscription_count, "nobody listens")
+    publisher = client.ros.publisher(JointState, "/heptarm/servo/joint")
     for _ in range(10):
         publisher.publish(joint_state(client, here))
         client.sleep(0.02)

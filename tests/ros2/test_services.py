@@ -46,9 +46,14 @@ def test_a_goal_runs_under_joint_impedance_and_a_wrong_stiffness_is_refused(clie
 def test_a_pause_holds_a_goal_and_a_resume_lets_it_go_on(client: Client, ask) -> None:
     for name in ("mode/position", "pause", "resume"):
         client.ros.find(Trigger, f"{client.name}/{name}")
+    sent = client.send(step(client, time=20.0, size=6.0))
+    until(lambda: client.feedback(sent), "the goal does not begin")
+    assert "stop it first" in ask("mode/position", refused=True).message  # after two seconds
+    assert client.cancel(sent)
+    client.result(sent)
+    rests(client)
     sent = client.send(step(client, time=3.0))
     until(lambda: client.feedback(sent), "the goal does not begin")
-    assert "stop it first" in ask("mode/position", refused=True).message
     ask("pause")
     rests(client)
     ask("resume")

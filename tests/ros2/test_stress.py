@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 import heptarm as ha
-from tests.conformance.case import long, rests, step, succeeds, under_way
+from tests.conformance.case import long, newest, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
 from tests.conformance.stress import preempted_without_growth, refused_in_flight, status
 from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, to_duration, to_time, until
@@ -62,9 +62,15 @@ def test_twenty_subscribers_at_200_hz(ros: Ros, spare: Stage, nodes: Start, seco
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             succeeds(client, step(client, time=1.0, size=0.5))
-        received = [after - before for before, after in zip(first, counts)]
-        # a busy machine delivers fewer of them, but all subscribers are served alike
-        assert min(received) > 0.2 * 200.0 * seconds and min(received) > 0.5 * max(received), received
+
+        def received() -> list[int]:
+            return [after - before for before, after in zip(first, counts)]
+
+        # a busy machine delivers them later, but all subscribers are served alike
+        until(lambda: min(received()) > 0.2 * 200.0 * seconds, "messages do not come")
+        until(
+            lambda: min(found := received()) > 0.5 * max(found), "some come to few subscribers", timeout=5.0
+        )
         assert 1024 * (status(node.process.pid, "VmRSS") - memory) < 30e6
     finally:
         context.close()
@@ -81,10 +87,10 @@ def test_a_node_that_is_killed_in_mid_goal_and_its_successor(ros: Ros, spare: St
         assert client.send(long(client)).accepted
         under_way(client, here, 0.03)
         node.end(signal.SIGKILL)
-        with ha.connect(spare.target, control=False) as arm:
-            moved = arm.state.q
-            until(lambda: np.abs(arm.state.dq).max() < 1e-3, "the cabinet does not brake the arm")
-            assert np.abs(arm.state.q - moved).max() < 1.0
+        with ha.connect(spare.target, control=False, watchdog=5.0, timeout=30.0) as arm:
+            moved = newest(arm).q
+            until(lambda: np.abs(newest(arm).dq).max() < 1e-3, "the cabinet does not brake the arm")
+            assert np.abs(newest(arm).q - moved).max() < 1.0
         successor = NodeProcess(spare.target, name="mortal", space="/fate", **values)
         heir = Client(ros, spare, "/fate/mortal")
         heir.ready()
@@ -133,7 +139,7 @@ def test_jumps_of_the_clock(
         goal.trajectory.points.append(JointTrajectoryPoint(positions=there, time_from_start=to_duration(1.0)))
         handle = None
         while handle is None or not handle.accepted:  # the node may not be active yet
-            handle = ros.wait(action.send_goal_async(goal), "no answer")
+            handle = ros.send_goal(action, goal)
         time.sleep(0.3)
         simulated[0] += jump
         answer = ros.wait(handle.get_result_async(), "the goal does not end")

@@ -12,7 +12,7 @@ from rclpy.action import ActionClient
 
 from tests.conformance import hands, surface
 from tests.conformance.stage import ROOT, Stage
-from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration, until
+from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration
 from tests.ros2.test_examples import run
 
 NAME = "/surface/heptarm"
@@ -24,8 +24,7 @@ class Sent:
     def __init__(self, ros: Ros, client: ActionClient, goal: Any) -> None:
         self.reported: list[Any] = []
         self._ros = ros
-        sent = client.send_goal_async(goal, feedback_callback=lambda one: self.reported.append(one.feedback))
-        self._handle = ros.wait(sent, "no answer")
+        self._handle = ros.send_goal(client, goal, self.reported.append)
         assert self._handle.accepted
         self._result = self._handle.get_result_async()
 
@@ -61,10 +60,8 @@ class Client:
     def tell(self, name: str, kind: str, /, **message: Any) -> Callable[[], None]:
         made = found(kind, "msg")(**message)
         if name not in self._publishers:
-            self._publishers[name] = self._ros.node.create_publisher(type(made), self._full(name), 1)
-        one = self._publishers[name]
-        until(one.get_subscription_count, f"nobody listens to {name}")
-        return lambda: one.publish(made)
+            self._publishers[name] = self._ros.publisher(type(made), self._full(name))
+        return lambda: self._publishers[name].publish(made)
 
     def make(self, kind: str, /, **fields: Any) -> Any:
         return found(kind, "msg")(**fields)

@@ -123,9 +123,10 @@ def test_a_node_that_the_system_stops_for_a_while(victim: Client, tough: NodePro
     sent = victim.send(step(victim, time=9.0, size=6.0))
     under_way(victim, here)
     tough.process.send_signal(signal.SIGSTOP)
-    time.sleep(3.0)  # a busy cabinet forgives as long as it was late itself
+    time.sleep(4.5)  # a busy cabinet forgives as long as it was late itself
     tough.process.send_signal(signal.SIGCONT)
     ended = victim.result(sent)
     assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended
+    victim.ready()
     rests(victim)
     succeeds(victim, step(victim))
