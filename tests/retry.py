@@ -30,8 +30,9 @@ T = TypeVar("T")
 LIMIT = 12
 #: Most retries in a row.
 IN_A_ROW = 2
-#: Longest time of the cabinet between two states of it that shows nothing about this machine [s].
-HELD_UP = 0.06
+#: Longest time of the cabinet between two states of it that shows nothing about this machine [s], and longest time of
+#: this process between two that it received.
+HELD_UP, HELD_UP_HERE = 0.06, 0.2
 #: Pause before a retry, in which the load of the machine may end [s].
 PAUSE = 1.0
 
@@ -93,16 +94,25 @@ def silent(outcome: object) -> str:
 
 
 def held_up(arm: ha.Arm, since: int) -> str:
-    """The cause, if the cabinet of an arm did not sample states for a while, so that what happened then was not seen.
+    """The cause, if the cabinet of an arm did not sample states for a while, or this process received none.
+
+    What happened then was not seen, and what this process was to send in that time was not sent.
 
     Args:
-        arm: connected to a virtual cabinet that runs faster than time.
+        arm: connected to a virtual cabinet.
         since: when its measurement began, our monotonic clock [ns].
     """
     connection = arm.connection
-    stamps = [connection.decode(one).stamp for one in connection.feed.kept() if one.received >= since]
-    longest = max((after - before for before, after in pairwise(stamps)), default=0) * 1e-9
-    return f"no states of {longest:.2f} s of the cabinet's time" if longest > HELD_UP else ""
+    kept = [one for one in connection.feed.kept() if one.received >= since]
+
+    def longest(times: list[int]) -> float:
+        return max((after - before for before, after in pairwise(times)), default=0) * 1e-9
+
+    if (gap := longest([connection.decode(one).stamp for one in kept])) > HELD_UP:
+        return f"no states of {gap:.2f} s of the cabinet's time"
+    if (gap := longest([one.received for one in kept])) > HELD_UP_HERE:
+        return f"no states received for {gap:.2f} s"
+    return ""
 
 
 def busy(outcome: object) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shlex
+import time
 from typing import Any
 
 import yaml
@@ -47,6 +48,7 @@ def topic(ros: Ros, verb: str, name: str, *rest: str) -> object:
     if verb == "pub":
         message = fill(find(rest[0])(), yaml.safe_load(rest[1]) if len(rest) > 1 else {})
         ros.publisher(find(rest[0]), name).publish(message)
+        time.sleep(1.0)  # no sooner does the tool end and the next command begin
         return "published"
     known: list[str] = until(
         lambda: dict(ros.node.get_topic_names_and_types()).get(name), f"there is no {name}"

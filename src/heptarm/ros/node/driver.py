@@ -7,6 +7,7 @@ import logging
 import os
 import socket
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
@@ -110,6 +111,7 @@ class Driver:
         self._listener = listener
         self._active = False
         self._handle: MotionHandle | None = None
+        self._starting = threading.Lock()  # messages and goals come in several threads
         self._task: ArmTask | None = None
         _check_simulator(values["target"])
         self._arm = connect(
@@ -282,8 +284,10 @@ class Driver:
         """Bring to rest what moves the arm besides goals."""
         self._end_task(reason)
         self._stream.close()
-        if self._handle is not None and not self._handle.done:
-            self._handle.cancel()
+        with self._starting:  # a motion that the cabinet is about to accept runs, too
+            handle = self._handle
+        if handle is not None and not handle.done:
+            handle.cancel()
             self._arm.wait_for_rest(timeout=_REST_TIMEOUT)
 
     def _end_task(self, reason: str) -> None:
@@ -359,9 +363,10 @@ class Driver:
         self._check_no_task()
         limit = self.configuration.values["speed"] if speed is None else speed
         condition = self.guard if until is None else until
-        handle = self._handle = self._arm.start(
-            motion, mode=mode, speed=limit, until=condition, then=then, when=when
-        )
+        with self._starting:
+            handle = self._handle = self._arm.start(
+                motion, mode=mode, speed=limit, until=condition, then=then, when=when
+            )
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
         return handle
 
