@@ -147,6 +147,31 @@ def test_goals_arrive_one_after_the_other(driver: Driver, recorder: Recorder) ->
     steadily(driver, recorder, there_and_back)
 
 
+def test_a_goal_preempts_a_motion_that_is_not_yet_accepted(
+    driver: Driver, recorder: Recorder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start, begun = driver.arm.start, threading.Event()
+
+    def slowly(*arguments: object, **named: object) -> object:
+        begun.set()
+        time.sleep(0.3)
+        return start(*arguments, **named)  # type: ignore[arg-type]
+
+    def goal_behind_a_motion() -> None:
+        monkeypatch.setattr(driver.arm, "start", slowly)
+        begun.clear()
+        mover = threading.Thread(target=driver.start, args=(ptp(HOME + 0.5 * AWAY),))
+        mover.start()
+        assert begun.wait(PATIENCE)
+        driver.accept(goal(driver))
+        mover.join()
+        monkeypatch.undo()
+        recorder.until(lambda: len(recorder.ends) == 1)
+        assert recorder.ends[0].outcome is GoalOutcome.SUCCEEDED, recorder.ends
+
+    steadily(driver, recorder, goal_behind_a_motion)
+
+
 def test_a_goal_preempts_another_and_is_cancelled(driver: Driver, recorder: Recorder) -> None:
     steadily(driver, recorder, lambda: _replaced_and_cancelled(driver, recorder))
 
