@@ -30,8 +30,8 @@ T = TypeVar("T")
 LIMIT = 12
 #: Most retries in a row.
 IN_A_ROW = 2
-#: Longest time of the cabinet between two states of it that shows nothing about this machine [s], and longest time of
-#: this process between two that it received.
+#: Longest times of the cabinet that show nothing about this machine [s]: between two states of it, and between the
+#: receipt of two by this process.
 HELD_UP, HELD_UP_HERE = 0.06, 0.2
 #: Pause before a retry, in which the load of the machine may end [s].
 PAUSE = 1.0
@@ -110,7 +110,7 @@ def held_up(arm: ha.Arm, since: int) -> str:
 
     if (gap := longest([connection.decode(one).stamp for one in kept])) > HELD_UP:
         return f"no states of {gap:.2f} s of the cabinet's time"
-    if (gap := longest([one.received for one in kept])) > HELD_UP_HERE:
+    if (gap := longest([one.received for one in kept])) * connection.real_time_factor > HELD_UP_HERE:
         return f"no states received for {gap:.2f} s"
     return ""
 

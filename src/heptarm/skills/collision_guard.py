@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 THRESHOLD = 20.0
 #: No joint may turn faster than this while the baseline is taken [rad/s].
 _REST = 0.01
+#: So often an average is begun when no state comes, as after a standstill of this machine.
+_WINDOWS = 5
 #: Longest sleep of the watching thread without a state [s].
 _NAP = 0.2
 
@@ -58,17 +60,22 @@ def collision_guard(
         LimitError: a value outside its range.
     """
     CollisionGuard.of(threshold, margin=margin)
-    torques = []
-    for state in arm.states(duration=within(seconds, "seconds", 0.0, 60.0, above=True, unit="s")):
-        if (np.abs(np.nan_to_num(state.dq)) > _REST).any():
-            raise NotReady(
-                f"the arm moves; a baseline is taken at rest, with every joint below {_REST:g} rad/s",
-                hint="arm.wait_for_rest()",
-            )
-        torques.append(state.tau_ext)
-    if not torques:
+    within(seconds, "seconds", 0.0, 60.0, above=True, unit="s")
+    for _ in range(_WINDOWS):
+        torques = []
+        for state in arm.states(duration=seconds):
+            if (np.abs(np.nan_to_num(state.dq)) > _REST).any():
+                raise NotReady(
+                    f"the arm moves; a baseline is taken at rest, with every joint below {_REST:g} rad/s",
+                    hint="arm.wait_for_rest()",
+                )
+            torques.append(state.tau_ext)
+        if torques:
+            break
+    else:
         raise StaleState(
-            f"no state received within {seconds:g} s", hint="give more seconds, or arm.subscribe(rate=100)"
+            f"no state received within {_WINDOWS * seconds:g} s",
+            hint="give more seconds, or arm.subscribe(rate=100)",
         )
     return CollisionGuard.of(threshold, baseline=np.mean(torques, axis=0), margin=margin)
 
@@ -102,13 +109,14 @@ def guarded(
         raise ModeConflict("a collision guard is in force already", hint="leave its block first")
     if on_collision is not None:
         callback(on_collision, "on_collision")
+    reaction = check_reaction(then)
     bands = collision_guard(arm) if guard is None else instance(guard, CollisionGuard, "guard")
     _guarded[arm] = (bands, on_collision)
     try:
         with (
             _watched(arm, bands, on_collision)
             if bands.is_moving
-            else _broken_off(arm, bands, on_collision, check_reaction(then))
+            else _broken_off(arm, bands, on_collision, reaction)
         ):
             yield bands
     finally:

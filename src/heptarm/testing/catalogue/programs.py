@@ -70,7 +70,7 @@ def queue(arm: Arm) -> None:
 @scenario(line=2, rows="B9 B16", space=0.1, needs=("ptp",))
 def replace(arm: Arm) -> None:
     """A new motion replaces the running and queued ones, or is refused, as requested."""
-    first, waiting = arm.start(_turned(60)), arm.start(_turned(30))
+    first, waiting = arm.start(_turned(60), speed=0.15), arm.start(_turned(30))
     _under_way(arm, first)
     try:
         arm.start(_turned(0), when="reject")
@@ -87,7 +87,7 @@ def replace(arm: Arm) -> None:
 @scenario(line=2, rows="B10 B14", space=0.1, needs=("ptp",))
 def cancel(arm: Arm) -> None:
     """A motion is cancelled while it runs: it brakes, reports it, and the arm stays where it stopped."""
-    handle = arm.start(_turned(80))
+    handle = arm.start(_turned(80), speed=0.15)
     _under_way(arm, handle)
     handle.cancel()
     result = handle.wait()
