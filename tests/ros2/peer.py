@@ -384,9 +384,7 @@ class Client:
     def ready(self) -> None:
         """Wait until the node is active and discovery is complete."""
         _ = self._action
-        self.ros.meet(
-            f"{self.name}/status"
-        )  # a node that was started again has to discover an old client, too
+        self.ros.meet(f"{self.name}/status")  # a node that has started again has to discover this client, too
         until(lambda: self.states and self.status and self.status[-1].active, "the node is not active")
 
     @property

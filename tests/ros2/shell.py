@@ -14,6 +14,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.qos import DurabilityPolicy
 
+from tests.retry import retry
 from tests.ros2.peer import Ros, until
 
 
@@ -65,11 +66,12 @@ def topic(ros: Ros, verb: str, name: str, *rest: str) -> object:
 def service(ros: Ros, verb: str, name: str, kind: str, values: str = "{}") -> object:
     assert verb == "call"
     request = fill(find(kind).Request(), yaml.safe_load(values))  # type: ignore[attr-defined]
-    answer = ros.call(find(kind), name, request)
-    for _ in range(4):  # a busy machine may answer FRI too late
-        if answer.success or not name.endswith("/fri/open"):
-            break
-        answer = ros.call(find(kind), name, request)
+
+    def late(answer: Any) -> str:
+        refused = name.endswith("/fri/open") and not isinstance(answer, Exception) and not answer.success
+        return "FRI answers came late" if refused else ""
+
+    answer = retry(lambda: ros.call(find(kind), name, request), late)
     if not answer.success:
         raise AssertionError(answer.message)
     return answer

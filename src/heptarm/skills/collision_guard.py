@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CollisionDetected, HeptarmError, ModeConflict, NotReady, StaleState, Timeout
-from heptarm.values.arrays import callback, instance, within
+from heptarm.values.arrays import Array, callback, instance, within
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.result import Result
@@ -57,27 +57,31 @@ def collision_guard(
 
     Raises:
         NotReady: the arm does not rest.
+        StaleState: no state is received.
         LimitError: a value outside its range.
     """
     CollisionGuard.of(threshold, margin=margin)
     within(seconds, "seconds", 0.0, 60.0, above=True, unit="s")
-    for _ in range(_WINDOWS):
-        torques = []
-        for state in arm.states(duration=seconds):
-            if (np.abs(np.nan_to_num(state.dq)) > _REST).any():
-                raise NotReady(
-                    f"the arm moves; a baseline is taken at rest, with every joint below {_REST:g} rad/s",
-                    hint="arm.wait_for_rest()",
-                )
-            torques.append(state.tau_ext)
-        if torques:
-            break
-    else:
+    torques = next(filter(None, (_torques_at_rest(arm, seconds) for _ in range(_WINDOWS))), None)
+    if torques is None:
         raise StaleState(
             f"no state received within {_WINDOWS * seconds:g} s",
             hint="give more seconds, or arm.subscribe(rate=100)",
         )
     return CollisionGuard.of(threshold, baseline=np.mean(torques, axis=0), margin=margin)
+
+
+def _torques_at_rest(arm: Arm, seconds: float) -> list[Array]:
+    """External torques of the states of a time [s]; none if no state came."""
+    torques = []
+    for state in arm.states(duration=seconds):
+        if (np.abs(np.nan_to_num(state.dq)) > _REST).any():
+            raise NotReady(
+                f"the arm moves; a baseline is taken at rest, with every joint below {_REST:g} rad/s",
+                hint="arm.wait_for_rest()",
+            )
+        torques.append(state.tau_ext)
+    return torques
 
 
 @contextlib.contextmanager
