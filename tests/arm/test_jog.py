@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ import pytest
 import heptarm as ha
 from heptarm.model import forward
 from tests.conftest import RunningCabinet
+from tests.relay import Relay
 
 pytestmark = pytest.mark.slow
 SPEED = 1.0  # streams by this machine's clock: what a busy machine is late, the path deviates
@@ -203,6 +205,27 @@ def test_an_arm_that_does_not_follow_has_no_far_target(arm: ha.Arm) -> None:
         arm.set_override(1.0)
     arm.wait_for_rest()
     assert abs(arm.state.q[6] - seen[-1].q[6]) < 0.35
+
+
+def test_states_that_arrive_late_do_not_slow_it_down(arm: ha.Arm, cabinet: RunningCabinet) -> None:
+    arm.release_control()
+    late = 25  # frames, a quarter of a second of states
+    try:
+        with Relay(cabinet.port) as relay, ha.connect(f"127.0.0.1:{relay.port}", timeout=30.0) as far:
+            waiting: deque[bytes] = deque()
+
+            def hold_back(frames: list[bytes]) -> bytes:
+                waiting.append(frames[-1])
+                return waiting.popleft() if len(waiting) > late else b""
+
+            relay.attack("down", hold_back)
+            with far.servo("velocity", speed=0.5, watchdog=2.0) as sv:
+                jog(far, sv, A7, until=1.5)
+                assert far.state.age > 0.15
+                # a busy machine may slow it down for a moment
+                assert min((one.factor for one in sv.stats.slowdowns), default=1.0) > 0.3, sv.stats
+    finally:
+        arm.take_control()
 
 
 def test_bodies_are_kept_clear_of(arm: ha.Arm) -> None:

@@ -223,7 +223,8 @@ class JogServo(Servo):
         state = None if sample is None else self._connection.build(sample)
         if sample is None or state is None or state.groups.joints is None:
             return None
-        age = min((now - sample.received) * 1e-9 * self._connection.real_time_factor, _OLDEST)
+        # since it was sampled, not received: an arm whose states arrive late does not lag
+        age = min((now - state.sampled) * 1e-9 * self._connection.real_time_factor, _OLDEST)
         ahead = (path.q - state.q - path.dq * age) * np.sign(dq)
         ratio = ahead / (_AHEAD + _AHEAD_TIME * np.abs(path.dq))
         index = int(ratio.argmax())
