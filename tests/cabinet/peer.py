@@ -120,6 +120,12 @@ class Peer:
                 return self.seen[index][1]
             index += 1
 
+    def signals(self) -> dict[str, float]:
+        """The signals by name, all of them read after the last frame that was received; they are subscribed."""
+        now = self.seen[-1][0].time
+        state = self.wait(lambda _, one: isinstance(one, wire.State) and one.io and one.io.stamp > now)
+        return {self.welcome.signals[one.index].name: one.value for one in state.io.values}
+
     def all(self, kind: type[M]) -> list[M]:
         return [message for _, message in self.seen if isinstance(message, kind)]
 

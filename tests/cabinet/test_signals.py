@@ -29,11 +29,9 @@ def target(**values: float) -> wire.SetSignals:
 def seen(peer: Peer) -> dict[str, float]:
     """Values in a state that is pushed from now on."""
     peer.ask(wire.Subscribe(groups=wire.Groups.IO, rate=50.0))
-    before = len(peer.seen)
-    state = peer.wait(lambda _, message: isinstance(message, wire.State), since=before)
+    signals = peer.signals()
     peer.ask(wire.Subscribe(groups=wire.Groups.IO, rate=0.0))
-    names = [info.name for info in peer.welcome.signals]
-    return {names[one.index]: one.value for one in state.io.values}
+    return signals
 
 
 def test_signals_are_reported_written_and_pushed(peer: Peer) -> None:
@@ -79,6 +77,36 @@ def test_a_slow_cabinet_reads_them_a_few_at_a_time(make: Maker) -> None:
         fresh = {state.joints.stamp for state in states if state.joints is not None}
         assert len(fresh) > 10, "signals do not keep the joints from being read"
         assert all(state.io is not None and len(state.io.values) == 5 for state in states)
+
+
+def next_signals(peer: Peer) -> wire.IoState:
+    return peer.wait(lambda _, one: isinstance(one, wire.State) and one.io, since=len(peer.seen)).io
+
+
+def test_the_stamp_of_signals_is_that_of_the_oldest(make: Maker) -> None:
+    with Peer(make(getter=0.005).port) as peer:
+        peer.take_control()
+        peer.ask(wire.Subscribe(groups=wire.Groups.IO, rate=5.0))
+        for count in range(1, 10):
+            for _ in range(count % 3):  # written anywhere in a round of three readings
+                next_signals(peer)
+            peer.ask(target(Cell_Count=float(count), Cell_Level=0.1 * count))
+            now = peer.signals()
+            assert (now["Cell.Count"], now["Cell.Level"]) == (count, 0.1 * count)
+
+
+def test_a_new_subscriber_sees_no_value_from_before(make: Maker) -> None:
+    with Peer(make(getter=0.005).port) as peer:
+        peer.take_control()
+        for count in range(1, 4):
+            peer.ask(target(Cell_Count=float(count), Cell_Level=0.1 * count))
+            written = peer.seen[-1][0].time
+            peer.ask(wire.Subscribe(groups=wire.Groups.IO, rate=5.0))
+            assert next_signals(peer).stamp > written
+            for _ in range(count):
+                next_signals(peer)
+            peer.ask(wire.Subscribe(groups=0, rate=0.0))
+            peer.read_for(0.5)
 
 
 def test_only_the_controller_writes(cabinet: FakeCabinet, peer: Peer) -> None:

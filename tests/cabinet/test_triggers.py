@@ -76,9 +76,8 @@ def lamp(port: int) -> tuple[float, float]:
     """The lamp and the level in the states of an observer."""
     with Peer(port) as peer:
         peer.ask(wire.Subscribe(groups=wire.Groups.IO, rate=100.0))
-        state = peer.wait_for(wire.State)
-        assert state.io is not None
-        return state.io.values[1].value, state.io.values[3].value
+        signals = peer.signals()
+        return signals[LAMP], signals[LEVEL]
 
 
 def test_an_output_is_set_on_the_way_and_an_event_reported(cabinet: FakeCabinet, peer: Peer) -> None:

@@ -33,6 +33,7 @@ class Stage:
     def _start(self) -> subprocess.Popen[str]:
         command = [str(PYTHON), str(Path(__file__).with_name("faulty.py")), "--port", str(self.port)]
         command += ["--drive-monitoring", "off"]  # the drives of an arm that does not follow would trip
+        command += ["--data", "heptarm.heartbeat=2"]  # a busy machine may hold it up for longer than a second
         process = subprocess.Popen(
             [*command, *self._options],
             stdin=subprocess.PIPE,

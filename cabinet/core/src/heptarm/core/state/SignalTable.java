@@ -1,5 +1,7 @@
 package heptarm.core.state;
 
+import java.util.Arrays;
+
 import heptarm.core.CommandRejected;
 import heptarm.core.robot.SignalPort;
 import heptarm.wire.Code;
@@ -20,14 +22,15 @@ public final class SignalTable {
     private final SignalPort port;
     private final SignalInfo[] known;
     private final double[] values;
+    private final long[] times;
     private int next;
-    private boolean complete;
-    private long began;
+    private volatile boolean all = true;
 
     public SignalTable(SignalPort port) {
         this.port = port;
         this.known = port.signals();
         this.values = new double[known.length];
+        this.times = new long[known.length];
     }
 
     /** Index of a signal in a list. */
@@ -83,25 +86,32 @@ public final class SignalTable {
         return place;
     }
 
-    /** Reads some of the signals; all of them the first time, and when that is quick. The stamp is that of the oldest value. One thread. */
+    /** A new subscriber gets no value from before its subscription: the next reading is one of all signals. */
+    void readAllNext() {
+        all = true;
+    }
+
+    /**
+     * Reads some of the signals; all of them when that is quick, and for a new subscriber. The stamp is that of the oldest
+     * value. One thread.
+     */
     IoState read(long now) {
+        boolean isWhole = all;
+        all = false;
+        next = isWhole ? 0 : next;
         long started = System.nanoTime();
         do {
-            if (next == 0) {
-                began = now;
-            }
             int count = Math.min(SLICE, known.length - next);
             port.read(values, next, count);
-            next += count;
-            if (next >= known.length) {
-                next = 0;
-                complete = true;
-            }
-        } while (!complete || next != 0 && System.nanoTime() - started < PATIENCE_NS);
+            Arrays.fill(times, next, next + count, now);
+            next = next + count < known.length ? next + count : 0;
+        } while (next != 0 && (isWhole || System.nanoTime() - started < PATIENCE_NS));
+        long oldest = now;
         SignalValue[] result = new SignalValue[known.length];
         for (int i = 0; i < result.length; i++) {
             result[i] = new SignalValue(i, values[i]);
+            oldest = Math.min(oldest, times[i]);
         }
-        return new IoState(began, result);
+        return new IoState(oldest, result);
     }
 }

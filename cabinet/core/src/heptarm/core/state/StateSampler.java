@@ -137,6 +137,9 @@ public final class StateSampler {
             unsubscribe(subscriber);
             return;
         }
+        if ((groups & Groups.IO) != 0) {
+            signals.readAllNext();
+        }
         long period = Math.round(1e9 / rate);
         long now = clock.nanos();
         synchronized (subscriptions) {
