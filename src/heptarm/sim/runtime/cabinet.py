@@ -54,6 +54,8 @@ _EXITED = (
     "the application called System.exit, which would end the whole JVM of a cabinet: let run() return instead"
 )
 _HOUSEKEEPING = 0.1
+#: So often a thread's name is read: it may have none yet at first.
+_LOOKS = 3
 #: Ticks between two updates of the file of positions.
 _POSITIONS_EVERY = 30
 
@@ -265,15 +267,20 @@ class _Priorities:
     def __init__(self, loop: RealtimeLoop) -> None:
         self._loop = loop
         self._promoted: set[int] = set()
+        self._looks: dict[str, int] = {}
 
     def update(self) -> None:
         """Promote new threads, every client adds some; or demote those that were promoted."""
         if sys.platform == "linux" and self._loop.is_real_time:
-            for task in Path("/proc/self/task").iterdir():
+            # to read all names each time would delay one state in a hundred by a millisecond
+            looks = {task: self._looks.get(task, 0) + 1 for task in os.listdir("/proc/self/task")}
+            for task in [task for task, count in looks.items() if count <= _LOOKS]:
                 with contextlib.suppress(OSError):  # it has ended, or is refused, which the statistics report
-                    if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
-                        self._promote(int(task.name))
+                    if Path(f"/proc/self/task/{task}/comm").read_text().startswith(REAL_TIME_THREADS):
+                        self._promote(int(task))
+            self._looks = looks
         elif self._promoted:
+            self._looks = {}
             for number in self._promoted:
                 with contextlib.suppress(OSError):  # it has ended
                     os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
