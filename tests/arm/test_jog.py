@@ -8,14 +8,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.arm.motion.jog import lag
 from heptarm.model import forward
+from heptarm.model.velocity import VelocityPath
 from tests.conftest import RunningCabinet
 
 pytestmark = pytest.mark.slow
@@ -207,26 +208,23 @@ def test_an_arm_that_does_not_follow_has_no_far_target(arm: ha.Arm) -> None:
 
 
 def test_a_state_that_arrives_late_shows_no_arm_that_lags(arm: ha.Arm) -> None:
-    connection, late = arm.connection, 0.25
-    sample = connection.feed.newest
+    sample = arm.connection.feed.newest
     assert sample is not None
-    state = connection.build(sample)
-    now = state.sampled + round(late * 1e9)
-    there = SimpleNamespace(
-        q=state.q + A7 * late, dq=A7
-    )  # the path goes on at 1 rad/s since the state was sampled
-    stream: Any = arm.servo("velocity", speed=0.5, watchdog=2.0)
-    for received, path, lags in (
-        (now, there, False),
-        (state.sampled, there, False),
-        (now, SimpleNamespace(q=there.q + A7 * 0.3, dq=A7), True),
-    ):
-        stream._connection = SimpleNamespace(
-            feed=SimpleNamespace(newest=sample._replace(received=received)),
-            build=connection.build,
-            real_time_factor=1.0,
-        )
-        assert (stream._lag(path, A7, now) is not None) == lags
+    state = arm.connection.build(sample)
+    now = state.sampled + 250_000_000
+    late = arm.connection.build(sample._replace(received=now))
+    ceiling = np.full(7, 10.0)
+    path = VelocityPath(
+        state.q - A7 * 0.25, speed=ceiling, acceleration=ceiling * 1e6, q_min=-ceiling, q_max=ceiling
+    )
+    path.advance(A7, 0.5, [])  # at 1 rad/s, where the arm is after the 0.25 s since the state was sampled
+    assert path.dq == pytest.approx(A7)
+    assert path.q - state.q == pytest.approx(A7 * 0.25, abs=1e-3)
+    assert lag(path, A7, late, now=now, rate=1.0) is None
+    assert lag(path, A7, state, now=now, rate=1.0) is None
+    path.advance(A7, 0.3, [])
+    slowdown = lag(path, A7, late, now=now, rate=1.0)
+    assert slowdown is not None and slowdown.reason == "A7 does not follow"
 
 
 def test_bodies_are_kept_clear_of(arm: ha.Arm) -> None:

@@ -32,6 +32,7 @@ from heptarm.model.velocity import (
 )
 from heptarm.values.arrays import Array, array
 from heptarm.values.pose import Pose
+from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
 #: The path stays below the cabinet's own limit of the speed, so that the arm can catch up.
@@ -79,6 +80,28 @@ class TwistLimits:
     acceleration: float
     turn: float
     spin: float
+
+
+def lag(path: VelocityPath, dq: Array, state: State | None, *, now: int, rate: float) -> Slowdown | None:
+    """The arm does not follow: it is blocked, pushed, or its speed override is low.
+
+    Args:
+        path: where the arm is to be.
+        dq: velocity that is asked for [rad/s].
+        state: the newest one.
+        now: on the clock of this machine [ns].
+        rate: seconds of the robot's clock in one of this machine's.
+    """
+    if state is None or state.groups.joints is None:
+        return None
+    # since it was sampled, not received: an arm whose states arrive late does not lag
+    age = min((now - state.sampled) * 1e-9 * rate, _OLDEST)
+    ahead = (path.q - state.q - path.dq * age) * np.sign(dq)
+    ratio = ahead / (_AHEAD + _AHEAD_TIME * np.abs(path.dq))
+    index = int(ratio.argmax())
+    if ratio[index] <= 0.5:
+        return None
+    return Slowdown(f"A{index + 1} does not follow", float(np.clip(2.0 - 2.0 * ratio[index], 0.0, 1.0)))
 
 
 class JogServo(Servo):
@@ -194,9 +217,10 @@ class JogServo(Servo):
             wanted = command[0]
         dq, done = self._velocity(path.q, wanted, dt)
         before = path.q
-        held = [
-            one for one in (self._lag(path, dq, now), self._obstacle(path, dq), self._wall(path, dq)) if one
-        ]
+        sample = self._connection.feed.newest
+        state = None if sample is None else self._connection.build(sample)
+        behind = lag(path, dq, state, now=now, rate=self._connection.real_time_factor)
+        held = [one for one in (behind, self._obstacle(path, dq), self._wall(path, dq)) if one]
         least = min((*done, path.advance(dq, dt, held)), key=lambda one: one.factor)
         if self._leaves(path.q):
             path.stay_at(before)
@@ -216,21 +240,6 @@ class JogServo(Servo):
     def _unbounded(self, q: Array, command: Array) -> Array:
         """Joint velocities of a command without ramps and walls [rad/s]."""
         return command
-
-    def _lag(self, path: VelocityPath, dq: Array, now: int) -> Slowdown | None:
-        """The arm does not follow: it is blocked, pushed, or its speed override is low."""
-        sample = self._connection.feed.newest
-        state = None if sample is None else self._connection.build(sample)
-        if sample is None or state is None or state.groups.joints is None:
-            return None
-        # since it was sampled, not received: an arm whose states arrive late does not lag
-        age = min((now - state.sampled) * 1e-9 * self._connection.real_time_factor, _OLDEST)
-        ahead = (path.q - state.q - path.dq * age) * np.sign(dq)
-        ratio = ahead / (_AHEAD + _AHEAD_TIME * np.abs(path.dq))
-        index = int(ratio.argmax())
-        if ratio[index] <= 0.5:
-            return None
-        return Slowdown(f"A{index + 1} does not follow", float(np.clip(2.0 - 2.0 * ratio[index], 0.0, 1.0)))
 
     def _obstacle(self, path: VelocityPath, dq: Array) -> Slowdown | None:
         """Bodies that come near."""
