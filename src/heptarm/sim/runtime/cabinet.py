@@ -36,7 +36,7 @@ from heptarm.sim.plant.shared_state import PositionsFile, Trace
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
-from heptarm.sim.runtime.operator import SimulatedOperator, timed
+from heptarm.sim.runtime.operator import LONGEST_WAIT, SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled, share_memory_pools
 from heptarm.sim.runtime.rest import Rest
 from heptarm.values.robot import robot
@@ -54,6 +54,8 @@ _EXITED = (
     "the application called System.exit, which would end the whole JVM of a cabinet: let run() return instead"
 )
 _HOUSEKEEPING = 0.1
+#: Held while an action of the operator is executed and reported.
+_OPERATING = threading.Lock()
 #: So often a thread's name is read: it may have none yet at first.
 _LOOKS = 3
 #: Ticks between two updates of the file of positions.
@@ -266,7 +268,7 @@ class _Priorities:
 
     def __init__(self, loop: RealtimeLoop) -> None:
         self._loop = loop
-        self._promoted: set[int] = set()
+        self._promoted: dict[int, int] = {}  # and the policies that they had
         self._looks: dict[str, int] = {}
 
     def update(self) -> None:
@@ -281,15 +283,16 @@ class _Priorities:
             self._looks = looks
         elif self._promoted:
             self._looks = {}
-            for number in self._promoted:
+            for number, policy in self._promoted.items():
                 with contextlib.suppress(OSError):  # it has ended
-                    os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
-            self._promoted = set()
+                    os.sched_setscheduler(number, policy, os.sched_param(0))
+            self._promoted = {}
 
     def _promote(self, number: int) -> None:
-        if os.sched_getscheduler(number) == os.SCHED_OTHER:
+        policy = os.sched_getscheduler(number)
+        if policy != os.SCHED_FIFO:
             os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(REAL_TIME_PRIORITY))
-            self._promoted.add(number)
+            self._promoted[number] = policy
 
 
 def _housekeeping(loop: RealtimeLoop, stop: threading.Event) -> None:
@@ -317,13 +320,14 @@ def _read_standard_input(operator: SimulatedOperator, end: Callable[[], None]) -
 def _operate(operator: SimulatedOperator, words: str) -> None:
     """Execute an operator action and report on standard output whether it was accepted, and what it shows."""
     shown = error = ""
-    try:
-        if words:
-            shown = operator.do(words)
-            operator.await_tick()
-    except ValueError as refused:
-        error = str(refused)
-    print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
+    with _OPERATING:
+        try:
+            if words:
+                shown = operator.do(words)
+                operator.await_tick()
+        except ValueError as refused:
+            error = str(refused)
+        print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
@@ -420,6 +424,9 @@ def main(argv: list[str] | None = None) -> int:
         log.debug("the virtual cabinet has failed", exc_info=True)
         stopping.set()
         failed.insert(0, f"the virtual cabinet has failed: {_described(error)}")
+    _OPERATING.acquire(
+        timeout=2 * LONGEST_WAIT
+    )  # an action may have ended the application: it is reported first
     if failed:
         print(_failure(failed[0]), flush=True)
     # the JVM's shutdown may wait for its own threads; everything is closed, so exit at once

@@ -29,6 +29,8 @@ _OPTIONS = (
     "-XX:MaxMetaspaceSize=64m",
     "-Xshare:auto",
     "-Xrs",
+    "-Xlog:disable",  # standard output belongs to the lines of the cabinet
+    "-Xlog:all=warning:stderr",
     "-XX:-UsePerfData",  # no thread that samples counters for other programs twenty times a second
     "-Djava.util.logging.SimpleFormatter.format=%1$tT.%1$tL %4$s %5$s%6$s%n",
 )
