@@ -1,12 +1,18 @@
 package heptarm.doubles.motion;
 
-import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
 import heptarm.doubles.seam.RobotDescription;
 
-/** Forward kinematics of the robot: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7), all offsets along z. */
+/**
+ * Forward kinematics of the robot: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7), all offsets along z.
+ *
+ * <p>Every state that a client receives needs it, so it works on plain numbers: an object for each factor would have the garbage
+ * collector stop the cabinet several times a second.
+ */
 public final class ForwardKinematics {
+    private static final int AXES = 7;
+
     private final double[] links;
 
     public ForwardKinematics(RobotDescription robot) {
@@ -15,35 +21,75 @@ public final class ForwardKinematics {
 
     /** Pose of the flange in the base (millimetres) for joint positions [rad]. */
     public Transformation flange(double[] q) {
-        return up(links[0]).compose(z(q[0])).compose(y(q[1])).compose(up(links[1])).compose(z(q[2])).compose(y(-q[3]))
-                .compose(up(links[2])).compose(z(q[4])).compose(y(q[5])).compose(up(links[3])).compose(z(q[6]));
+        Tip tip = new Tip();
+        for (int i = 0; i < AXES; i++) {
+            before(tip, i);
+            turn(tip, i, q[i]);
+        }
+        return Poses.ofRows(tip.x * 1e3, tip.y * 1e3, tip.z * 1e3, tip.r);
     }
 
-    /** Origin [m] and direction of each axis in the base, seven rows of six; the sign of a direction is arbitrary. */
-    double[][] axes(double[] q) {
-        double[][] found = new double[7][];
-        Transformation here = Transformation.IDENTITY;
-        for (int i = 0; i < 7; i++) {
-            boolean turnsAboutZ = i % 2 == 0;
-            here = turnsAboutZ ? here.compose(up(links[i / 2])) : here;
-            Matrix r = here.getRotationMatrix();
-            int column = turnsAboutZ ? 2 : 1;
-            found[i] = new double[] {here.getX() * 1e-3, here.getY() * 1e-3, here.getZ() * 1e-3, r.get(0, column),
-                r.get(1, column), r.get(2, column)};
-            here = here.compose(turnsAboutZ ? z(q[i]) : y(i == 3 ? -q[i] : q[i]));
+    /** Origin [m] and direction of each axis in the base, seven times six numbers; the sign of a direction is arbitrary. */
+    double[] axes(double[] q) {
+        double[] found = new double[6 * AXES];
+        Tip tip = new Tip();
+        for (int i = 0; i < AXES; i++) {
+            before(tip, i);
+            int column = turnsAboutZ(i) ? 2 : 1;
+            int at = 6 * i;
+            found[at] = tip.x;
+            found[at + 1] = tip.y;
+            found[at + 2] = tip.z;
+            found[at + 3] = tip.r[column];
+            found[at + 4] = tip.r[3 + column];
+            found[at + 5] = tip.r[6 + column];
+            turn(tip, i, q[i]);
         }
         return found;
     }
 
-    private static Transformation up(double metres) {
-        return Transformation.ofTranslation(0, 0, metres * 1e3);
+    private static boolean turnsAboutZ(int axis) {
+        return axis % 2 == 0;
     }
 
-    private static Transformation z(double angle) {
-        return Transformation.ofRad(0, 0, 0, angle, 0, 0);
+    /** To the origin of an axis. */
+    private void before(Tip tip, int axis) {
+        if (turnsAboutZ(axis)) {
+            tip.rise(links[axis / 2]);
+        }
     }
 
-    private static Transformation y(double angle) {
-        return Transformation.ofRad(0, 0, 0, 0, angle, 0);
+    private static void turn(Tip tip, int axis, double angle) {
+        if (turnsAboutZ(axis)) {
+            tip.turn(angle, 0, 1);
+        } else {
+            tip.turn(axis == 3 ? -angle : angle, 2, 0);
+        }
+    }
+
+    /** The end of the chain so far: the rows of its rotation, and its place [m]. */
+    private static final class Tip {
+        private final double[] r = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+        private double x;
+        private double y;
+        private double z;
+
+        private void rise(double metres) {
+            x += r[2] * metres;
+            y += r[5] * metres;
+            z += r[8] * metres;
+        }
+
+        /** Turns its first axis towards its second one. */
+        private void turn(double angle, int first, int second) {
+            double c = Math.cos(angle);
+            double s = Math.sin(angle);
+            for (int row = 0; row < 9; row += 3) {
+                double a = r[row + first];
+                double b = r[row + second];
+                r[row + first] = c * a + s * b;
+                r[row + second] = c * b - s * a;
+            }
+        }
     }
 }

@@ -181,22 +181,4 @@ public final class MotionTranslator {
         }
         return q;
     }
-
-    /** Transformation [mm] of a pose [m] and quaternion. */
-    public static Transformation transformation(double[] pose) {
-        double x = pose[3];
-        double y = pose[4];
-        double z = pose[5];
-        double w = pose[6];
-        double a = Math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z));
-        double sb = -2 * (x * z - w * y);
-        double cb = Math.hypot(1 - 2 * (y * y + z * z), 2 * (x * y + w * z));
-        double b = Math.atan2(sb, cb);
-        double c = Math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y));
-        if (cb < 1e-12) {
-            a = Math.atan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z));
-            c = 0.0;
-        }
-        return Transformation.ofRad(pose[0] / MM, pose[1] / MM, pose[2] / MM, a, b, c);
-    }
 }

@@ -21,22 +21,23 @@ public final class WrenchUncertainty {
      * @param axes axes of the result in the base
      */
     public static double[] inaccuracy(ForwardKinematics kinematics, double[] q, Transformation at, Matrix axes) {
-        double[][] a = new double[SIZE][SIZE];
-        for (double[] axis : kinematics.axes(q)) {
-            double x = at.getX() * 1e-3 - axis[0];
-            double y = at.getY() * 1e-3 - axis[1];
-            double z = at.getZ() * 1e-3 - axis[2];
-            double[] push = {axis[4] * z - axis[5] * y, axis[5] * x - axis[3] * z, axis[3] * y - axis[4] * x};
-            double[] column = new double[SIZE];
+        double[] a = new double[SIZE * SIZE];
+        double[] axis = kinematics.axes(q);
+        double[] column = new double[SIZE];
+        for (int n = 0; n < axis.length; n += 6) {
+            double x = at.getX() * 1e-3 - axis[n];
+            double y = at.getY() * 1e-3 - axis[n + 1];
+            double z = at.getZ() * 1e-3 - axis[n + 2];
+            double pushX = axis[n + 4] * z - axis[n + 5] * y;
+            double pushY = axis[n + 5] * x - axis[n + 3] * z;
+            double pushZ = axis[n + 3] * y - axis[n + 4] * x;
             for (int i = 0; i < 3; i++) {
-                for (int k = 0; k < 3; k++) {
-                    column[i] += axes.get(k, i) * push[k];
-                    column[3 + i] += axes.get(k, i) * axis[3 + k];
-                }
+                column[i] = axes.get(0, i) * pushX + axes.get(1, i) * pushY + axes.get(2, i) * pushZ;
+                column[3 + i] = axes.get(0, i) * axis[n + 3] + axes.get(1, i) * axis[n + 4] + axes.get(2, i) * axis[n + 5];
             }
             for (int i = 0; i < SIZE; i++) {
-                for (int k = 0; k < SIZE; k++) {
-                    a[i][k] += column[i] * column[k];
+                for (int k = 0; k <= i; k++) {
+                    a[SIZE * i + k] += column[i] * column[k];
                 }
             }
         }
@@ -47,27 +48,30 @@ public final class WrenchUncertainty {
         return result;
     }
 
-    /** Diagonal of the inverse by Cholesky factorisation: the damped matrix is symmetric and positive definite. */
-    private static double[] diagonalOfInverse(double[][] a) {
-        double[][] l = new double[SIZE][SIZE];
+    /**
+     * Diagonal of the inverse by Cholesky factorisation: the damped matrix is symmetric and positive definite.
+     *
+     * @param a the lower triangle of the matrix; that of its factor afterwards
+     */
+    private static double[] diagonalOfInverse(double[] a) {
         for (int i = 0; i < SIZE; i++) {
             for (int k = 0; k <= i; k++) {
-                double rest = a[i][k] + (i == k ? DAMPED : 0.0);
+                double rest = a[SIZE * i + k] + (i == k ? DAMPED : 0.0);
                 for (int j = 0; j < k; j++) {
-                    rest -= l[i][j] * l[k][j];
+                    rest -= a[SIZE * i + j] * a[SIZE * k + j];
                 }
-                l[i][k] = i == k ? Math.sqrt(Math.max(rest, DAMPED)) : rest / l[k][k];
+                a[SIZE * i + k] = i == k ? Math.sqrt(Math.max(rest, DAMPED)) : rest / a[SIZE * k + k];
             }
         }
         double[] diagonal = new double[SIZE];
+        double[] y = new double[SIZE];
         for (int unit = 0; unit < SIZE; unit++) {
-            double[] y = new double[SIZE];
-            for (int i = unit; i < SIZE; i++) { // the rows of the inverse of l, squared, add up
+            for (int i = unit; i < SIZE; i++) { // the rows of the inverse of the factor, squared, add up
                 double rest = i == unit ? 1.0 : 0.0;
                 for (int j = unit; j < i; j++) {
-                    rest -= l[i][j] * y[j];
+                    rest -= a[SIZE * i + j] * y[j];
                 }
-                y[i] = rest / l[i][i];
+                y[i] = rest / a[SIZE * i + i];
                 diagonal[unit] += y[i] * y[i];
             }
         }

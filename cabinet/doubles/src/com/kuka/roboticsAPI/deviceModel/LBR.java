@@ -36,6 +36,7 @@ import heptarm.doubles.motion.AppendedMotion;
 import heptarm.doubles.motion.ForwardKinematics;
 import heptarm.doubles.motion.MotionContainer;
 import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.motion.Poses;
 import heptarm.doubles.motion.AttachedLoadCalculator;
 import heptarm.doubles.motion.ServoRuntime;
 import heptarm.doubles.motion.WrenchUncertainty;
@@ -78,7 +79,7 @@ public abstract class LBR extends Robot {
         this.station = station;
         kinematics = new ForwardKinematics(station.description);
         root = getRootFrame();
-        flange = new ObjectFrame("Flange", this, () -> root, () -> MotionTranslator.transformation(numbers(StateWords.POSE, 7)));
+        flange = new ObjectFrame("Flange", this, () -> root, () -> Poses.ofQuaternion(numbers(StateWords.POSE, 7)));
     }
 
     private double[] numbers(int word, int count) {

@@ -34,7 +34,7 @@ public final class Transformation implements ITransformation {
     }
 
     public static Transformation ofTranslation(double x, double y, double z) {
-        return ofRad(x, y, z, 0, 0, 0);
+        return new Transformation(x, y, z, IDENTITY.r);
     }
 
     public static Transformation of(Vector translation, MatrixRotation rotation) {
