@@ -38,6 +38,7 @@ PAUSE = 1.0
 
 _LATE_ANSWERS = ("this machine answers late", "QualityLost")
 _LATE_TARGETS = ("no target arrived", "Starved")
+_SILENCE = ("its watchdog time is", "nothing received from", "the newest state is")
 _FILE = "RETRIES_OF_HEPTARM"
 _log = logging.getLogger(__name__)
 
@@ -86,11 +87,11 @@ def starved(outcome: object) -> str:
 
 
 def silent(outcome: object) -> str:
-    """The cause of a program that lost its session since one side heard nothing of the other for the time allowed."""
+    """The cause of a program that ended since one side heard nothing of the other for the time allowed."""
     if not isinstance(outcome, subprocess.CompletedProcess) or outcome.returncode == 0:
         return ""
     said = str(outcome.stderr)
-    return "one side was silent" if "its watchdog time is" in said or "nothing received from" in said else ""
+    return "one side was silent" if any(one in said for one in _SILENCE) else ""
 
 
 def held_up(arm: ha.Arm, since: int) -> str:

@@ -478,6 +478,7 @@ private:
 
     void run() {
         std::int64_t due = now();
+        std::int64_t at = due;  // when the last call of `receive` ended
         try {
             while (!error_at_once()) {
                 if (now() >= due) {
@@ -486,11 +487,13 @@ private:
                     send(ping, 0);
                     due = now() + ping_interval();
                 }
+                // time in which nobody listened is no silence of the cabinet: that before the call, and that by which it
+                // ends later than the ping is due, since then this process or its machine stood still
+                const std::int64_t begun = now();
+                const std::int64_t deaf = begun - at;
                 const std::size_t size = socket_->receive(buffer_.data(), buffer_.size(), due);
-                const std::int64_t at = now();
-                // the call ends when the ping is due: if it ended later, this process or its machine stood still,
-                // and that time is no silence of the cabinet
-                received_ = std::min(at, received_ + std::max<std::int64_t>(at - due, 0));
+                at = now();
+                received_ = std::min(at, received_ + deaf + std::max<std::int64_t>(at - std::max(due, begun), 0));
                 session_.feed(buffer_.data(), size);
                 while (const auto frame = session_.next()) {
                     received_ = at;

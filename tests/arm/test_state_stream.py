@@ -9,6 +9,7 @@ from heptarm.arm.translate.state import read_robot, read_state
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
 from heptarm.io.clock import StepClock
 from heptarm.values.state import State
+from heptarm.wire import messages as wire
 from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.messages import RobotInfo
 from tests.wire.pairs import ROBOT
@@ -118,9 +119,16 @@ def test_a_stream_without_an_end_does_not_become_arrays(rate: float | None) -> N
 @pytest.mark.parametrize("body", [b"", b"\xff\xff", b"\x00\x01" + bytes(20), b"\x00\x04" + bytes(200)])
 def test_bytes_that_are_no_state(body: bytes) -> None:
     with pytest.raises(RemoteProtocolError, match="state"):
-        str(
-            read_state(body, ClockOffset(), lambda: 0)
-        )  # bytes are checked at once, numbers when they are used
+        # bytes are checked at once, numbers when they are used
+        str(read_state(body, ClockOffset(), lambda: 0, received=0))
+
+
+def test_no_state_is_younger_than_its_receipt_though_the_clock_is_not_known_well_yet() -> None:
+    offset = ClockOffset()
+    offset.feed(0, 10_000_000, 400_000_000)  # a slow ping: both clocks are the same
+    joints = wire.JointState(stamp=500_000_000, q=(0.0,) * 7, q_cmd=(0.0,) * 7, dq=(0.0,) * 7)
+    state = read_state(wire.State(joints=joints).encode(), offset, lambda: 502_000_000, received=501_000_000)
+    assert state.stamp == 500_000_000 and state.age == pytest.approx(0.001)
 
 
 def test_the_robot_has_the_limits_that_the_cabinet_names() -> None:

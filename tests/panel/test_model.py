@@ -183,11 +183,13 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("patient")
 def test_it_goes_to_a_pose_and_stays_there(model: PanelArm, observer: ha.Arm) -> None:
     goal = observer.state.pose.shifted(0.02, 0.03, -0.02).rotated(a=0.1)
-    held(
-        model,
-        PoseJog(goal, 0.5),
-        lambda: observer.state.pose.distance_to(goal) < 1e-3 and observer.state.pose.angle_to(goal) < 5e-3,
-    )
+
+    def is_there() -> bool:
+        state = observer.state
+        is_still = abs(state.dq).max() < 5e-3
+        return is_still and state.pose.distance_to(goal) < 1e-3 and state.pose.angle_to(goal) < 5e-3
+
+    held(model, PoseJog(goal, 0.5), is_there)
     model.end_jog()
     assert at_rest(model, observer).pose.distance_to(goal) < 2e-3
 

@@ -35,6 +35,9 @@ _RATE = 50.0
 _CEILING = 0.5
 #: On the last piece to a pose the speed is the distance that is left times this [1/s].
 _GAIN = 3.0
+#: Largest product of that factor and the age of the pose it is computed from: with less than 1/e the arm does not go
+#: beyond its goal (the step response of an integrator with a delay in its loop).
+_GAIN_TIMES_AGE = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,7 +247,9 @@ class Jogger:
                 if isinstance(jog, TwistJog):
                     servo.set(jog.twist)
                 elif isinstance(jog, PoseJog):
-                    servo.set(_towards(jog, self._arm.state.pose))
+                    state = self._arm.state
+                    age = state.age * self._arm.real_time_factor
+                    servo.set(towards(jog, state.pose, age))
                 else:
                     return
                 self._slowed = servo.stats.slowdown.reason
@@ -255,14 +260,17 @@ def _axes(jog: Jog) -> str | None:
     return None if isinstance(jog, JointJog) else jog.frame if isinstance(jog, TwistJog) else BASE
 
 
-def _towards(jog: PoseJog, pose: Pose) -> Array:
-    """The twist, base axes, with which a pose goes to that of a movement and stops there, shape (6,)."""
+def towards(jog: PoseJog, pose: Pose, age: float) -> Array:
+    """The twist, base axes, with which a pose of an age [s] goes to that of a movement and stops there, shape (6,)."""
+    gain = min(_GAIN, _GAIN_TIMES_AGE / max(age, 1e-3))
     away = jog.pose.xyz - pose.xyz
     around = Pose(np.zeros(3), multiply(jog.pose.quat, pose.quat * np.array([-1.0, -1.0, -1.0, 1.0]))).rotvec
-    return np.concatenate([_slowed(away, jog.speed * LINE_SPEED), _slowed(around, jog.speed * TURN_SPEED)])
+    return np.concatenate(
+        [_slowed(away, jog.speed * LINE_SPEED, gain), _slowed(around, jog.speed * TURN_SPEED, gain)]
+    )
 
 
-def _slowed(left: Array, speed: float) -> Array:
-    """The velocity along what is left of a path, slower at its end."""
+def _slowed(left: Array, speed: float, gain: float) -> Array:
+    """The velocity along what is left of a path, slower at its end: the distance that is left times a gain [1/s]."""
     size = float(np.linalg.norm(left))
-    return np.zeros(3) if size < 1e-6 else left * (min(speed, _GAIN * size) / size)
+    return np.zeros(3) if size < 1e-6 else left * (min(speed, gain * size) / size)

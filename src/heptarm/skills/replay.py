@@ -141,8 +141,10 @@ class _Run:
                 self._report(handle.progress)
         finally:
             handle.cancel()
+        result = handle.wait()
+        self._report(handle.progress)  # the states may have ended before it was known how the motion did
         deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)
-        return Replay(handle.wait(), deviation)
+        return Replay(result, deviation)
 
     def by_servo(self, rate: float, watchdog: float | None) -> Replay:
         """Follow it by a stream of targets."""

@@ -738,7 +738,13 @@ class Connection:
 
     def decode(self, sample: StateSample) -> State:
         """The state of a sample."""
-        return read_state(sample.body, self.link.offset, self.clock.nanos, self.signals)
+        return read_state(
+            sample.body,
+            self.link.offset,
+            self.clock.nanos,
+            received=sample.received,
+            signals=self.signals,
+        )
 
     def state_of(self, message: wire.ConditionFired | wire.TriggerFired) -> State | None:
         """The robot's state when a condition or trigger fired; None if the cabinet did not report it."""

@@ -62,9 +62,21 @@ def _undecodable(error: Exception) -> RemoteProtocolError:
 
 
 def read_state(
-    body: bytes, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal] = ()
+    body: bytes,
+    offset: ClockOffset,
+    clock: Callable[[], int],
+    *,
+    received: int,
+    signals: Sequence[Signal] = (),
 ) -> values.State:
     """The state in the body of a frame.
+
+    Args:
+        body: the bytes.
+        offset: estimate of the cabinet's clock; after slow pings it may be off by half of their round trip.
+        clock: ours [ns].
+        received: our clock when it arrived [ns]; it was not sampled later than that.
+        signals: the cabinet's.
 
     Raises:
         RemoteProtocolError: the bytes are no state.
@@ -73,8 +85,8 @@ def read_state(
         groups = StateGroups(body)
     except ValueError as error:
         raise _undecodable(error) from error
-    received = _Received(groups.get, groups.stamp, signals)
-    return values.State(values.Groups.of(received), offset.to_ours(groups.stamp), clock)
+    source = _Received(groups.get, groups.stamp, signals)
+    return values.State(values.Groups.of(source), min(offset.to_ours(groups.stamp), received), clock)
 
 
 def read_signals(infos: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
