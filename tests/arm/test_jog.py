@@ -164,12 +164,15 @@ def test_a_joint_stops_before_its_limit_which_is_never_passed(arm: ha.Arm) -> No
     limit = arm.robot.q_max[6]
     arm.move(ha.ptp([*HOME[:6], limit - 0.3]), speed=1.0)
     with arm.servo("velocity", speed=0.5, watchdog=2.0) as sv:
-        seen = jog(arm, sv, 0.6 * A7, until=lambda state: state.q[6] > limit - 0.04 and rests(state))
-        stats = sv.stats
+
+        def is_at_its_end(state: ha.State) -> bool:
+            # it also rests for a moment where a busy machine sends its targets late
+            is_braked = any(one.reason == "limit of A7" and one.factor < 0.1 for one in sv.stats.slowdowns)
+            return state.q[6] > limit - 0.04 and rests(state) and is_braked
+
+        seen = jog(arm, sv, 0.6 * A7, until=is_at_its_end)
         assert max(state.q[6] for state in seen) < limit
-        slowed = {one.reason: one.factor for one in stats.slowdowns}
-        assert slowed["limit of A7"] < 0.1, slowed
-        assert "limit of A7" in str(stats)
+        assert "limit of A7" in str(sv.stats)
         jog(arm, sv, -0.3 * A7, until=lambda state: state.q[6] < limit - 0.1)
 
 

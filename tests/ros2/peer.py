@@ -149,20 +149,23 @@ class Ros:
         assert future.done(), f"{why}: the node of the tests is served no more"
         return future.result()
 
-    def act(self, kind: type, name: str) -> ActionClient[Any, Any, Any]:
-        """A client of an available action.
+    def do(self, action: Callable[..., Any], *given: Any, **named: Any) -> Any:
+        """Let the executor's thread do something, and return what it returns.
 
-        rclpy shows a client to the executor before it is complete, so the executor's thread has to create it.
+        Whatever makes or destroys a part of the node is done so: rclpy shows a client to the executor before it is
+        complete, and its wait in Fast DDS may crash while another thread changes the node.
         """
+        done = self._executor.create_task(action, *given, **named)
+        return self.wait(done, f"{action.__name__} does not end")
+
+    def act(self, kind: type, name: str) -> ActionClient[Any, Any, Any]:
+        """A client of an available action."""
         if name not in self._actions:
             many = QoSProfile(depth=100)  # by default more than ten answers at once are lost
-            made = self._executor.create_task(
-                ActionClient, self.node, kind, name, goal_service_qos_profile=many
-            )
-            self._actions[name] = self.wait(made, f"no client of {name} can be made")
+            self._actions[name] = self.do(ActionClient, self.node, kind, name, goal_service_qos_profile=many)
             until(self._actions[name].server_is_ready, f"there is no action {name}")
             topic, message = f"{name}/_action/feedback", kind.Impl.FeedbackMessage  # type: ignore[attr-defined]
-            self.node.create_subscription(message, topic, self._on_feedback, 1000)
+            self.do(self.node.create_subscription, message, topic, self._on_feedback, 1000)
             self.meet(name)
         client = self._actions[name]
         until(client.server_is_ready, f"there is no action {name}")
@@ -192,7 +195,7 @@ class Ros:
                 for goal, number in zip(goals, numbers)
             ]
 
-        return list(self.wait(self._executor.create_task(send), "goals cannot be sent"))
+        return list(self.do(send))
 
     def send_goal(self, client: Any, goal: Any, feedback: Callable[[Any], None] | None = None) -> Any:
         """Send a goal; returns its handle when it is accepted or rejected."""
@@ -201,7 +204,7 @@ class Ros:
 
     def publisher(self, kind: type, name: str) -> Any:
         """A publisher whose messages arrive: its subscriber has discovered it, too."""
-        made = self.node.create_publisher(kind, name, 1)
+        made = self.do(self.node.create_publisher, kind, name, 1)
         until(made.get_subscription_count, f"nobody listens to {name}")
         self.meet(name)
         return made
@@ -209,7 +212,7 @@ class Ros:
     def find(self, kind: type, name: str) -> Any:
         """A client of an available service."""
         if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, name)
+            self._clients[name] = self.do(self.node.create_client, kind, name)
             self.meet(name)
         client = self._clients[name]
         until(client.service_is_ready, f"there is no service {name}")
@@ -231,7 +234,7 @@ class Ros:
             return next((one for one in nodes if one in there), "") or next(others, "")
 
         service = until(parameters, f"no node with {name} is there")
-        probe = self.node.create_client(GetParameters, service)
+        probe = self.do(self.node.create_client, GetParameters, service)
         until(probe.service_is_ready, f"there is no service {service}")
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
@@ -243,8 +246,7 @@ class Ros:
                 probe.remove_pending_request(asked)
         else:
             raise TimeoutError(f"{service} does not answer")
-        done = self._executor.create_task(self.node.destroy_client, probe)
-        self.wait(done, "a client does not end")
+        self.do(self.node.destroy_client, probe)
 
     def call(self, kind: type, name: str, request: Any) -> Any:
         """Call a service."""
@@ -255,15 +257,13 @@ class Ros:
         found: list[Any] = []
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         profile = QoSProfile(depth=100, durability=durability)
-        self._collected.append(self.node.create_subscription(kind, name, found.append, profile))
+        self._collected.append(self.do(self.node.create_subscription, kind, name, found.append, profile))
         return found
 
     def forget(self, count: int) -> None:
         """Stop collecting except for the first topics: each costs time with every message."""
         while len(self._collected) > count:
-            subscription = self._collected.pop()
-            done = self._executor.create_task(self.node.destroy_subscription, subscription)
-            self.wait(done, "a subscription does not end")
+            self.do(self.node.destroy_subscription, self._collected.pop())
 
     @property
     def collected(self) -> int:
@@ -376,7 +376,7 @@ class Client:
         self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
         self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
-        self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
+        self._topic = ros.do(ros.node.create_publisher, JointTrajectory, f"{name}/joint_trajectory", 1)
         self._reported: dict[int, list[ReceivedFeedback]] = {}
         self._changed: set[str] = set()
         self._how, self._override = "follows", 1.0

@@ -56,7 +56,7 @@ def test_twenty_subscribers_at_200_hz(ros: Ros, spare: Stage, nodes: Start, seco
             def count(_: JointState, number: int = number) -> None:
                 counts[number] += 1
 
-            context.node.create_subscription(JointState, "/crowd/joint_states", count, 1)
+            context.do(context.node.create_subscription, JointState, "/crowd/joint_states", count, 1)
         until(lambda: min(counts) > 0, "not every subscriber receives states")
         memory, first = status(node.process.pid, "VmRSS"), list(counts)
         deadline = time.monotonic() + seconds
@@ -107,7 +107,7 @@ def test_a_node_that_is_killed_in_mid_goal_and_its_successor(ros: Ros, spare: St
 def simulated(ros: Ros) -> Iterator[list[float]]:
     """A simulated clock [s] in the first entry of a list, published at 50 Hz."""
     now, over = [1e6], threading.Event()  # jumps go further back than forth
-    publisher = ros.node.create_publisher(Clock, "/clock", 1)
+    publisher = ros.do(ros.node.create_publisher, Clock, "/clock", 1)
 
     def run() -> None:
         while not over.wait(0.02):
@@ -119,7 +119,7 @@ def simulated(ros: Ros) -> Iterator[list[float]]:
     yield now
     over.set()
     thread.join()
-    ros.node.destroy_publisher(publisher)
+    ros.do(ros.node.destroy_publisher, publisher)
 
 
 @pytest.mark.parametrize("rounds", [1, pytest.param(40, marks=[pytest.mark.long, pytest.mark.timeout(1800)])])
