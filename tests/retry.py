@@ -87,10 +87,11 @@ def starved(outcome: object) -> str:
 
 
 def silent(outcome: object) -> str:
-    """The cause of a program that ended since one side heard nothing of the other for the time allowed."""
-    if not isinstance(outcome, subprocess.CompletedProcess) or outcome.returncode == 0:
-        return ""
-    said = str(outcome.stderr)
+    """The cause of a program or a call that ended since one side heard nothing of the other for the time allowed."""
+    if isinstance(outcome, subprocess.CompletedProcess):
+        said = str(outcome.stderr) if outcome.returncode != 0 else ""
+    else:
+        said = str(outcome) if isinstance(outcome, Exception) else ""
     return "one side was silent" if any(one in said for one in _SILENCE) else ""
 
 
