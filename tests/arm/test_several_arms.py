@@ -7,6 +7,8 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import Arm
+from tests.retry import held_up, retry
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 SETTINGS = {"watchdog": 5.0, "timeout": 30.0, "state_rate": 250.0}
@@ -116,33 +119,57 @@ def test_their_states_have_one_clock(arms: ha.Arms) -> None:
     assert apart <= 0.01
 
 
-def test_one_file_has_both_on_one_time_line(arms: ha.Arms, tmp_path: Path) -> None:
+@dataclass(frozen=True)
+class RecordedPair:
+    """Both arms moved by 5 cm at once: the file, and how far the begins of their motions are apart in it [s]."""
+
+    file: Path
+    apart: float
+    allowed: float
+    held_up: str
+
+
+def record_both(arms: ha.Arms, file: Path) -> RecordedPair:
+    """Let both arms move at once, and check what the file has of each."""
     left, right = arms
-    file = tmp_path / "both.mcap"
+    since = time.monotonic_ns()
     with arms.record(file, rate=200) as recorder:
         recorder.note("go")
         both = ha.start_together(
             {left: ha.lin_rel(z=-0.05, speed_mps=0.1), right: ha.lin_rel(z=-0.05, speed_mps=0.1)}
         )
         both.wait()
-        skew = both.skew
     runs = {name: ha.load(file, arm=name) for name in arms.names}
     assert [run.facts["robot"] for run in runs.values()] == ["iiwa14", "iiwa7"]
     assert min(run.t[0] for run in runs.values()) == pytest.approx(0.0, abs=1e-6)
     begins = []
     for run in runs.values():
-        assert (
-            run.complete
-            and len(run) > 40
-            and len(run.motions) == 1
-            and [one.text for one in run.notes] == ["go"]
-        )
+        assert run.complete and len(run) > 40 and len(run.motions) == 1
+        assert [one.text for one in run.notes] == ["go"]
         moves = np.linalg.norm(run["q_cmd"] - run["q_cmd"][0], axis=1) > 1e-4
         begins.append(run.t[int(moves.argmax())])
         assert run.motions[0].cause == "finished"
-    assert abs(begins[0] - begins[1]) < 2.0 * skew + 0.3  # twice as fast; the machine may be busy
+    return RecordedPair(
+        file,
+        abs(begins[0] - begins[1]),
+        2.0 * both.skew + 0.3,  # twice as fast; the machine may be busy
+        held_up(left, since) or held_up(right, since),
+    )
+
+
+def test_one_file_has_both_on_one_time_line(arms: ha.Arms, tmp_path: Path) -> None:
+    files = count()
+
+    def attempt() -> RecordedPair:
+        return record_both(arms, tmp_path / f"both-{next(files)}.mcap")
+
+    def busy(found: RecordedPair | Exception) -> str:
+        return found.held_up if isinstance(found, RecordedPair) and found.apart > found.allowed else ""
+
+    found = retry(attempt, busy)
+    assert found.apart < found.allowed
     with pytest.raises(ha.CommandRejected, match="arm must be one of left, right, got ''"):
-        ha.load(file)
+        ha.load(found.file)
 
 
 def test_connecting_names_the_arm_that_fails_and_closes_the_others() -> None:
