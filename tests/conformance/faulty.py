@@ -22,7 +22,6 @@ import numpy as np
 from heptarm.io.compiled import SWITCH
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState
-from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.runtime import cabinet as virtual
 
 #: Delay of an arm that lags, in ticks.
@@ -77,10 +76,8 @@ def _listen() -> None:
         if word in ("follows", "frozen", "lags"):
             _behaviour = word
             _cabinets[0].operator.on_action()  # an arm that stands still rests, and simulates nothing
-        elif word == "press":
-            _cabinets[0].plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
-        elif word == "release":
-            _cabinets[0].plant.safety.withdraw()
+        elif word in ("press", "release"):
+            _cabinets[0].operator.do({"press": "emergency_stop", "release": "clear"}[word])
         elif word.startswith("answer"):
             with contextlib.suppress(ValueError):  # no dialog is shown yet
                 _cabinets[0].operator.do(word)

@@ -8,11 +8,19 @@ import threading
 from collections.abc import Callable
 from math import inf
 
+import numpy as np
+
 from heptarm.arm.arm import Arm
 from heptarm.errors import CollisionDetected, HeptarmError
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.motion.motion import hold
+from heptarm.values.state import State
+
+#: Longest wait for the end of braking [s].
+_REST_TIMEOUT = 5.0
+#: Highest velocity of an axis at rest [rad/s].
+_RESTING = 0.01
 
 _log = logging.getLogger("heptarm.ros")
 
@@ -56,12 +64,22 @@ class CollisionReaction:
         _log.warning("collision at %s", found)
         self._notify(found)
         if self._stiffness is not None:
-            threading.Thread(target=self._comply, args=(self._stiffness,), name="heptarm-collision").start()
+            motion = self._arm.state.motion
+            given = (self._stiffness, motion.id if motion else 0)
+            threading.Thread(target=self._comply, args=given, name="heptarm-collision").start()
 
-    def _comply(self, stiffness: float) -> None:
+    def _comply(self, stiffness: float, stopped: int) -> None:
+        """Become compliant after the motion that the collision stopped, unless another one has begun meanwhile."""
+
+        def is_over(state: State) -> bool:
+            motion = state.motion
+            if motion is not None and motion.active:
+                return motion.id != stopped
+            return not (np.abs(state.dq) > _RESTING).any()
+
         try:
             self.disable()  # the contact that remains is not another collision
-            self._arm.wait_for_rest()
+            self._arm.wait_until(is_over, timeout=_REST_TIMEOUT)
             self._start(hold(inf), mode=JointImpedance(stiffness), when="reject")
         except HeptarmError as error:
             _log.warning("the arm does not become compliant after the collision: %s", error)
