@@ -83,9 +83,16 @@ def held(model: PanelArm, jog: Jog, condition: Callable[[], object], owner: obje
     until(condition, meanwhile=lambda: model.jog(jog, owner))
 
 
+def resting(model: PanelArm, observer: ha.Arm) -> State:
+    """What the second client sees once the arm rests, not what it saw while its states were still on the way."""
+    rest = model.arm.wait_for_rest(timeout=PATIENCE)
+    until(lambda: observer.state.stamp >= rest.stamp)
+    return observer.state
+
+
 def at_rest(model: PanelArm, observer: ha.Arm) -> State:
     until(lambda: not model.poll().is_jogging)
-    return observer.wait_for_rest(timeout=PATIENCE)
+    return resting(model, observer)
 
 
 # ------------------------------------------------------------------------------------------- looking
@@ -93,10 +100,11 @@ def at_rest(model: PanelArm, observer: ha.Arm) -> State:
 
 def test_it_shows_what_a_second_client_sees(model: PanelArm, observer: ha.Arm) -> None:
     until(lambda: model.poll().is_connected)
+    seen = resting(model, observer)
     readout = model.poll()
     assert readout.state is not None and readout.tcp is not None
-    assert readout.state.q == pytest.approx(observer.state.q, abs=1e-4)
-    assert readout.tcp.distance_to(observer.state.pose) < 1e-3
+    assert readout.state.q == pytest.approx(seen.q, abs=1e-4)
+    assert readout.tcp.distance_to(seen.pose) < 1e-3
     assert readout.is_virtual and readout.in_control and readout.stands == ()
     assert set(readout.state.io) == set(observer.io)
 
@@ -127,7 +135,7 @@ def test_it_takes_and_gives_control(model: PanelArm, observer: ha.Arm) -> None:
 def test_a_joint_turns_while_its_button_is_held_and_no_longer(model: PanelArm, observer: ha.Arm) -> None:
     velocity = np.zeros(7)
     velocity[3] = 0.2
-    before = observer.state.q
+    before = resting(model, observer).q
     held(model, JointJog(velocity), lambda: observer.state.q[3] > before[3] + 0.05)
     assert model.poll().is_jogging
     rest = at_rest(model, observer)  # nobody released it: silence is enough
@@ -140,7 +148,7 @@ def test_a_joint_turns_while_its_button_is_held_and_no_longer(model: PanelArm, o
 def test_the_tcp_moves_along_the_axes_of_a_frame(
     model: PanelArm, observer: ha.Arm, frame: str, axis: tuple[int, ...]
 ) -> None:
-    before = observer.state.pose
+    before = resting(model, observer).pose
     along = (before.rotation if frame == "tool" else np.eye(3)) @ np.array(axis)
     jog = TwistJog(np.array((*(-0.1 * np.array(axis)), 0, 0, 0)), frame)
     poses: list[Pose] = []
@@ -161,7 +169,7 @@ def test_the_tcp_moves_along_the_axes_of_a_frame(
 
 
 def test_the_tcp_turns_about_its_own_origin(model: PanelArm, observer: ha.Arm) -> None:
-    before = observer.state.pose
+    before = resting(model, observer).pose
     held(
         model,
         TwistJog(np.array((0, 0, 0, 0, 0, 0.3)), "tool"),
@@ -182,7 +190,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("patient")
 def test_it_goes_to_a_pose_and_stays_there(model: PanelArm, observer: ha.Arm) -> None:
-    goal = observer.state.pose.shifted(0.02, 0.03, -0.02).rotated(a=0.1)
+    goal = resting(model, observer).pose.shifted(0.02, 0.03, -0.02).rotated(a=0.1)
 
     def is_there() -> bool:
         state = observer.state
@@ -373,7 +381,7 @@ def test_the_motion_to_the_points_is_planned_and_shown(model: PanelArm, observer
         model.preview()
     model.teach("here")
     model.arm.move(ha.ptp(HOME + 0.1))
-    before = observer.state.q
+    before = resting(model, observer).q
     model.preview(speed=0.5)
     plan = model.plan
     assert plan is not None and plan.q[-1] == pytest.approx(HOME, abs=2e-3) and plan.robot == "iiwa14"
