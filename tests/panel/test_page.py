@@ -63,7 +63,12 @@ class Page:
         return visible[0]
 
     def press(self, label: str) -> None:
-        self.button(label).click()
+        button = self.button(label)
+        places: list[Any] = [None, button.rect]
+        while places[-1] != places[-2]:  # a browser that draws slowly still scrolls
+            time.sleep(0.1)
+            places.append(button.rect)
+        button.click()
 
     def check(self, label: str) -> None:
         self.browser.find_element("xpath", f"//label[normalize-space()={label!r}]").click()
@@ -112,9 +117,11 @@ def test_every_control_does_what_it_is_labelled(browser: Any, observer: Callable
         page.shows("Taught P1")
         page.tab("IO, tools")
         page.tab("Operator")
+        at = page.button("Clear").rect
         page.press("Emergency stop")
         arm.wait_until(lambda state: state.safety.emergency_stop, timeout=PATIENCE)
         page.shows("press Clear under Operator")
+        assert page.button("Clear").rect == at, "a message moves the buttons"
         page.press("Clear")
         arm.wait_until(lambda state: not state.safety.emergency_stop, timeout=PATIENCE)
         page.press("T1")

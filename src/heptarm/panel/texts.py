@@ -40,6 +40,7 @@ STYLE = """<style>
 .ha .box{border-radius:6px;padding:5px 9px;margin:3px 0;background:#8882;border-left:4px solid #888}
 .ha .box.good{border-color:#2f9e44}.ha .box.warn{border-color:#f59f00}.ha .box.bad{border-color:#e03131}
 .ha .box small{display:block;opacity:.8}
+.ha.head{min-height:48px}.ha.news{height:112px;overflow-y:auto}
 .ha table{width:100%;border-collapse:collapse}.ha td{padding:1px 4px;border-bottom:1px solid #8882}
 .ha .on{color:#40c057}.ha .here{background:#ff6b0a33}
 div:has(> div > .ha-grid){display:grid;grid-template-columns:1fr 1fr}
@@ -80,7 +81,7 @@ def head(readout: Readout) -> str:
         chips.append(_chip(f"to {readout.running}", "warn"))
     if readout.recording:
         chips.append(_chip("● recording", "bad"))
-    return f'<div class="ha"><span class="title">{escape(readout.title)}</span>{"".join(chips)}</div>'
+    return f'<div class="ha head"><span class="title">{escape(readout.title)}</span>{"".join(chips)}</div>'
 
 
 def _box(advice: Advice, kind: str, before: str = "") -> str:
@@ -89,7 +90,10 @@ def _box(advice: Advice, kind: str, before: str = "") -> str:
 
 
 def safety(readout: Readout) -> str:
-    """Why the arm stands, with the remedy; the last stop; the outcome of the last action."""
+    """Why the arm stands, with the remedy; the last stop; the outcome of the last action.
+
+    They take the same place whether they are few or many: no button below moves from under somebody's finger.
+    """
     boxes = [_box(one, "warn") for one in readout.stands]
     if not readout.is_connected:
         boxes = [
@@ -101,7 +105,7 @@ def safety(readout: Readout) -> str:
         boxes.append(_box(Advice(last.what), "", f"Last stop {at}: "))
     if readout.message is not None:
         boxes.append(_box(readout.message, _LEVELS[readout.message.level]))
-    return f'<div class="ha">{"".join(boxes)}</div>'
+    return f'<div class="ha news">{"".join(boxes)}</div>'
 
 
 def _colour(load: float) -> str:
