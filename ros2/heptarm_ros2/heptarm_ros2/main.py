@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from typing import NoReturn
 
 from heptarm.ros.interface.action import MAX_GOALS
 from heptarm_ros2.node import HeptarmNode
@@ -12,10 +12,10 @@ from heptarm_ros2.process import run
 _THREADS = MAX_GOALS + 8
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node; returns the exit code of the process."""
-    return run(HeptarmNode, arguments, threads=_THREADS, close=HeptarmNode.close)
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the node, and end the process."""
+    run(HeptarmNode, arguments, threads=_THREADS, close=HeptarmNode.close)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

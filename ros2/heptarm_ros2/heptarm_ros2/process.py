@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
+import os
 import signal
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import rclpy
 from rclpy.executors import Executor, InvalidHandle, MultiThreadedExecutor, SingleThreadedExecutor
@@ -26,14 +28,26 @@ def _on_signal(*_: Any) -> None:
     raise KeyboardInterrupt
 
 
+def _leave(code: int) -> NoReturn:
+    """End the process at once, after everything that mattered has been closed.
+
+    Python would now take apart what rclpy has left, in any order and beside threads of its executor and of the
+    middleware, and crashes at times (SIGSEGV in the garbage collector: an exit code that speaks of a failure).
+    """
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
 def run(
     make: Callable[[], One],
     arguments: list[str] | None = None,
     *,
     threads: int = 1,
     close: Callable[[One], None] = lambda _: None,
-) -> int:
-    """Run a node until a signal comes or a callback fails; returns the exit code of the process.
+) -> NoReturn:
+    """Run a node until a signal comes or a callback fails, and end the process; its exit code is 1 after a failure.
 
     The signal handlers of ROS would shut it down immediately, while the executor and the node still use it.
 
@@ -83,4 +97,4 @@ def run(
         close(node)
         node.destroy_node()
     rclpy.try_shutdown()
-    return int(failed.is_set())
+    _leave(int(failed.is_set()))

@@ -6,8 +6,7 @@ ros2 topic pub --once /reach/target geometry_msgs/msg/PointStamped "{point: {x: 
 
 from __future__ import annotations
 
-import sys
-from typing import Any
+from typing import Any, NoReturn
 
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
@@ -63,10 +62,10 @@ class Reach(Node):
             self._distance.publish(Float64(data=self._follower.distance))
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run the node; returns the exit code of the process."""
-    return run(Reach, arguments)
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the node, and end the process."""
+    run(Reach, arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
