@@ -73,7 +73,7 @@ def header() -> str:
         (joint_guard, ("PLANNED", "ON_TRACK")),
         (cycle, ("GAP_PERIODS", "MIN_GAP", "GRACE", "REPEATS")),
         (statistics, ("LONGEST",)),
-        (native, ("LAW_PATIENCE", "LAW_CUT")),
+        (native, ("LAW_PATIENCE", "LAW_CUT", "WARM_UP")),
         (wrench, ("NEARBY",)),
     ):
         lines += [f"#define {name} {_number(getattr(module, name))}" for name in names]

@@ -45,7 +45,7 @@ def compiled(source: Path, folder: Path) -> Path:
     if compiler is None:
         pytest.skip("no C++ compiler here: the C++ client is not tested")
     program = folder / source.stem
-    subprocess.run([compiler, *FLAGS, "-o", str(program), str(source)], check=True, timeout=300)
+    subprocess.run([compiler, *FLAGS, "-o", str(program), str(source)], check=True, timeout=800)
     return program
 
 

@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for source in MATLAB.iterdir():
         shutil.copy(source, folder)
     command = [compiler, "--mex", *FLAGS, "heptarm_mex.cpp"]
-    subprocess.run(command, cwd=folder, check=True, timeout=300)
+    subprocess.run(command, cwd=folder, check=True, timeout=800)
     return folder
 
 

@@ -41,6 +41,8 @@ HEAD = 80
 LAW_PATIENCE = 10
 #: A call of a compiled law that has used this much of the processor's time is ended [ns].
 LAW_CUT = 20_000_000
+#: How long before a message is due the loop warms up caches [ns]; an answer takes less, however cold they are.
+WARM_UP = 100_000
 #: Largest size of robot and connection info in messages for the native part.
 MAX_PLAIN = 64
 
@@ -171,6 +173,7 @@ def library() -> ctypes.CDLL:
     made.hf_send.argtypes = (_POINTER,)
     made.hf_run.argtypes = (_POINTER, _WORD, _POINTER)
     made.hf_law.argtypes = (_POINTER, _POINTER)
+    made.hf_warm_up.argtypes = (_POINTER, ctypes.c_int)
     made.hf_echo.argtypes, made.hf_echo.restype = (ctypes.c_int, _WORD, _POINTER), _WORD
     if made.hf_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")

@@ -203,6 +203,7 @@ enum {
 #define LONGEST 1000000000000000LL
 #define LAW_PATIENCE 10LL
 #define LAW_CUT 20000000LL
+#define WARM_UP 100000LL
 #define NEARBY 0.002
 
 struct loop {
