@@ -97,7 +97,9 @@ def test_a_contact_stays_near_its_threshold(speed: float, most: float) -> None:
     assert forces[-200:].mean() == pytest.approx(forces[-800:-600].mean(), abs=0.3), (
         "it must not grow at rest"
     )
-    assert np.median([_speed(plant) for _ in range(200)]) < 1e-3, "a contact at rest trembles, by chance at each moment"
+    assert np.median([_speed(plant) for _ in range(200)]) < 1e-3, (
+        "a contact at rest trembles, by chance at each moment"
+    )
 
 
 def _speed(plant: Plant) -> float:
