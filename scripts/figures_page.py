@@ -26,7 +26,7 @@ $ make bench GROUP=state,fri    # some groups
 $ make bench ONLY=round_trip    # one benchmark
 $ make bench LIST=1             # groups, names and what they measure
 $ make bench STORE=1            # stores the run in bench/results as well
-$ make figures                  # writes this page from the newest stored runs of one machine
+$ make figures                  # writes this page from the newest stored run of each benchmark
 ```
 
 A figure has `name`, `group`, `value`, `unit`, `reference` (its floor, measured in the same run), `ratio`, `limit` (of
@@ -47,8 +47,8 @@ VERDICTS = {True: "met", False: "**missed**", None: "undecided"}
 Record = dict[str, Any]
 
 
-def newest() -> tuple[Record, list[Record]]:
-    """Head of the newest stored run, with the days of all figures, and each benchmark's newest figures on its machine.
+def newest() -> list[Record]:
+    """Each benchmark's newest figures; `machine` and `date` of a figure are those of its run.
 
     Raises:
         FileNotFoundError: no run is stored.
@@ -59,19 +59,16 @@ def newest() -> tuple[Record, list[Record]]:
         runs.append((head["date"], path.name, head, figures))
     if not runs:
         raise FileNotFoundError("no stored run in bench/results; make one with: make bench STORE=1")
-    runs.sort(key=lambda run: run[:2], reverse=True)
-    head = runs[0][2]
     found: list[Record] = []
-    days: list[str] = []
-    for date, _, other, figures in runs:
-        if any(other["machine"][what] != head["machine"][what] for what in ("cpu", "cores")):
-            continue
+    for _, _, head, figures in sorted(runs, key=lambda run: run[:2], reverse=True):
         known = {figure["run"]["benchmark"] for figure in found}
-        newer = [figure for figure in figures if figure["run"]["benchmark"] not in known]
-        if newer:
-            found += newer
-            days.append(date)
-    return head | {"date": " and ".join(sorted(days))}, found
+        found += [figure | head for figure in figures if figure["run"]["benchmark"] not in known]
+    return found
+
+
+def machines(figures: list[Record]) -> list[str]:
+    """The machines of some figures."""
+    return sorted({f"{one['machine']['cores']} cores of {one['machine']['cpu']}" for one in figures})
 
 
 def groups() -> list[Record]:
@@ -79,7 +76,7 @@ def groups() -> list[Record]:
     return list(tomllib.loads(TEXTS.read_text())["group"])
 
 
-def page(head: Record, figures: list[Record]) -> str:
+def page(figures: list[Record]) -> str:
     """The whole page.
 
     Raises:
@@ -90,29 +87,40 @@ def page(head: Record, figures: list[Record]) -> str:
         failed = figure["name"] == f"{figure['run']['benchmark']}_failed"
         if not failed and not any(fnmatchcase(figure["name"], pattern) for pattern in known):
             raise KeyError(f"{figure['name']} has no description; add one to bench/results/figures.toml")
-    return "\n".join(
-        [HEAD, *_machine(head, figures), *(line for one in groups() for line in _group(one, figures))]
-    )
+    return "\n".join([HEAD, *_origin(figures), *(line for one in groups() for line in _group(one, figures))])
 
 
-def _machine(head: Record, figures: list[Record]) -> list[str]:
-    machine = head["machine"]
-    commits = sorted({figure["run"]["commit"] for figure in figures})
+def _origin(figures: list[Record]) -> list[str]:
+    """Where the figures come from."""
+    systems = sorted({f"{one['machine']['kernel']}, Python {one['machine']['python']}" for one in figures})
+    has_priority = all(one["machine"]["real_time"] for one in figures)
     loads = [figure["run"]["load"] for figure in figures]
     settings = sorted(
         {f"{name}={value}" for one in figures for name, value in one["run"].get("settings", {}).items()}
     )
     lines = [
-        f"This page shows the newest run of each benchmark, of {head['date']}, "
-        f"on {machine['cores']} cores of {machine['cpu']}, "
-        f"{machine['kernel']}, Python {machine['python']}, "
-        f"{'with' if machine['real_time'] else 'without'} realtime priority, of commit "
-        f"{', '.join(f'`{commit}`' for commit in commits)}. Load average before the benchmarks: "
-        f"{min(loads):g} to {max(loads):g}.",
+        f"This page shows the newest run of each benchmark, on {' and on '.join(machines(figures))}, with "
+        f"{' and '.join(systems)}, {'all' if has_priority else 'not all'} with realtime priority. Load average before "
+        f"the benchmarks: {min(loads):g} to {max(loads):g}.",
     ]
     if settings:
         lines.append(f"Some benchmarks ran with {', '.join(f'`{one}`' for one in settings)}.")
     return [*lines, ""]
+
+
+def _runs(figures: list[Record]) -> str:
+    """Machine, day and commit of the benchmarks of a group."""
+    runs: dict[str, list[str]] = {}
+    for one in figures:
+        run = f"{one['machine']['cpu']}, {one['date']}, commit `{one['run']['commit']}`"
+        names = runs.setdefault(run, [])
+        if one["run"]["benchmark"] not in names:
+            names.append(one["run"]["benchmark"])
+    if len(runs) == 1:
+        return f"Run on {next(iter(runs))}."
+    return (
+        "; ".join(f"{', '.join(f'`{name}`' for name in names)}: {run}" for run, names in runs.items()) + "."
+    )
 
 
 def _group(group: Record, figures: list[Record]) -> list[str]:
@@ -128,7 +136,7 @@ def _group(group: Record, figures: list[Record]) -> list[str]:
             rows.append(f"| `{figure['run']['benchmark']}` did not finish | | | | {VERDICTS[figure['ok']]} |")
     if rows:
         header = "| figure | measured | floor | ratio: median, lowest to highest | limit |"
-        lines += [header, "|---|---|---|---|---|", *rows, ""]
+        lines += [header, "|---|---|---|---|---|", *rows, "", _runs(here), ""]
     ran = {figure["run"]["benchmark"] for figure in here}
     absent = [name for name in group["benchmarks"] if name not in ran]
     if absent:
@@ -186,7 +194,7 @@ def _number(value: float) -> str:
 def main() -> int:
     """Write the page."""
     try:
-        text = page(*newest())
+        text = page(newest())
     except (FileNotFoundError, KeyError) as error:
         print(error.args[0], file=sys.stderr)
         return 1

@@ -18,7 +18,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from scripts.figures_page import newest  # noqa: E402
+from scripts.figures_page import machines, newest  # noqa: E402
 
 PICTURE = ROOT / "docs" / "_static" / "times.png"
 #: Figures that have a floor, without their placement, and what they and their floors are.
@@ -50,7 +50,7 @@ Record = dict[str, Any]
 
 def main() -> None:
     """Draw the picture."""
-    head, found = newest()
+    found = newest()
     figures = {figure["name"]: figure for figure in found}
     picture = plt.figure(figsize=(11, 6.6), constrained_layout=True)
     upper, lower = picture.subfigures(2, 1, height_ratios=(5, 1.5))
@@ -61,9 +61,9 @@ def main() -> None:
     one.legend(loc="upper right", fontsize=8)
     _parts(lower.subplots(), figures)
     lower.legend(ncol=5, fontsize=7, loc="outside lower center", frameon=False)
-    machine = head["machine"]
+    shown = [one for one in found if one["name"].startswith((*BESIDE_FLOORS, *PARTS))]
     picture.suptitle(
-        f"Medians and their floors, {machine['cpu']}, {machine['cores']} cores, {head['date']}", fontsize=9
+        f"Medians and their floors, each pair on one machine: {', '.join(machines(shown))}", fontsize=9
     )
     picture.savefig(PICTURE, dpi=100, metadata={"Software": None})
     print(PICTURE.relative_to(ROOT))

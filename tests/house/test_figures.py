@@ -37,7 +37,7 @@ def figures_page() -> ModuleType:
 
 
 def test_page_agrees_with_the_newest_stored_runs(figures_page: ModuleType) -> None:
-    assert figures_page.PAGE.read_text() == figures_page.page(*figures_page.newest()), "run make figures"
+    assert figures_page.PAGE.read_text() == figures_page.page(figures_page.newest()), "run make figures"
 
 
 def test_every_benchmark_is_on_the_page_in_its_group(figures_page: ModuleType) -> None:
