@@ -20,7 +20,6 @@ _OPTIONS = (
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--disable-gpu-watchdog",  # a busy machine draws slowly, and Chromium would end what draws
     "--window-size=1000,750",
 )
 
