@@ -141,7 +141,7 @@ def _group(group: Record, figures: list[Record]) -> list[str]:
     absent = [name for name in group["benchmarks"] if name not in ran]
     if absent:
         names = ", ".join(f"`{name}`" for name in absent)
-        lines += [f"Not in this run: {names} (`make bench ONLY={','.join(absent)} STORE=1`).", ""]
+        lines += [f"Not stored: {names} (`make bench ONLY={','.join(absent)} STORE=1`).", ""]
     return lines
 
 
