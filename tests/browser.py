@@ -36,6 +36,9 @@ def browser(tmp_path: Path) -> Iterator[Any]:
     options.binary_location = binary
     for option in (*_OPTIONS, f"--user-data-dir={tmp_path / 'profile'}"):
         options.add_argument(option)
-    running = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    # Linux divides the processors among sessions first, and a session's time among its processes then. In the
+    # session of the tests and beside other load, a browser that draws answers no command for minutes.
+    service = webdriver.ChromeService(driver, popen_kw={"start_new_session": True})
+    running = webdriver.Chrome(options=options, service=service)
     yield running
     running.quit()

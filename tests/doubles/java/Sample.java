@@ -63,7 +63,7 @@ public class Sample extends RoboticsAPIApplication implements IErrorHandler {
         say("linRel moves along the flange's own axes",
                 Math.abs(before.transformationTo(lbr.getCurrentCartesianPosition(lbr.getFlange())).getZ() - 50) < 0.1);
 
-        IMotionContainer first = lbr.moveAsync(ptp(0.4, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0));
+        IMotionContainer first = lbr.moveAsync(ptp(0.4, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0).setJointVelocityRel(0.05));
         IMotionContainer second = lbr.moveAsync(ptp(0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0));
         say("moveAsync returns before the motion has ended", !first.isFinished());
         second.await();
