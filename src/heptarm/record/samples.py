@@ -43,12 +43,13 @@ class SampleQueue:
         lost: number of dropped samples, and of those that never arrived, up to the place that the reader has reached.
     """
 
-    __slots__ = ("_changed", "_gaps", "_samples", "_waiting", "lost")
+    __slots__ = ("_changed", "_gaps", "_lock", "_samples", "_waiting", "lost")
 
     def __init__(self, size: int) -> None:
         self._samples: deque[StateSample] = deque(maxlen=size)
         self._gaps: deque[tuple[int, int]] = deque()  # the number of the sample before a gap, and its size
-        self._changed = threading.Condition(threading.Lock())
+        self._lock = threading.Lock()
+        self._changed = threading.Condition(self._lock)
         self._waiting = 0
         self.lost = 0
 
@@ -59,7 +60,7 @@ class SampleQueue:
 
     def put(self, sample: StateSample) -> None:
         """Append a sample."""
-        with self._changed:
+        with self._lock:
             if len(self._samples) == self._samples.maxlen:
                 self.lost += 1
             self._samples.append(sample)
@@ -73,7 +74,7 @@ class SampleQueue:
             samples: in order; those that are in the queue already are left out.
             after: number of the last sample that is not asked for; the older ones that are missing count as lost.
         """
-        with self._changed:
+        with self._lock:
             there = list(self._samples)
             first = there[0].number if there else float("inf")
             older = [one for one in samples if after < one.number < first]
@@ -86,19 +87,20 @@ class SampleQueue:
 
     def get(self, seconds: float) -> StateSample | None:
         """Take the oldest sample; None if none arrived in time."""
-        with self._changed:
+        with self._lock:
             if not self._samples and seconds > 0.0:
                 self._waiting += 1
                 try:
                     self._changed.wait_for(lambda: bool(self._samples), seconds)
                 finally:
                     self._waiting -= 1
-            self._pass_gaps()
+            if self._gaps:
+                self._pass_gaps()
             return self._samples.popleft() if self._samples else None
 
     def take(self, most: int) -> list[StateSample]:
         """Take the oldest samples that are there, at most so many, without waiting."""
-        with self._changed:
+        with self._lock:
             taken = [self._samples.popleft() for _ in range(min(most, len(self._samples)))]
             self._pass_gaps()
             return taken
@@ -110,7 +112,7 @@ class SampleQueue:
             count: how many.
             after: number of the last sample before them.
         """
-        with self._changed:
+        with self._lock:
             self._gaps.append((after, count))
 
     def _pass_gaps(self) -> None:

@@ -15,8 +15,7 @@ from heptarm.wire.messages import HEADER, MAGIC, MAJOR, MAX_BODY, TAG, OneWay
 
 #: Largest number of unread bytes; feeding more is a bug of the caller.
 MAX_UNREAD = 2 * MAX_BODY
-#: Consumed bytes are deleted from the front once there are this many.
-_COMPACT_AT = 65536
+_new = tuple.__new__
 #: Flag of a frame that ends with a tag.
 _TAGGED = 1
 
@@ -82,7 +81,7 @@ class FrameReader:
 
     def __init__(self) -> None:
         self.tag: FrameTag | None = None
-        self._buffer = bytearray()
+        self._buffer = b""
         self._start = 0
 
     def __len__(self) -> int:
@@ -95,9 +94,10 @@ class FrameReader:
         Raises:
             LocalProtocolError: too many bytes are unread.
         """
-        if len(self) + len(data) > MAX_UNREAD:
+        unread = self._buffer[self._start :]
+        if len(unread) + len(data) > MAX_UNREAD:
             raise LocalProtocolError(f"more than {MAX_UNREAD} bytes are unread: read frames between feeds")
-        self._buffer += data
+        self._buffer, self._start = unread + data, 0
 
     def read(self) -> Frame | None:
         """Read the next complete frame; None until more bytes arrive.
@@ -106,15 +106,17 @@ class FrameReader:
             RemoteProtocolError: the bytes are not a frame; the stream cannot be used any more.
         """
         buffer, start = self._buffer, self._start
+        if start == len(buffer):
+            return None
         body = start + HEADER.size
         if len(buffer) < body:
             # refuse a wrong magic at once: a peer of another protocol may never send a complete header
             if len(buffer) >= start + 2 and int.from_bytes(buffer[start : start + 2], "big") != MAGIC:
-                raise _stranger(bytes(buffer[start:]))
+                raise _stranger(buffer[start:])
             return None
         magic, version, flags, type_, length, seq, request, time = HEADER.unpack_from(buffer, start)
         if magic != MAGIC:
-            raise _stranger(bytes(buffer[start : start + HEADER.size]))
+            raise _stranger(buffer[start : start + HEADER.size])
         if flags > _TAGGED:
             raise _bad(f"the flags of a frame must be 0 or 1, got {flags:#04x}")
         if length > MAX_BODY:
@@ -130,16 +132,9 @@ class FrameReader:
             return None
         if tag is not None and not hmac.compare_digest(tag.of(buffer[start:rest]), buffer[rest:end]):
             raise forged("a frame has a wrong tag")
-        content = bytes(buffer[body:rest])
-        if end == len(buffer):
-            buffer.clear()
-            self._start = 0
-        elif end >= _COMPACT_AT:
-            del buffer[:end]
-            self._start = 0
-        else:
-            self._start = end
-        return Frame(version, type_, seq, request, time, content)
+        self._start = end
+        # without a call of a Python function
+        return _new(Frame, (version, type_, seq, request, time, buffer[body:rest]))
 
 
 def forged(text: str) -> RemoteProtocolError:

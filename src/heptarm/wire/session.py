@@ -266,68 +266,63 @@ class Session:
         Raises:
             RemoteProtocolError: the other side violated the protocol; the session is closed.
         """
+        return iter(self._next_event, None)
+
+    def _next_event(self) -> Received | StateReceived | None:
+        """The next event; None until more bytes arrive, and when the session is closed."""
         if self._failed is not None:
             raise self._failed
-        while self._state is not SessionState.CLOSED:
-            try:
-                frame = self._reader.read()
-                if frame is None:
-                    return
-                event = self._accept(frame)
-            except RemoteProtocolError as error:
-                self._failed = error
-                self._enter(SessionState.CLOSED)
-                raise
-            yield event
+        if self._state is SessionState.CLOSED:
+            return None
+        try:
+            frame = self._reader.read()
+            return None if frame is None else self._accept(frame)
+        except RemoteProtocolError as error:
+            self._failed = error
+            self._enter(SessionState.CLOSED)
+            raise
 
     def _accept(self, frame: Frame) -> Received | StateReceived:
-        kind = self._answers.get(frame.type)
-        if (
-            kind is not None  # the usual case
-            and frame.request in self._waiting
-            and frame.seq == self._received
-            and frame.version == MAJOR
-        ):
-            self._count_received()
-            try:
-                message = kind.decode(frame.body)
-            except DecodeError as error:
-                raise _broken(Code.BAD_BODY, f"{kind.__name__}: {error}") from error
-            del self._waiting[frame.request]
-            return Received(message, frame.request, frame.time)
-        if frame.version != MAJOR and frame.type not in _FROZEN:
+        version, type_, seq, request, time, body = frame
+        if version != MAJOR and type_ not in _FROZEN:
             raise _broken(
-                Code.WRONG_VERSION, f"a frame has protocol version {frame.version}, this side has {MAJOR}"
+                Code.WRONG_VERSION, f"a frame has protocol version {version}, this side has {MAJOR}"
             )
-        if frame.seq != self._received:
-            raise forged(f"expected frame {self._received}, got frame {frame.seq}")
-        kind = MESSAGES.get(frame.type)
+        if seq != self._received:
+            raise forged(f"expected frame {self._received}, got frame {seq}")
+        self._count_received()
+        # states and answers are by far the most frequent
+        if type_ == State.TYPE and request == 0 and self._takes_states:
+            return StateReceived(body, time)
+        kind = self._answers.get(type_)
+        if kind is not None and request in self._waiting:
+            message = _decoded(kind, body)
+            del self._waiting[request]
+            return Received(message, request, time)
+        kind = MESSAGES.get(type_)
         if kind is None:
-            raise _broken(Code.UNKNOWN_MESSAGE, f"message id {frame.type} is not known")
+            raise _broken(Code.UNKNOWN_MESSAGE, f"message id {type_} is not known")
+        after = self._check_legal(kind, request)
+        message = _decoded(kind, body)
+        if kind.KIND == "handshake":
+            self._check_handshake(message, body)
+        self._after(kind, after, request, body)
+        return Received(message, request, time)
+
+    def _check_legal(self, kind: type[Message], request: int) -> SessionState:
+        """Check that a message may come now, with this request id; returns the state after it."""
         after = self._legal.get(_SYMBOLS[kind])
         if after is None or self._source == kind.SOURCE:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} came in state {self._state.value!r}")
         # a Rejected for a message that is no request has no id
-        is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or frame.request != 0)
-        if is_numbered != (frame.request != 0) and kind.KIND != "oneway":  # a target may have a number
-            raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} with request id {frame.request}")
-        if kind.KIND == "answer" and is_numbered and frame.request not in self._waiting:
-            raise _broken(
-                Code.UNEXPECTED_MESSAGE, f"an answer to request {frame.request}, which was not made"
-            )
-        if kind.KIND == "request" and frame.request in self._waiting:
-            raise _broken(Code.UNEXPECTED_MESSAGE, f"request id {frame.request} is in use")
-        self._count_received()
-        if kind is State:
-            return StateReceived(frame.body, frame.time)
-        try:
-            message = kind.decode(frame.body)
-        except DecodeError as error:
-            raise _broken(Code.BAD_BODY, f"{kind.__name__}: {error}") from error
-        if kind.KIND == "handshake":
-            self._check_handshake(message, frame.body)
-        self._after(kind, after, frame.request, frame.body)
-        return Received(message, frame.request, frame.time)
+        is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or request != 0)
+        if is_numbered != (request != 0) and kind.KIND != "oneway":  # a target may have a number
+            raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} with request id {request}")
+        if kind.KIND == "answer" and is_numbered and request not in self._waiting:
+            raise _broken(Code.UNEXPECTED_MESSAGE, f"an answer to request {request}, which was not made")
+        if kind.KIND == "request" and request in self._waiting:
+            raise _broken(Code.UNEXPECTED_MESSAGE, f"request id {request} is in use")
+        return after
 
     def _count_received(self) -> None:
         self._received = (self._received + 1) & _WRAP
@@ -356,6 +351,7 @@ class Session:
     def _enter(self, state: SessionState) -> None:
         self._state, self._legal = state, TRANSITIONS[state]
         self._requests, self._answers = _plain(state, self._source)
+        self._takes_states = _SYMBOLS[State] in self._legal and self._source != State.SOURCE
         self._packers = {
             kind: pack
             for kind, pack in self._one_way.items()
@@ -396,6 +392,13 @@ def _plain(state: SessionState, source: str) -> tuple[frozenset[type[Message]], 
     requests = (kind for kind in kept if kind.KIND == "request" and kind.SOURCE in (source, "both"))
     answers = (kind for kind in kept if kind.KIND == "answer" and source != kind.SOURCE)
     return frozenset(requests), {kind.TYPE: kind for kind in answers}
+
+
+def _decoded(kind: type[Message], body: bytes) -> Message:
+    try:
+        return kind.decode(body)
+    except DecodeError as error:
+        raise _broken(Code.BAD_BODY, f"{kind.__name__}: {error}") from error
 
 
 def _broken(code: Code, text: str) -> RemoteProtocolError:

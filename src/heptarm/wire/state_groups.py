@@ -24,12 +24,14 @@ class _Layout(NamedTuple):
         parts: by name of a group with a fixed size: a mask of it alone, its begin and its end.
         stamps: time stamps of the groups that have a known place.
         size: of the groups that have a fixed size, with the mask [bytes].
+        least: of a body with these groups [bytes].
         rest: mask of the groups behind them; 0: there are none.
     """
 
     parts: dict[str, tuple[bytes, int, int]]
     stamps: Struct
     size: int
+    least: int
     rest: int
 
 
@@ -46,7 +48,8 @@ def _layout(mask: int) -> _Layout:
             stamps += f"q{end - begin - 8}x"
     rest = mask & ~_FIXED
     is_one = rest > 0 and rest & (rest - 1) == 0
-    return _Layout(parts, Struct(stamps + "q" if is_one else stamps), end, rest)
+    places = Struct(stamps + "q" if is_one else stamps)
+    return _Layout(parts, places, end, max(end, places.size), rest)
 
 
 class StateGroups:
@@ -68,15 +71,14 @@ class StateGroups:
         if len(body) < _MASK.size:
             raise DecodeError(f"a state has at least {_MASK.size} bytes, got {len(body)}")
         layout = _layout(body[0] << 8 | body[1])
-        size = max(layout.size, layout.stamps.size)
-        if len(body) < size or (len(body) > size and not layout.rest):
-            raise DecodeError(f"a state with these groups has {size} bytes, got {len(body)}")
+        if len(body) < layout.least or (len(body) > layout.least and not layout.rest):
+            raise DecodeError(f"a state with these groups has {layout.least} bytes, got {len(body)}")
         self._body, self._layout = body, layout
         self._rest: State | None = None
         stamps = layout.stamps.unpack_from(body)
         if layout.rest and layout.stamps.size == layout.size:  # the place of the last stamp has to be found
             stamps += tuple(group.stamp for group in (self.get("io"), self.get("mode")) if group is not None)
-        self.stamp: int = max(stamps, default=0)
+        self.stamp: int = max(stamps) if stamps else 0
 
     def get(self, name: str) -> Any:
         """The message of a group; None: the state has none of that name.
