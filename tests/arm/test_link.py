@@ -14,6 +14,7 @@ import heptarm as ha
 from heptarm.arm.link.link import Heartbeat
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from heptarm.wire.session import Session
 from tests.arm.peer import Peer
 from tests.arm.standstill import stand_still
 from tests.interrupts import ctrl_c_interrupts
@@ -107,6 +108,20 @@ def test_heartbeats_go_both_directions() -> None:
         with pytest.raises(ha.StaleState):
             _ = arm.state
     peer.close()
+
+
+def test_encoding_a_ping_is_no_part_of_its_round_trip(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise a slow program would believe its states to be older than they are."""
+    encode, seconds = Session.send, 0.01
+
+    def slow(session: Session, message: wire.Message, *, request: int = 0, time: int = 0) -> bytes:
+        if isinstance(message, wire.Ping):
+            threading.Event().wait(seconds)
+        return encode(session, message, request=request, time=time)
+
+    monkeypatch.setattr(Session, "send", slow)
+    with peer.arm() as arm:
+        assert arm.connection.link.offset.uncertainty < 0.5 * seconds
 
 
 def test_a_cabinet_that_ends_reports_it(peer: Peer) -> None:

@@ -674,7 +674,7 @@ class Connection:
         return States(
             self.feed,
             self.clock,
-            build=self.build,
+            build=self.decode if until is None else self.build,
             check=self._stream_error,
             rate=rate,
             duration=duration,

@@ -100,6 +100,7 @@ class DatagramLine:
         self._answered: int | None = None
         self._last_target = clock.nanos() - _STREAMING
         self._targets = self._pings = self._answers = self._states = 0
+        self._ping_left = 0, 0  # the time in the newest ping, and when it left [ns]
         self._copied = 0
         self._round_trips: deque[int] = deque(maxlen=_ROUND_TRIPS)
         self._urgent: dict[int, tuple[Message, int]] = {}
@@ -154,6 +155,12 @@ class DatagramLine:
         now = self._clock.nanos()
         self._socket.send(self._codec.pack(message, time=self._offset.to_cabinet(now), request=request))
 
+    def _ping(self, now: int) -> None:
+        """Send a ping; its round trip begins when it leaves, as in `Link.ping`."""
+        data = self._codec.pack(Ping(sent=now), time=self._offset.to_cabinet(now))
+        self._ping_left = now, self._clock.nanos()
+        self._socket.send(data)
+
     # ---------------------------------------------------------------------------------- receiving
 
     def _run(self) -> None:
@@ -164,7 +171,7 @@ class DatagramLine:
                 now = clock.nanos()
                 if now >= due:
                     self._pings += 1
-                    self._send(Ping(sent=now))
+                    self._ping(now)
                     is_busy = now - self._last_target < _STREAMING
                     due = now + round((_BUSY if is_busy else _IDLE) * 1e9)
                 if self._urgent and now >= again:
@@ -208,8 +215,10 @@ class DatagramLine:
                 pong = Pong.decode(frame.body)
                 self._answers += 1
                 self._answered = now
-                self._round_trips.append(now - pong.sent)
-                self._on_pong(pong.sent, pong.received, now)
+                made, left = self._ping_left
+                sent = left if pong.sent == made else pong.sent
+                self._round_trips.append(now - sent)
+                self._on_pong(sent, pong.received, now)
         except DecodeError:
             self._codec.ignored.damaged += 1
 

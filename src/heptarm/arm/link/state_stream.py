@@ -72,7 +72,6 @@ class StateFeed:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self.newest: StateSample | None = None
-        self._history: deque[StateSample] = deque(maxlen=HISTORY)
         self._kept: deque[StateSample] = deque(maxlen=_KEPT)
         self._changed = threading.Condition()
         self._waiting = 0
@@ -85,9 +84,9 @@ class StateFeed:
 
     def push(self, body: bytes, received: int) -> None:
         """Take a new state; called by the link."""
-        sample = StateSample(self.count + 1, body, received)
+        newest = self.newest
+        sample = StateSample(1 if newest is None else newest.number + 1, body, received)
         self.newest = sample
-        self._history.append(sample)
         kept = self._kept
         kept.append(sample)
         while kept[0].received < received - _KEPT_TIME:
@@ -105,13 +104,12 @@ class StateFeed:
     def abandon(self) -> None:
         """Drop all states in a fork of the process, and the lock, which another thread may hold."""
         self.newest, self._queues = None, ()
-        self._history.clear()
         self._kept.clear()
         self._changed, self._waiting = threading.Condition(), 0
 
     def history(self) -> list[StateSample]:
         """The last samples, oldest first."""
-        return list(self._history)
+        return self.kept()[-HISTORY:]
 
     def kept(self) -> list[StateSample]:
         """The samples of the last 30 s, oldest first."""
@@ -258,8 +256,7 @@ class States(Iterator[State]):
 
     def _received(self) -> StateSample | None:
         """The next sample that was received; None: there is none yet, or the stream is over."""
-        now = self._clock.nanos()
-        if self._queue is None and self._end is not None and now >= self._end:
+        if self._queue is None and self._end is not None and self._clock.nanos() >= self._end:
             self._is_over = True
             return None
         sample = self._next_paced() if self._queue is None else self._next_queued()
