@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.shared_state import NEVER
 from heptarm.sim.seam import SLOTS, HeaderWords, SafetyFlags, StateWords
 from tests.sim.driving import ready
 
@@ -45,6 +46,28 @@ def test_somebody_is_woken_only_when_their_time_has_come() -> None:
     assert woken == [15_000_000]
 
 
+def test_somebody_is_woken_before_the_tick_is_published_and_only_once() -> None:
+    plant = ready()
+    plant.step(10)
+    newest: list[int] = []
+
+    def woken(time: int) -> None:
+        newest.append(int(plant.shared.header[HeaderWords.NEWEST]))
+        plant.shared.header[HeaderWords.WAKE] = NEVER  # as Java does: nobody else waits
+
+    plant.on_wake = woken
+    plant.shared.header[HeaderWords.WAKE] = 11_000_000
+    plant.compute()
+    plant.wake()
+    plant.publish()
+    assert newest == [10]
+    plant.compute()
+    plant.wake()
+    plant.shared.header[HeaderWords.WAKE] = 12_000_000  # somebody comes between the two
+    plant.publish()
+    assert newest == [10, 12]
+
+
 def test_a_reader_never_sees_a_torn_slot_while_the_plant_ticks() -> None:
     plant = ready()
     stop, wrong, read = threading.Event(), [], [0]
@@ -70,6 +93,7 @@ _PACE = """
 import sys, threading, time
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.shared_state import NEVER
 plant = Plant()
 began = []
 def tick():

@@ -68,7 +68,10 @@ def sim(
     ] = 1.0,
     real_time: Annotated[
         RealTime,
-        Parameter(help="Real-time priority: while an FRI session is open (fri), always (on), never (off)."),
+        Parameter(
+            help="Real-time priority: while an FRI session is open (fri), always, and Java compiled for the lowest "
+            "latency (on), never (off)."
+        ),
     ] = "fri",
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     panel: Annotated[

@@ -136,7 +136,8 @@ class SimulatorOptions:
     real_time: str = field(
         default="fri",
         metadata=_about(
-            'real-time priority: "fri": while an FRI session is open; "on": always; "off": never',
+            'real-time priority: "fri": while an FRI session is open; "on": always, and Java compiled for the lowest '
+            'latency; "off": never',
             metavar="fri|on|off",
             in_target=True,
         ),

@@ -57,6 +57,9 @@ public class Oversleeping extends RoboticsAPIApplication {
         long before = clock.sleepUntil(clock.nanos());
         for (int look = 1; look <= 150; look++) {
             long now = clock.sleepUntil(before + STEP);
+            if (now < before + STEP) {
+                throw new IllegalStateException("woken before the tick was published");
+            }
             double place = lbr.getCommandedJointPosition().get(0);
             fastest = Math.max(fastest, Math.abs(place - last) / ((now - before) * 1e-9));
             last = place;

@@ -421,8 +421,14 @@ class Plant:
             self._supervise(self._monitor)
         self._write(progress, remaining)
 
+    def wake(self) -> None:
+        """Wake those that wait for the tick that was computed; they wait until it is published, which follows soon."""
+        time = (self.tick_count + 1) * TICK_NS
+        if self.on_wake is not None and time >= self.shared.header[HeaderWords.WAKE]:
+            self.on_wake(time)
+
     def publish(self) -> None:
-        """Let readers see the state of the tick that was computed, and wake those that wait for it."""
+        """Let readers see the state of the tick that was computed, and wake those that still sleep until it."""
         self.tick_count = k = self.tick_count + 1
         if self._native is not None:
             is_awaited = self._native.publish(k)

@@ -136,7 +136,7 @@ class VirtualCabinet:
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
-        jvm.start(options.classpath, foreign=self.is_foreign)
+        jvm.start(options.classpath, foreign=self.is_foreign, optimised=options.real_time == "on")
         import jpype
 
         self._system = jpype.JClass("java.lang.System")
@@ -196,6 +196,7 @@ class VirtualCabinet:
         self.sessions.tick()
         self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
         self.plant.compute()
+        self.plant.wake()  # to wake a thread takes about as long as is left
         self.loop.wait_until_due()
         self.plant.publish()
         if self._trace is not None:

@@ -23,6 +23,7 @@ import gc
 import os
 import sys
 import time
+from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -180,8 +181,9 @@ class RealtimeLoop:
         self._speed = speed
         self.answer_gap = 0.0
         self._stop = False
-        self._cost = np.zeros(_HISTORY, dtype=np.int64)
-        self._late = np.zeros(_HISTORY, dtype=np.int64)
+        # no arrays of numpy: between two ticks the caches get cold, and writing into these needs less code
+        self._cost = array("q", bytes(8 * _HISTORY))
+        self._late = array("q", bytes(8 * _HISTORY))
         self._count = 0
         self._rebased = 0
         self._refused: list[str] = []
@@ -309,8 +311,8 @@ class RealtimeLoop:
             self._rested,
             self._rebased,
             list(self._refused),
-            _percentiles(self._late[:size]),
-            _percentiles(self._cost[:size]),
+            _percentiles(np.array(self._late[:size])),
+            _percentiles(np.array(self._cost[:size])),
         )
 
 

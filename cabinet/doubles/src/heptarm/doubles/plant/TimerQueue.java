@@ -27,6 +27,9 @@ public final class TimerQueue {
 
     /** A state is at most so many ticks old at rest: the clocks of the threads run ahead of it no further than that. */
     private static final int STRIDE = 20;
+    /** How long a thread spins for a tick that is about to be published, and how long it sleeps at a time after that. */
+    private static final long SPIN_NS = 100000L;
+    private static final long PAUSE_NS = 50000L;
 
     private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
@@ -82,7 +85,7 @@ public final class TimerQueue {
         LockSupport.unpark(resting);
     }
 
-    /** Called by the realtime thread of the plant after a tick. */
+    /** Called by the realtime thread of the plant after a tick, or shortly before that: see {@link #awaitTick}. */
     public synchronized void tick(long nanos) {
         Iterator<Sleeper> all = sleepers.iterator();
         while (all.hasNext()) {
@@ -126,6 +129,22 @@ public final class TimerQueue {
         }
         if (!own.awake) {
             remove(own);
+        }
+        awaitTick(nanos);
+    }
+
+    /** Waits for a tick that is about to be published: the plant wakes the sleepers before, since waking takes a while, too. */
+    private void awaitTick(long nanos) throws InterruptedException {
+        long began = System.nanoTime();
+        while (sharedState.newest() * Seam.TICK_NS < nanos) {
+            if (System.nanoTime() - began < SPIN_NS) {
+                Thread.onSpinWait();
+            } else {
+                LockSupport.parkNanos(this, PAUSE_NS); // the plant's thread was interrupted
+            }
+            if (Thread.interrupted()) {
+                throw new InterruptedException();
+            }
         }
     }
 
