@@ -23,6 +23,8 @@ from heptarm.values.robot import ROBOTS
 
 #: Of states over all blocks of a placement, and of their floor; fewer are for a quick check.
 SECONDS = float(os.environ.get("BENCH_SECONDS", "60")) / 2
+#: Java's optimising compiler is busy for so long with what is called a thousand times a second [s].
+WARM_UP = 12.0
 #: Largest ratio of a state's age to the bare path's, of the median and of the 99th percentile.
 LIMIT = 1.6
 #: Bytes of a state's frame, header included.
@@ -77,13 +79,15 @@ def state_push() -> Iterator[Figure]:
             ha.ptp(ha.deg(30, 40, 10, -70, 20, 60, 30)),
             ha.ptp(ha.deg(-30, 20, -10, -100, -20, 50, -30)),
         )
-        arm.start([there, back] * int(8 * SECONDS + 20))  # longer than the run; closing stops it
+        arm.start([there, back] * int(8 * SECONDS + 30))  # longer than the run; closing stops it
         states, current = States(arm, seconds), [frozenset({0})]
 
         def place(placement: Placement) -> None:
             pin(cabinet.process.pid, placement.far)
             current[0] = placement.far
 
+        for _ in arm.states(duration=WARM_UP):
+            pass
         found = by_turns(states.block, lambda: bare(program, round(seconds * 1000), current[0]), place)
         stats = cabinet.stats()
     noisy = any(one.is_noisy for comparison in found for one in comparison.noise)
