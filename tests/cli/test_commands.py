@@ -44,6 +44,17 @@ def test_help_names_every_command() -> None:
         assert command in text
 
 
+def test_the_package_runs_as_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "heptarm", "move", "--help"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout.startswith("Usage: heptarm move")
+
+
 def test_help_imports_no_command() -> None:
     listing = (
         "import sys\n"
