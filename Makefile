@@ -91,7 +91,7 @@ test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searc
 	@$(MAKE) --no-print-directory conformance
 	@$(MAKE) --no-print-directory test-pythons
 
-test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 3.13; PYTHONS="3.10 3.12" selects
+test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 3.13, and with the oldest packages; PYTHONS="3.10 lowest" selects
 	scripts/test_pythons.sh $(PYTHONS)
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Tests the package with each Python that this machine has. Usage: scripts/test_pythons.sh [3.10 3.11 ...]
+# Tests the package with each Python that this machine has. Usage: scripts/test_pythons.sh [3.10 3.11 ... lowest]
 #
+# `lowest` is the first of them with the oldest packages that pyproject.toml allows, as far as there are wheels of them.
 # Each gets a virtual environment in build/python with the package, its simulator, its recordings and pytest, and nothing else of
 # the developers'.
 set -eu
@@ -18,17 +19,30 @@ python_of() { # the path of a working Python of this version
     return 1
 }
 
+first() { # the path of the oldest Python
+    for version in 3.10 3.11 3.12 3.13; do
+        python_of "$version" && return 0
+    done
+    return 1
+}
+
 found=0
-for version in ${*:-3.10 3.11 3.12 3.13}; do
-    if ! python=$(python_of "$version"); then
+for version in ${*:-3.10 3.11 3.12 3.13 lowest}; do
+    if [ "$version" = lowest ]; then
+        python=$(first) || continue
+    elif ! python=$(python_of "$version"); then
         echo "Python $version: not on this machine"
         continue
     fi
     found=$((found + 1))
     venv=build/python/$version
     [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
-    "$venv/bin/python" -m pip install -q --disable-pip-version-check -e ".[sim,record]" "pytest>=8" "pytest-timeout>=2.3" \
-        "hypothesis>=6.100"
+    pip="$venv/bin/python -m pip install -q --disable-pip-version-check"
+    if [ "$version" = lowest ]; then
+        $pip uv
+        pip="$venv/bin/uv pip install -q --python $venv/bin/python --resolution lowest-direct --only-binary :all:"
+    fi
+    $pip -e ".[sim,record]" "pytest>=8" "pytest-timeout>=2.3" "hypothesis>=6.100"
     echo "Python $version: $("$venv/bin/python" --version)"
     # shellcheck disable=SC2086
     "$venv/bin/python" -m pytest -q -m "not slow and not long and not alone and not browser" $TESTS

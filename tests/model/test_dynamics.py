@@ -55,7 +55,7 @@ def test_that_of_mujoco(robot: RobotModel, load: Body | None) -> None:
         q, dq, ddq = random_q(robot, rng), rng.normal(size=7), rng.normal(size=7)
         data.qpos[:7], data.qvel[:7], data.qacc[:7] = q, dq, ddq
         mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, full, data.qM) if hasattr(data, "qM") else mujoco.mj_fullM(model, data, full)
+        mujoco.mj_fullM(model, data, full)
         assert np.abs(mass_matrix(robot, q, load=load) - full[:7, :7]).max() < 1e-12
         bias = coriolis(robot, q, dq, load=load) + gravity(robot, q, load=load)
         assert np.abs(bias - data.qfrc_bias[:7]).max() < 1e-11
