@@ -366,7 +366,8 @@ def soak(seconds: float, *, seed: int = 1, folder: Path | None = None) -> Verdic
             lines.write(json.dumps(asdict(sample)) + "\n")
             lines.flush()
 
-    with Cabinet() as cabinet:
+    # as `heptarm sim` starts it: with "on" Java compiles for some minutes, and its memory grows meanwhile
+    with Cabinet(real_time="fri") as cabinet:
         verdict = Soak(cabinet, seed=seed, write=write).run(seconds)
     if folder is not None and lines is not None:
         lines.close()
