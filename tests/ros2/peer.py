@@ -233,11 +233,15 @@ class Ros:
             others = (one for one in near if one.endswith("/get_parameters"))  # with a name of another driver
             return next((one for one in nodes if one in there), "") or next(others, "")
 
-        service = until(parameters, f"no node with {name} is there")
-        probe = self.do(self.node.create_client, GetParameters, service)
-        until(probe.service_is_ready, f"there is no service {service}")
+        service, probe = "", None
         deadline = time.monotonic() + PATIENCE
         while time.monotonic() < deadline:
+            found = until(parameters, f"no node with {name} is there")
+            # the first one found may have ended: its name stays for a while
+            if probe is None or found != service:
+                if probe is not None:
+                    self.do(self.node.destroy_client, probe)
+                service, probe = found, self.do(self.node.create_client, GetParameters, found)
             asked = probe.call_async(GetParameters.Request())
             try:
                 self.wait(asked, "no answer", timeout=1.0)
