@@ -55,6 +55,17 @@ def test_from_rest_the_motion_frame_goes_straight_and_turns_in_step() -> None:
     assert np.abs(fraction - turned).max() < 1e-6
 
 
+@pytest.mark.parametrize("tick", [100, 200, 300])
+def test_a_target_that_comes_again_while_the_acceleration_has_a_kink_changes_nothing(tick: int) -> None:
+    plant, _, start = serving()
+    goal = Pose.of(start.xyz + [0.0, 0.08, -0.06], start.quat) @ Pose.xyz_abc(0, 0, 0, 0.2, 0, 0)
+    plant.shared.post(7, goal.array)
+    before, _ = places(plant, tick)
+    plant.shared.post(7, goal.array)
+    after, _ = places(plant, 100)
+    assert beside(np.concatenate([before, after]), start.xyz, goal.xyz) < 1e-6
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_limits_hold_along_each_axis_of_the_chosen_frame(turned: bool) -> None:
     axes = Pose.xyz_abc(0, 0, 0, 0.6, 0.3, 0.0)

@@ -263,8 +263,11 @@ class StraightFollower:
             return self._place, np.zeros(3), np.zeros(6), np.zeros(6)
         time = self._otg.time
         x, v, a = self._otg.at(time)
-        low, high = max(0.0, time - _STEP), time + _STEP
-        change = (self._spin(high) - self._spin(low)) / (high - low)
+        if np.abs(np.cross(x[3:], v[3:])).max() < _TINY and np.abs(np.cross(x[3:], a[3:])).max() < _TINY:
+            change = np.array(a[3:])  # about one axis; exact also where the acceleration has a kink
+        else:
+            low, high = max(0.0, time - _STEP), time + _STEP
+            change = (self._spin(high) - self._spin(low)) / (high - low)
         return (
             x[:3],
             x[3:],
