@@ -93,7 +93,6 @@ _PACE = """
 import sys, threading, time
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.shared_state import NEVER
 plant = Plant()
 began = []
 def tick():
