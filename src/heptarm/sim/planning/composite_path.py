@@ -5,17 +5,18 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import lru_cache
-from math import inf
+from itertools import pairwise
+from math import inf, sqrt
 
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model.kinematics import forward
+from heptarm.model.batch import forward_batch
 from heptarm.sim.planning.command import PlanError
 from heptarm.sim.planning.path import JointPath
 from heptarm.sim.planning.time_scaling import PathConstraints
 from heptarm.values.arrays import Array
-from heptarm.values.pose import Pose, quaternion
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
 #: A larger step between two samples is a jump to another branch of the inverse kinematics [rad].
@@ -137,12 +138,12 @@ class PathSamples:
     Attributes:
         q: of each segment, shapes (n, 7) [rad].
         positions: of the tool frame, shapes (n, 3) [m].
-        orientations: of the flange, quaternions, shapes (n, 4).
+        rotations: of the flange, matrices, shapes (n, 3, 3).
     """
 
     q: list[Array]
     positions: list[Array]
-    orientations: list[Array]
+    rotations: list[Array]
 
 
 def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> PathSamples:
@@ -152,33 +153,51 @@ def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> P
         PlanError: it leaves the workspace, or passes a singularity.
     """
     result, near = PathSamples([], [], []), start
-    for index, segment in enumerate(path.segments):
-        low, high = path.marks[index], path.marks[index + 1]
-        joints = []
-        for k in range(segment.samples):
-            fraction = k / (segment.samples - 1)
-            percent = 100 * (low + (high - low) * fraction)
-            try:
-                q = segment.path.at(fraction, near)
-            except Unreachable as error:
-                raise PlanError(
-                    "unreachable",
-                    f"Can not plan motion: the path is not reachable at {percent:.0f} %: {error.text}",
-                ) from None
-            step = np.abs(q - near)
-            if step.max() > LARGEST_STEP:
-                raise PlanError(
-                    "planning",
-                    f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {percent:.0f} % of the path "
-                    "(singularity)",
-                )
-            near = q
-            joints.append(q)
-        frames = np.array([forward(robot, q) for q in joints])
-        result.q.append(np.array(joints))
+    for segment, span in zip(path.segments, pairwise(path.marks), strict=True):
+        fractions = np.linspace(0.0, 1.0, segment.samples)
+        if segment.path.is_direct:
+            joints = segment.path.row(fractions)
+        else:
+            joints = _followed(segment.path, near, fractions, span)
+        near = joints[-1]
+        frames = forward_batch(robot, joints)
+        result.q.append(joints)
         result.positions.append(frames[:, :3, :3] @ tcp.xyz + frames[:, :3, 3])
-        result.orientations.append(np.array([quaternion(frame[:3, :3]) for frame in frames]))
+        result.rotations.append(frames[:, :3, :3])
     return result
+
+
+def _followed(path: JointPath, near: Array, fractions: Array, span: tuple[float, float]) -> Array:
+    """Joint positions at fractions of a segment, each next to the one before, shape (n, 7) [rad].
+
+    Args:
+        path: of the segment.
+        near: joint positions at its start, shape (7,) [rad].
+        fractions: of it, shape (n,).
+        span: s at which it begins and ends.
+
+    Raises:
+        PlanError: see `sample`.
+    """
+    joints = np.empty((len(fractions), 7))
+    for index, fraction in enumerate(fractions.tolist()):
+        percent = 100 * (span[0] + (span[1] - span[0]) * fraction)
+        try:
+            joints[index] = path.at(fraction, near)
+        except Unreachable as error:
+            raise PlanError(
+                "unreachable",
+                f"Can not plan motion: the path is not reachable at {percent:.0f} %: {error.text}",
+            ) from None
+        step = np.abs(joints[index] - near)
+        if step.max() > LARGEST_STEP:
+            raise PlanError(
+                "planning",
+                f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {percent:.0f} % of the path "
+                "(singularity)",
+            )
+        near = joints[index]
+    return joints
 
 
 def constraints(
@@ -191,7 +210,7 @@ def constraints(
         segment, low = path.segments[index], path.marks[index]
         n, span = segment.samples, path.marks[index + 1] - path.marks[index]
         step = span / (n - 1)
-        positions, turned = samples.positions[index], _turned(samples.orientations[index])
+        positions, turned = samples.positions[index], _turned(samples.rotations[index])
         length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
         values = np.column_stack([samples.q[index], positions, length, turned])
         slopes = [matrix @ values / step**k for k, matrix in enumerate(_derivatives(n), start=1)]
@@ -225,8 +244,16 @@ def _derivatives(count: int) -> tuple[Array, Array, Array]:
     return result[0], result[1], result[2]
 
 
-def _turned(quats: Array) -> Array:
-    """Angle turned by since the first of n quaternions, shape (n,) [rad]."""
-    signs = np.where(np.einsum("ij,ij->i", quats[1:], quats[:-1]) < 0, -1.0, 1.0)
-    chords = np.linalg.norm(quats[1:] * signs[:, None] - quats[:-1], axis=1)
-    return np.concatenate([[0.0], np.cumsum(4 * np.arcsin(np.minimum(1.0, chords / 2)))])
+def turns(rotations: Array, others: Array) -> Array:
+    """Angles of n rotations to others, shapes (n, 3, 3) or broadcast to that; shape (n,) [rad].
+
+    The norm of the difference of two rotation matrices is √8 times the sine of half the angle.
+    """
+    chords = np.linalg.norm(rotations - others, axis=(-2, -1))
+    angles: Array = 2.0 * np.arcsin(np.minimum(1.0, chords / sqrt(8.0)))
+    return angles
+
+
+def _turned(rotations: Array) -> Array:
+    """Angle turned by since the first of n rotations, shape (n,) [rad]."""
+    return np.concatenate([[0.0], np.cumsum(turns(rotations[1:], rotations[:-1]))])

@@ -16,6 +16,7 @@ from heptarm.sim.planning.composite_path import (
     SegmentLimits,
     SubPath,
     sample,
+    turns,
 )
 from heptarm.sim.planning.geometry import Geometry, Quat, blend_weight, product
 from heptarm.sim.planning.path import CartesianPath, JointLine, JointPath, Sequential
@@ -88,23 +89,23 @@ class GeometryBlend:
 
 
 def blending_zone(
-    positions: Array, orientations: Array, blending: tuple[float, float, float], *, backwards: bool
+    positions: Array, rotations: Array, blending: tuple[float, float, float], *, backwards: bool
 ) -> float:
     """Fraction of a path that a blending allows at one of its ends.
 
     Args:
         positions: of the tool frame at even samples, shape (n, 3) [m].
-        orientations: likewise, shape (n, 4).
+        rotations: likewise, shape (n, 3, 3).
         blending: fraction of the path, distance [m], rotation [rad]; zeros do not count.
         backwards: at its end.
     """
     relative, distance, turn = blending
     if backwards:
-        positions, orientations = positions[::-1], orientations[::-1]
+        positions, rotations = positions[::-1], rotations[::-1]
     fractions = [relative] if relative > 0 else []
     for most, distances in (
         (distance, np.linalg.norm(positions - positions[0], axis=1)),
-        (turn, 2 * np.arccos(np.minimum(1.0, np.abs(orientations @ orientations[0])))),
+        (turn, turns(rotations, rotations[0])),
     ):
         if most > 0:
             beyond = np.flatnonzero(distances > most)
@@ -140,7 +141,7 @@ class _Motion:
         speed_limit: what it allows as a fraction of the programmed speed.
         end: joint positions at its end, shape (7,) [rad].
         positions: of the tool frame, shape (n, 3) [m]; empty where the motion is alone.
-        orientations: likewise, shape (n, 4).
+        rotations: likewise, shape (n, 3, 3).
         begin: fraction that the blend at its beginning takes.
         finish: fraction that the blend at its end takes.
     """
@@ -151,7 +152,7 @@ class _Motion:
     speed_limit: float
     end: Array
     positions: Array
-    orientations: Array
+    rotations: Array
     begin: float = 0.0
     finish: float = 0.0
 
@@ -202,7 +203,7 @@ def _motion(robot: RobotModel, order: Order, start: Array, *, is_alone: bool) ->
         raise PlanError(
             "planning", f"Can not plan motion: a batch cannot have a motion of kind {order.kind!r}"
         )
-    limits, nothing = segment_limits(order), (np.zeros((0, 3)), np.zeros((0, 4)))
+    limits, nothing = segment_limits(order), (np.zeros((0, 3)), np.zeros((0, 3, 3)))
     if is_still:
         return _Motion(None, 0.0, limits, 1.0, end, *nothing)
     # where only the elbow moves, the joints' limits alone count
@@ -211,16 +212,16 @@ def _motion(robot: RobotModel, order: Order, start: Array, *, is_alone: bool) ->
         return _Motion(path, time, limits, speed_limit, end, *nothing)
     segment = Segment(path, 1.0, limits, samples=_ZONE_SAMPLES)
     samples = sample(robot, CompositePath([segment]), start, Pose.of(order.tcp[:3], order.tcp[3:]))
-    (q,), (positions,), (orientations,) = samples.q, samples.positions, samples.orientations
-    return _Motion(path, time, limits, speed_limit, q[-1], positions, orientations)
+    (q,), (positions,), (rotations,) = samples.q, samples.positions, samples.rotations
+    return _Motion(path, time, limits, speed_limit, q[-1], positions, rotations)
 
 
 def _blend_ends(before: _Motion, after: _Motion, blending: tuple[float, float, float]) -> None:
     """Give the blend of two motions a fraction of both, equally long at programmed speed."""
     if before.path is None or after.path is None or not any(blending):
         return
-    one = blending_zone(before.positions, before.orientations, blending, backwards=True)
-    other = blending_zone(after.positions, after.orientations, blending, backwards=False)
+    one = blending_zone(before.positions, before.rotations, blending, backwards=True)
+    other = blending_zone(after.positions, after.rotations, blending, backwards=False)
     most = min(before.time * min(one, 1.0 - before.begin), after.time * min(other, _HALF))
     if most >= _SHORTEST:
         before.finish, after.begin = most / before.time, most / after.time
