@@ -196,8 +196,7 @@ class VirtualCabinet:
         self.sessions.tick()
         self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
         self.plant.compute()
-        self.plant.wake()  # to wake a thread takes about as long as is left
-        self.loop.wait_until_due()
+        self.loop.wait_until_due(self.plant.wake)
         self.plant.publish()
         if self._trace is not None:
             self._trace.append()
