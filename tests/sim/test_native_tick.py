@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import mujoco
 import numpy as np
 import pytest
 
 from heptarm.io.compiled import SWITCH, Unavailable
+from heptarm.sim.planning.command import Order
 from heptarm.sim.planning.native_inverse import inverse_library
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
@@ -71,3 +73,37 @@ def test_a_robot_that_cannot_compile_computes_in_python(monkeypatch: pytest.Monk
         plant = Plant("iiwa7", q=READY)
         plant.step(5)
     assert plant.shared.read(5) is not None
+
+
+def test_a_motion_in_position_control_is_computed_in_c_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = Plant("iiwa14", q=READY)
+    plant.submit(Order(1, "ptp", joints=tuple(q + 0.1 for q in READY)))
+    with monkeypatch.context() as patched:
+        for name in ("mj_step1", "mj_step2", "mj_step"):
+            patched.setattr(mujoco, name, _refuse)
+        plant.step(300)
+        here = plant.snapshot.q
+        assert np.abs(here - READY).min() > 1e-3
+        plant.apply_wrench((0.0, 0.0, -10.0))
+        with pytest.raises(_RefusedError):  # what pushes is known to Python alone
+            plant.step()
+
+
+class _RefusedError(Exception):
+    """A function of MuJoCo was called from Python."""
+
+
+def _refuse(*_: object) -> None:
+    raise _RefusedError
+
+
+def test_a_force_on_a_body_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = Plant("iiwa14", q=READY)
+    plant.step(5)
+    body = mujoco.mj_name2id(plant.model, mujoco.mjtObj.mjOBJ_BODY, "link_7")
+    plant.data.xfrc_applied[body, 2] = -10.0  # as a viewer's mouse pulls
+    plant.step(100)
+    assert plant.snapshot.wrench[2] == pytest.approx(-10.0, abs=0.1)
+    plant.data.xfrc_applied[body, 2] = 0.0
+    plant.step(2)
+    assert not plant.snapshot.wrench.any()

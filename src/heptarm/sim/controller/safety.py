@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from enum import Enum
 
-from heptarm.sim.seam import OperationMode
+from heptarm.sim.seam import OperationMode, SafetyFlags
 
 
 class StopRequest(Enum):
@@ -22,6 +22,16 @@ class StopRequest(Enum):
     DRIVE_ERROR = "drive_error"  # the drives are off until the error is acknowledged
 
 
+#: Flag of each stop request beside `SafetyFlags.PROTECTIVE_STOP`, which all of them set.
+_FLAGS = {
+    StopRequest.EMERGENCY_STOP: SafetyFlags.EMERGENCY_STOP,
+    StopRequest.EXTERNAL_EMERGENCY_STOP: SafetyFlags.EXTERNAL_STOP,
+    StopRequest.OPERATOR_SAFETY: SafetyFlags.SAFEGUARD_OPEN,
+    StopRequest.PROTECTIVE_STOP: SafetyFlags.PROTECTIVE_STOP,
+    StopRequest.DRIVE_ERROR: SafetyFlags.DRIVE_ERROR,
+}
+
+
 class SafetyController:
     """State of the safety controller.
 
@@ -30,6 +40,7 @@ class SafetyController:
         manual: override at the smartPAD, a factor on every speed, 0 to 1.
         stop_requested: a stop is requested now.
         latched: execution is held by a stop that is or was requested.
+        flags: of `SafetyFlags` those that the safety controller decides about, as a plain integer for the tick.
     """
 
     def __init__(self) -> None:
@@ -41,6 +52,7 @@ class SafetyController:
         self._guides = False
         self._requests: frozenset[StopRequest] = frozenset()
         self._lock = threading.Lock()
+        self._settle()
 
     @property
     def stop_requests(self) -> frozenset[StopRequest]:
@@ -111,6 +123,15 @@ class SafetyController:
             self.latched = self.stop_requested
 
     def _settle(self) -> None:
-        """Update the stop state; called with the lock held."""
+        """Update stop state and flags; called with the lock held."""
         self.stop_requested = bool(self._requests) or self.lacks_enabling
         self.latched = self.latched or self.stop_requested
+        flags = SafetyFlags.MASTERED
+        if self._enabled:
+            flags |= SafetyFlags.ENABLED
+        if self._guides:
+            flags |= SafetyFlags.HAND_GUIDING
+        flags |= SafetyFlags.PROTECTIVE_STOP if self.stop_requested else SafetyFlags.READY
+        for request in self._requests:
+            flags |= _FLAGS[request]
+        self.flags = int(flags)

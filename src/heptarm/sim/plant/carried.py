@@ -28,6 +28,8 @@ _MOUNTED = "mounted"
 _SLOTS = tuple(f"{_MOUNTED}/{index}" for index in range(2 * MOST_SHAPES))
 #: Contact types of a shape that is mounted, as those of the links.
 _MEETS_ALL = 1
+#: MuJoCo's flag that it does not search trees of the shapes of a body for those that are near others.
+NO_TREES = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
 #: MuJoCo's kind of each kind of shape.
 GEOMS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -106,6 +108,7 @@ class FlangeShapes:
         self._body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, _MOUNTED)
         found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name) for name in _SLOTS]
         self._slots = [geom for geom in found if geom >= 0]
+        self._disabled = int(model.opt.disableflags)
 
     def mount(self, bodies: Sequence[CarriedShapes]) -> None:
         """Replace what is mounted; it collides from the next tick on.
@@ -113,13 +116,12 @@ class FlangeShapes:
         The trees with which MuJoCo finds near shapes within a body are made when a model is compiled, without the
         shapes that are mounted later. So the search by trees is off while something is mounted.
         """
-        model, midphase = self._model, int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+        model, disabled = self._model, self._disabled
         if not self._slots:
             return
         shapes = [(one, body.pose @ one.pose) for body in bodies for one in body.shapes]
         model.geom_contype[self._slots] = model.geom_conaffinity[self._slots] = 0
         model.body_contype[self._body] = model.body_conaffinity[self._body] = _MEETS_ALL if shapes else 0
-        model.opt.disableflags &= ~midphase
         for geom, (one, pose) in zip(self._slots, shapes):
             half = _half_extents(one.kind, one.size)
             model.geom_type[geom] = GEOMS[one.kind]
@@ -129,8 +131,7 @@ class FlangeShapes:
             model.geom_aabb[geom] = (0.0, 0.0, 0.0, *half)
             model.geom_rbound[geom] = _radius(one.kind, half)
             model.geom_contype[geom] = model.geom_conaffinity[geom] = _MEETS_ALL
-        if shapes:
-            model.opt.disableflags |= midphase
+        model.opt.disableflags = disabled | NO_TREES if shapes else disabled
 
 
 def _half_extents(kind: ShapeKind, size: Array) -> Array:

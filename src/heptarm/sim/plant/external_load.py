@@ -40,8 +40,12 @@ class ExternalLoad:
         self.is_misjudged = False
         self.torque = np.zeros(7)
         self.wrench = np.zeros(6)
-        self._has_wrench = False
         self._jacobian = np.zeros((6, 7))
+
+    @property
+    def is_pushed(self) -> bool:
+        """Whether a push has to be applied, or ended, in the next tick."""
+        return self._push is not None
 
     def push(self, wrench: Array, until: float) -> None:
         """Push the flange with a force and a torque, base axes, shape (6,), until a plant time [s]."""
@@ -71,11 +75,8 @@ class ExternalLoad:
     def resolve(self, *, is_loaded: bool) -> None:
         """The wrench of the torques; zero without any load."""
         if not (is_loaded and self.torque.any()):
-            if self._has_wrench:
-                self.wrench[:] = 0.0
-                self._has_wrench = False
+            self.wrench[:] = 0.0
             return
-        self._has_wrench = True
         mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
         self._jacobian[:3], self._jacobian[3:] = self._jp[:, :7], self._jr[:, :7]
         j = self._jacobian

@@ -1,6 +1,6 @@
 /* The arithmetic of a tick of the plant in C. The Python modules are the reference: heptarm.sim.control.laws,
    heptarm.sim.plant.plant, heptarm.sim.plant.external_load and heptarm.sim.plant.drive_monitor. This file does the same; sums of
-   products may differ from numpy's in their rounding.
+   products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
 
    The constants, and `struct tick`, whose members all have eight bytes, come from heptarm.sim.plant.native. */
 #include <math.h>
@@ -19,21 +19,33 @@ static double row(const struct tick *t, int index, const double *vector) {
 
 word ht_size(void) { return sizeof(struct tick); }
 
-/* Torques of the motors in position control, to the actuators: `PositionLaw.torque` without preload. */
-void ht_command(struct tick *t) {
+/* Accelerations that the set-points ask for, and how much faster than the arm they are. */
+static void aim(const struct tick *t, double *slip, double *acceleration) {
     const double *before = t->points, *now = before + AXES, *after = now + AXES;
-    double slip[AXES], acceleration[AXES];
     for (int i = 0; i < AXES; i++) {
         slip[i] = (after[i] - before[i]) * 500.0 - t->dq[i];
         acceleration[i] = (after[i] - 2.0 * now[i] + before[i]) * 1e6 + t->mass_damping * slip[i];
     }
+}
+
+/* Torques of the motors, to the actuators; inertial: inertia matrix times the accelerations. */
+static void drive(struct tick *t, const double *slip, const double *inertial) {
+    const double *now = t->points + AXES;
     for (int i = 0; i < AXES; i++) {
-        double torque = row(t, i, acceleration) + t->bias[i] - t->passive[i];
+        double torque = inertial[i] + t->bias[i] - t->passive[i];
         torque += t->stiffness[i] * (now[i] - t->q[i] + t->stiffness_damping * slip[i]);
         if (torque > t->most[i]) torque = t->most[i];
         if (torque < -t->most[i]) torque = -t->most[i];
         t->torque[i] = t->tau_cmd[i] = t->actuators[i] = torque;
     }
+}
+
+/* Position control: `PositionLaw.torque` without preload. */
+void ht_command(struct tick *t) {
+    double slip[AXES], acceleration[AXES], inertial[AXES];
+    aim(t, slip, acceleration);
+    for (int i = 0; i < AXES; i++) inertial[i] = row(t, i, acceleration);
+    drive(t, slip, inertial);
 }
 
 /* What the torque sensors show and what acts from outside, after the dynamics. Returns LOADED if there is such a load. */
@@ -136,7 +148,7 @@ static int posture(const struct tick *t, const double *q, double *e1, word *stat
 
 /* Write a state into its slot of the shared memory; `ht_publish` has to follow. Returns ASK if the arm angle has to be
    computed elsewhere: then nothing is written before the next call with that angle in `e1` and `has_e1` set. */
-word ht_write(struct tick *t, word tick, word flags, word mode, word order, double progress, double remaining) {
+word ht_write(struct tick *t, word tick, double progress, double remaining) {
     const double *q = t->shown;
     word *words = t->memory + STATES + tick % SLOTS * SIZE;
     double *reals = (double *)words, angle;
@@ -157,9 +169,9 @@ word ht_write(struct tick *t, word tick, word flags, word mode, word order, doub
     copy(reals + TAU_CMD, t->tau_cmd, AXES);
     copy(reals + WRENCH, t->wrench, 6);
     flange(t, q, reals + POSE);
-    words[FLAGS] = flags;
-    words[MODE] = mode;
-    words[ORDER] = order;
+    words[FLAGS] = t->flags;
+    words[MODE] = t->mode;
+    words[ORDER] = t->order;
     reals[PROGRESS] = progress;
     reals[REMAINING] = remaining;
     reals[E1] = angle;
@@ -167,6 +179,24 @@ word ht_write(struct tick *t, word tick, word flags, word mode, word order, doub
     for (int i = 0; i < AXES; i++) turns |= (word)(q[i] < 0.0) << i;
     words[TURN] = turns;
     return 0;
+}
+
+/* A tick in position control of an arm that nothing pushes, whose load data are true: `Plant.compute` after its set-point.
+   Returns 0 if it is complete, or what is left: ELSEWHERE: all of it; LOADED: from the wrench on; STRAINED: from the
+   supervision of the drives on; ASK: the state. */
+word ht_tick(struct tick *t, word tick, double progress, double remaining) {
+    double slip[AXES];
+    for (word i = 0; i < t->pulls; i++)
+        if (t->pulled[i] != 0.0) return ELSEWHERE;
+    t->step1(t->model, t->data);
+    aim(t, slip, t->vector);
+    t->multiply(t->model, t->data, t->product, t->vector);
+    drive(t, slip, t->product);
+    t->step2(t->model, t->data);
+    if (ht_sense(t)) return LOADED;
+    for (int i = 0; i < 6; i++) t->wrench[i] = 0.0;
+    if (t->ranges && ht_strained(t, 1)) return STRAINED;
+    return ht_write(t, tick, progress, remaining);
 }
 
 /* Let readers see the state that was written last. Returns whether one of them waits for it. */

@@ -12,18 +12,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from heptarm.io.compiled import Unavailable, compiled_library
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
+from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
 AXES = 7
-#: What the functions return.
-LOADED, ASK = 1, 1
+#: What the functions return; nothing is left to do after 0.
+LOADED, ASK, STRAINED, ELSEWHERE = 1, 2, 3, 4
 
 _SOURCE = Path(__file__).with_name("native.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
@@ -38,12 +40,17 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ),
     # what a tick computes
     ("reals", 0, "torque tau_cmd tau load wrench"),
-    ("word", 0, "stride pulls is_misjudged has_e1"),
+    ("word", 0, "stride pulls is_misjudged has_e1 flags mode order"),
     ("real", 0, "d_bs d_se d_ew d_wf straight on_axis mass_damping stiffness_damping e1"),
     ("real", AXES, "stiffness most"),
     ("real", 3 * AXES, "points"),
+    # MuJoCo's model and state, its functions, and vectors of all its degrees of freedom for them
+    ("address", 0, "model data"),
+    ("step", 0, "step1 step2"),
+    ("product", 0, "multiply"),
+    ("reals", 0, "vector product"),
 )
-_TYPES: dict[str, Any] = {"words": _POINTER, "reals": _POINTER, "word": _WORD, "real": _REAL}
+_TYPES: dict[str, Any] = {"word": _WORD, "real": _REAL}
 _WORDS = "SEQ TIME FLAGS MODE ORDER PROGRESS REMAINING E1 STATUS TURN"
 _SLICES = "Q Q_CMD DQ TAU TAU_EXT TAU_CMD POSE WRENCH"
 
@@ -52,7 +59,7 @@ class _Memory(ctypes.Structure):
     """`struct tick` of native.c."""
 
     _fields_ = tuple(
-        (name, _TYPES[kind] * size if size else _TYPES[kind])
+        (name, _TYPES[kind] * size if size else _TYPES.get(kind, _POINTER))
         for kind, size, names in STRUCT
         for name in names.split()
     )
@@ -64,6 +71,8 @@ def _header() -> str:
         "AXES": AXES,
         "LOADED": LOADED,
         "ASK": ASK,
+        "STRAINED": STRAINED,
+        "ELSEWHERE": ELSEWHERE,
         "SLOTS": SLOTS,
         "TICK_NS": TICK_NS,
         "HEADER": HeaderWords.SECTION.start,
@@ -74,13 +83,15 @@ def _header() -> str:
         **{name: getattr(StateWords, name) for name in _WORDS.split()},
         **{name: getattr(StateWords, name).start for name in _SLICES.split()},
     }
-    types = {"words": "word *", "reals": "double *", "word": "word ", "real": "double "}
+    types = {"words": "word *", "reals": "double *", "word": "word ", "real": "double ", "address": "void *"}
+    types |= {"step": "step *", "product": "product *"}
     members = [
         f"    {types[kind]}{name}{f'[{size}]' if size else ''};"
         for kind, size, names in STRUCT
         for name in names.split()
     ]
-    lines = ["#include <stdint.h>", "typedef int64_t word;"]
+    lines = ["#include <stdint.h>", "typedef int64_t word;", "typedef void step(const void *, void *);"]
+    lines += ["typedef void product(const void *, const void *, double *, const double *);"]
     lines += [f"enum {{ {name} = {value} }};" for name, value in constants.items()]
     return "\n".join([*lines, "struct tick {", *members, "};", ""])
 
@@ -98,11 +109,18 @@ def tick_library() -> ctypes.CDLL:
     made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
     made.ht_command.restype = None
     made.ht_strained.argtypes = (_POINTER, _WORD)
-    made.ht_write.argtypes = (_POINTER, _WORD, _WORD, _WORD, _WORD, _REAL, _REAL)
+    made.ht_write.argtypes = (_POINTER, _WORD, _REAL, _REAL)
+    made.ht_tick.restype, made.ht_tick.argtypes = _WORD, made.ht_write.argtypes
     made.ht_publish.argtypes = (_POINTER, _WORD)
     if made.ht_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct tick` must have {ctypes.sizeof(_Memory)} bytes, got {made.ht_size()}")
     return made
+
+
+def _functions(*names: str) -> list[int]:
+    """Addresses of functions of MuJoCo."""
+    library = ctypes.CDLL(mujoco._functions.__file__)
+    return [ctypes.cast(getattr(library, name), _POINTER).value or 0 for name in names]
 
 
 class NativeTick:
@@ -110,6 +128,8 @@ class NativeTick:
 
     Args:
         robot: the robot.
+        model: MuJoCo's model.
+        data: its state.
         shared: where the states are published.
         on_axis: below this an elbow lies on its axis [m].
         straight: closer to the straight arm than this the arm angle is asked for [rad].
@@ -123,6 +143,8 @@ class NativeTick:
     def __init__(
         self,
         robot: RobotModel,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
         shared: SharedState,
         *,
         on_axis: float,
@@ -133,9 +155,14 @@ class NativeTick:
         library = tick_library()
         self._command, self._sense = library.ht_command, library.ht_sense
         self._strained, self._write, self._publish = library.ht_strained, library.ht_write, library.ht_publish
+        self._tick = library.ht_tick
         self._memory = memory = _Memory()
+        self._words = (0, 0, 0)
         self._at = ctypes.addressof(memory)
-        self._kept = (shared, ranges, arrays)
+        arrays |= {"vector": np.zeros(model.nv), "product": np.zeros(model.nv)}
+        self._kept = (model, data, shared, ranges, arrays)
+        memory.model, memory.data = model._address, data._address
+        memory.step1, memory.step2, memory.multiply = _functions("mj_step1", "mj_step2", "mj_mulM")
         memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
         for name, values in arrays.items():
             setattr(memory, name, values.ctypes.data)
@@ -154,6 +181,38 @@ class NativeTick:
         memory, self._model = self._memory, (mass, bias)
         memory.mass, memory.stride, memory.bias = mass.ctypes.data, mass.strides[0] // 8, bias.ctypes.data
         memory.is_misjudged = is_misjudged
+
+    def tick(
+        self,
+        tick: int,
+        points: SetPoints,
+        *,
+        words: tuple[int, int, int],
+        times: tuple[float, float],
+    ) -> int:
+        """Compute a tick of an arm in position control: dynamics, sensors, supervision of the drives, written state.
+
+        Args:
+            tick: see `write`, as the next two.
+            points: set-points.
+            words: flags, mode and order.
+            times: progress and remaining time.
+
+        Returns:
+            0, or what is left to do: `ELSEWHERE`: all of it; `LOADED`: from the wrench on; `STRAINED`: from the
+            supervision of the drives on; `ASK`: the state.
+        """
+        rows = self._points
+        rows[0], rows[1], rows[2] = points.before, points.now, points.after
+        if words != self._words:
+            self._show(words)
+        left: int = self._tick(self._at, tick, *times)
+        return left
+
+    def _show(self, words: tuple[int, int, int]) -> None:
+        """Set flags, mode and order of the states to come."""
+        memory, self._words = self._memory, words
+        memory.flags, memory.mode, memory.order = words
 
     def command(self, before: Array, now: Array, after: Array) -> None:
         """Drive the motors towards set-points of shape (7,) [rad] of the last, this and the next tick."""
@@ -189,9 +248,11 @@ class NativeTick:
             times: progress and remaining time.
         """
         self._points[2] = after
-        if self._write(self._at, tick, *words, *times) == ASK:
+        if words != self._words:
+            self._show(words)
+        if self._write(self._at, tick, *times) == ASK:
             self._memory.e1, self._memory.has_e1 = e1(), 1
-            self._write(self._at, tick, *words, *times)
+            self._write(self._at, tick, *times)
 
     def publish(self, tick: int) -> bool:
         """Let readers see the state of a tick that was written; returns whether one waits for it."""

@@ -25,7 +25,7 @@ from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
-from heptarm.sim.plant.native import NativeTick
+from heptarm.sim.plant.native import ASK, ELSEWHERE, LOADED, NativeTick
 from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.safety_monitor import UNLIMITED, ExternalTorqueMonitor, SafetyLimits
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
@@ -78,24 +78,8 @@ BRAKE_TICKS = 400
 BRAKE_SLIP = 0.8 * LAG
 
 #: Flags as plain integers: an operation on two flags of an enumeration takes a microsecond.
-_MOVING, _MASTERED, _BRAKES_OPEN = (
-    int(SafetyFlags.MOVING),
-    int(SafetyFlags.MASTERED),
-    int(SafetyFlags.BRAKES_OPEN),
-)
-_PAUSED, _ENABLED, _HAND_GUIDING = (
-    int(SafetyFlags.PAUSED),
-    int(SafetyFlags.ENABLED),
-    int(SafetyFlags.HAND_GUIDING),
-)
-_READY, _PROTECTIVE_STOP = int(SafetyFlags.READY), int(SafetyFlags.PROTECTIVE_STOP)
-_REQUEST_FLAGS = {
-    StopRequest.EMERGENCY_STOP: int(SafetyFlags.EMERGENCY_STOP),
-    StopRequest.EXTERNAL_EMERGENCY_STOP: int(SafetyFlags.EXTERNAL_STOP),
-    StopRequest.OPERATOR_SAFETY: int(SafetyFlags.SAFEGUARD_OPEN),
-    StopRequest.PROTECTIVE_STOP: int(SafetyFlags.PROTECTIVE_STOP),
-    StopRequest.DRIVE_ERROR: int(SafetyFlags.DRIVE_ERROR),
-}
+_MOVING, _BRAKES_OPEN = int(SafetyFlags.MOVING), int(SafetyFlags.BRAKES_OPEN)
+_PAUSED = int(SafetyFlags.PAUSED)
 
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
 
@@ -129,16 +113,22 @@ class Snapshot:
     progress: float
 
 
+#: Place of the override among the words of the shared memory.
+_OVERRIDE = HeaderWords.SECTION.start + HeaderWords.OVERRIDE
+
+
 class _Inputs:
     """What the controller reads from the shared state; see `ControllerInputs`."""
 
     def __init__(self, shared: SharedState) -> None:
-        self._header, self.signals, self.target = shared.reals, shared.signals, shared.target
+        self.signals, self.target = shared.signals, shared.target
+        self._reals = memoryview(shared.memory).cast("d")  # numpy takes longer for a single number
 
     @property
     def override(self) -> float:
         """Factor on every programmed speed, 0 to 1."""
-        return float(self._header[HeaderWords.OVERRIDE])
+        value: float = self._reals[_OVERRIDE]
+        return value
 
 
 class Plant:
@@ -235,6 +225,8 @@ class Plant:
         try:
             return NativeTick(
                 self.robot,
+                self.model,
+                d,
                 self.shared,
                 on_axis=_ON_AXIS,
                 straight=_STRAIGHT,
@@ -357,6 +349,7 @@ class Plant:
         while self._changes:
             self._changes.popleft()()
         sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
+        self._is_ideal = self._errors is None and self._safety_monitor is None and not payload.differs
         if self._native is not None:
             self._native.believe(payload.mass, payload.bias, is_misjudged=payload.differs)
 
@@ -398,18 +391,45 @@ class Plant:
 
     def compute(self) -> None:
         """Compute the next tick: set-point, control law, dynamics; `publish` has to follow."""
-        m, d, interpolator = self.model, self.data, self.interpolator
         if self._changes:
             self._take_loads()
         progress, remaining = self._advance()
         if self._gripper is not None:
             self._gripper.tick()
+        native, left = self._native, ELSEWHERE
+        if native is not None and self._is_plain:
+            words, times = self._words(), (progress, remaining)
+            left = native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
+        if left == 0:
+            return
+        if left == ELSEWHERE:
+            self._simulate()
+        elif left == LOADED:
+            self._load.resolve(is_loaded=True)
+        if left != ASK and self._monitor is not None and not self._tripped:
+            self._supervise(self._monitor)
+        self._write(progress, remaining)
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether `NativeTick.tick` may compute the next tick: position control, and nothing special."""
+        return (
+            self._is_ideal
+            and self._control.is_plain
+            and self._brakes is None
+            and not (self.interpolator.is_overlaid or self._load.is_pushed)
+            and (self._monitor is None or not self._monitor.is_strained)
+        )
+
+    def _simulate(self) -> None:
+        """Control law, dynamics, and what the sensors show."""
+        m, d = self.model, self.data
         mujoco.mj_step1(m, d)
         self._load.apply(self.tick_count * TICK)
         mujoco.mj_fullM(m, d, self._mass)
         if self._payload.differs:
             self._payload.believe()
-        watched = self._safety_monitor if interpolator.order and not self.safety.latched else None
+        watched = self._safety_monitor if self.interpolator.order and not self.safety.latched else None
         if watched is not None:
             watched.follow(d)
         self._drive()
@@ -417,9 +437,6 @@ class Plant:
         self._sense()
         if watched is not None:
             self._watch(watched)
-        if self._monitor is not None and not self._tripped:
-            self._supervise(self._monitor)
-        self._write(progress, remaining)
 
     def wake(self) -> None:
         """Wake those that wait for the tick that was computed; they wait until it is published, which follows soon."""
@@ -551,9 +568,7 @@ class Plant:
     def _write(self, progress: float, remaining: float) -> None:
         """Write the state after the next tick into its slot; readers see it after `publish`."""
         k, shared, after = self.tick_count + 1, self.shared, self.interpolator.command.after
-        flags, mode, order = self._safety_flags(), int(self.safety.mode), self.interpolator.order
-        self._seen = flags | mode << 32  # a change of the mode alone is reported, too
-        given = (flags | _MOVING if order else flags, mode, order)
+        given = self._words()
         if self._native is not None:
             self._native.write(k, after, self._e1, words=given, times=(progress, remaining))
             return
@@ -576,23 +591,16 @@ class Plant:
         reals[StateWords.E1], words[StateWords.STATUS] = posture(self.robot, values)
         words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
 
-    def _safety_flags(self) -> int:
-        safety = self.safety
-        flags = _MASTERED
+    def _words(self) -> tuple[int, int, int]:
+        """Flags, operation mode and running command of the next tick."""
+        safety, order = self.safety, self.interpolator.order
+        flags, mode = safety.flags, safety.mode
         if self._brakes is None:
             flags |= _BRAKES_OPEN
         if self.interpolator.is_paused or safety.latched:
             flags |= _PAUSED
-        if safety.enabled:
-            flags |= _ENABLED
-        if safety.guides:
-            flags |= _HAND_GUIDING
-        if not safety.stop_requested:
-            return flags | _READY
-        flags |= _PROTECTIVE_STOP
-        for request in safety.stop_requests:
-            flags |= _REQUEST_FLAGS[request]
-        return flags
+        self._seen = flags | mode << 32  # a change of the mode alone is reported, too
+        return (flags | _MOVING if order else flags), mode, order
 
     @property
     def snapshot(self) -> Snapshot:

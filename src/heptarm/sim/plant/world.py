@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.appearance import ArmMeshes, undress
-from heptarm.sim.plant.carried import CarriedShapes, make_room
+from heptarm.sim.plant.carried import NO_TREES, CarriedShapes, make_room
 from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
@@ -128,6 +128,10 @@ def compiled(
             solref=COMPLIANCE,
             rgba=[0.7, 0.6, 0.45, 1.0],
         )
+    if (
+        scene is None and not boxes
+    ):  # the arm's links have two shapes: a search by trees takes longer than without
+        spec.option.disableflags |= NO_TREES
     if camera is not None:
         _add_camera(spec, camera)
     return spec.compile()
