@@ -206,7 +206,7 @@ class NativeTick:
         rows[0], rows[1], rows[2] = points.before, points.now, points.after
         if words != self._words:
             self._show(words)
-        left: int = self._tick(self._at, tick, *times)
+        left: int = self._tick(self._at, tick, times[0], times[1])
         return left
 
     def _show(self, words: tuple[int, int, int]) -> None:
