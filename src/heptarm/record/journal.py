@@ -7,8 +7,8 @@ import json
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple
 
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.wire import messages as wire
@@ -19,9 +19,8 @@ REQUEST, REFUSAL, EVENT, ERROR, NOTE, FRI = "request", "refusal", "event", "erro
 KEPT, KEPT_TIME, WAITING = 5_000, 31_000_000_000, 100_000
 
 
-@dataclass(frozen=True, slots=True)
-class JournalEntry:
-    """Something that happened.
+class JournalEntry(NamedTuple):
+    """Something that happened; a tuple, since every request makes one.
 
     Attributes:
         time: our clock [ns].
