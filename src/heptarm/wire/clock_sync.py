@@ -21,6 +21,22 @@ TOLERANCE = 300_000
 STALLED, SHORT = 0.05, 500_000_000
 
 
+class PingDeparture(NamedTuple):
+    """The newest ping: its round trip begins when it leaves, after its encoding, which takes 30 us after a pause.
+
+    Attributes:
+        stated: the time in it, our clock [ns].
+        left: when it left.
+    """
+
+    stated: int = 0
+    left: int = 0
+
+    def of(self, stated: int) -> int:
+        """When the ping left with which an answer came [ns]; `stated`: the time in it."""
+        return self.left if stated == self.stated else stated
+
+
 class _Sample(NamedTuple):
     ours: float  # middle of the round trip, our clock [ns]
     theirs: float  # the cabinet's clock then [ns]

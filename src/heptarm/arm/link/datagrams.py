@@ -17,7 +17,7 @@ from statistics import median
 from heptarm.errors import ConnectionLost, HeptarmError
 from heptarm.io.clock import Clock
 from heptarm.io.transport import DatagramSocket
-from heptarm.wire.clock_sync import ClockOffset
+from heptarm.wire.clock_sync import ClockOffset, PingDeparture
 from heptarm.wire.codec import DecodeError
 from heptarm.wire.datagrams import Datagrams
 from heptarm.wire.messages import Message, OneWay, Ping, Pong, State
@@ -100,7 +100,7 @@ class DatagramLine:
         self._answered: int | None = None
         self._last_target = clock.nanos() - _STREAMING
         self._targets = self._pings = self._answers = self._states = 0
-        self._ping_left = 0, 0  # the time in the newest ping, and when it left [ns]
+        self._departure = PingDeparture()
         self._copied = 0
         self._round_trips: deque[int] = deque(maxlen=_ROUND_TRIPS)
         self._urgent: dict[int, tuple[Message, int]] = {}
@@ -156,9 +156,9 @@ class DatagramLine:
         self._socket.send(self._codec.pack(message, time=self._offset.to_cabinet(now), request=request))
 
     def _ping(self, now: int) -> None:
-        """Send a ping; its round trip begins when it leaves, as in `Link.ping`."""
+        """Send a ping."""
         data = self._codec.pack(Ping(sent=now), time=self._offset.to_cabinet(now))
-        self._ping_left = now, self._clock.nanos()
+        self._departure = PingDeparture(now, self._clock.nanos())
         self._socket.send(data)
 
     # ---------------------------------------------------------------------------------- receiving
@@ -215,8 +215,7 @@ class DatagramLine:
                 pong = Pong.decode(frame.body)
                 self._answers += 1
                 self._answered = now
-                made, left = self._ping_left
-                sent = left if pong.sent == made else pong.sent
+                sent = self._departure.of(pong.sent)
                 self._round_trips.append(now - sent)
                 self._on_pong(sent, pong.received, now)
         except DecodeError:

@@ -27,7 +27,7 @@ from heptarm.errors import (
 )
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
-from heptarm.wire.clock_sync import ClockOffset
+from heptarm.wire.clock_sync import ClockOffset, PingDeparture
 from heptarm.wire.codes import Code
 from heptarm.wire.messages import (
     MAJOR,
@@ -267,7 +267,7 @@ class Link:
         self._targets = 0
         self._pushing = threading.Lock()  # states and pings arrive over TCP and by datagram
         self._newest_state = -(1 << 63)
-        self._ping_left = 0, 0  # the time in the newest ping, and when it left [ns]
+        self._departure = PingDeparture()
         self._thread = threading.Thread(target=self._run, name="heptarm-link", daemon=True)
 
     # ------------------------------------------------------------------------------------ opening
@@ -542,8 +542,7 @@ class Link:
                 raise self._lost()
             sent = self._clock.nanos()
             data = self._session.send(Ping(sent=sent), time=sent)
-            # after a pause its encoding takes 30 us, which are no part of the round trip
-            self._ping_left = sent, self._clock.nanos()
+            self._departure = PingDeparture(sent, self._clock.nanos())
             self._transmit(data)
 
     def _send(self, message: Message, pending: PendingRequest | None = None) -> int:
@@ -646,10 +645,8 @@ class Link:
             self._on_state(body, now)
 
     def _on_pong(self, sent: int, received: int, now: int) -> None:
-        made, left = self._ping_left
-        sent = left if sent == made else sent
         with self._pushing:
-            self.offset.feed(sent, received, now)
+            self.offset.feed(self._departure.of(sent), received, now)
 
     def _on_datagram(self, now: int) -> None:
         self._heartbeat.datagram = now
