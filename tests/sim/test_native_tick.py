@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -107,3 +109,25 @@ def test_a_force_on_a_body_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     plant.data.xfrc_applied[body, 2] = 0.0
     plant.step(2)
     assert not plant.snapshot.wrench.any()
+
+
+_PROFILED = """
+import sys, time
+import mujoco
+if sys.argv[1] == "own":
+    mujoco.set_mjcb_time(time.perf_counter)
+from heptarm.sim.plant.plant import Plant
+plant = Plant()
+timer = plant.data.timer[mujoco.mjtTimer.mjTIMER_POSITION]
+before = timer.duration
+plant.step(20)
+print(timer.duration > before)
+"""
+
+
+@pytest.mark.parametrize(("clock", "is_profiled"), [("own", "True"), ("none", "False")])
+def test_the_profiler_of_mujoco_runs_only_with_a_clock_of_the_program(clock: str, is_profiled: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _PROFILED, clock], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.strip() == is_profiled

@@ -96,9 +96,14 @@ def _header() -> str:
     return "\n".join([*lines, "struct tick {", *members, "};", ""])
 
 
+def _mujoco() -> ctypes.CDLL:
+    """MuJoCo's library, in which its module for Python has its functions."""
+    return ctypes.CDLL(mujoco._functions.__file__)
+
+
 @functools.cache
 def tick_library() -> ctypes.CDLL:
-    """Load the functions.
+    """Load the functions; MuJoCo's profiler is off from then on, unless the program has given it a clock.
 
     Raises:
         Unavailable: this system is not supported, or has no compiler.
@@ -114,13 +119,10 @@ def tick_library() -> ctypes.CDLL:
     made.ht_publish.argtypes = (_POINTER, _WORD)
     if made.ht_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct tick` must have {ctypes.sizeof(_Memory)} bytes, got {made.ht_size()}")
+    if mujoco.get_mjcb_time() is None:
+        clock = _POINTER.in_dll(_mujoco(), "mjcb_time")
+        clock.value = ctypes.cast(made.ht_no_clock, _POINTER).value
     return made
-
-
-def _functions(*names: str) -> list[int]:
-    """Addresses of functions of MuJoCo."""
-    library = ctypes.CDLL(mujoco._functions.__file__)
-    return [ctypes.cast(getattr(library, name), _POINTER).value or 0 for name in names]
 
 
 class NativeTick:
@@ -162,7 +164,9 @@ class NativeTick:
         arrays |= {"vector": np.zeros(model.nv), "product": np.zeros(model.nv)}
         self._kept = (model, data, shared, ranges, arrays)
         memory.model, memory.data = model._address, data._address
-        memory.step1, memory.step2, memory.multiply = _functions("mj_step1", "mj_step2", "mj_mulM")
+        functions = _mujoco()
+        for name, member in (("mj_step1", "step1"), ("mj_step2", "step2"), ("mj_mulM", "multiply")):
+            setattr(memory, member, ctypes.cast(getattr(functions, name), _POINTER).value)
         memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
         for name, values in arrays.items():
             setattr(memory, name, values.ctypes.data)
