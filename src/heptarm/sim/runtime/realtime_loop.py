@@ -214,14 +214,14 @@ class RealtimeLoop:
         """Wait for the moment at which the present tick is due; called between computing a state and publishing it.
 
         Args:
-            wake: wakes the readers of the state, which takes about as long as is left; called if something is left.
+            wake: wakes the readers of the state; called if time is left. That takes a while: later ticks begin earlier.
         """
+        if time.monotonic_ns() < self._due:
+            wake()
         begin = now = time.monotonic_ns()
         spare = self._due - begin
         if self.answer_gap == 0.0:
             self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
-        if spare > 0:
-            wake()
         while now < self._due:
             now = time.monotonic_ns()
         self._waited = now - begin
