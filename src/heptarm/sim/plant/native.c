@@ -181,12 +181,12 @@ word ht_write(struct tick *t, word tick, double progress, double remaining) {
     words[STATUS] = status;
     for (int i = 0; i < AXES; i++) turns |= (word)(q[i] < 0.0) << i;
     words[TURN] = turns;
-    return 0;
+    return DONE;
 }
 
 /* A tick in position control of an arm that nothing pushes, whose load data are true: `Plant.compute` after its set-point.
-   Returns 0 if it is complete, or what is left: ELSEWHERE: all of it; LOADED: from the wrench on; STRAINED: from the
-   supervision of the drives on; ASK: the state. */
+   Returns DONE, or what is left: ELSEWHERE: all of it; LOADED: from the wrench on; STRAINED: from the supervision of the
+   drives on; ASK: the state. */
 word ht_tick(struct tick *t, word tick, double progress, double remaining) {
     double slip[AXES];
     for (word i = 0; i < t->pulls; i++)

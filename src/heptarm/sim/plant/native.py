@@ -24,8 +24,8 @@ from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
 AXES = 7
-#: What the functions return; nothing is left to do after 0.
-LOADED, ASK, STRAINED, ELSEWHERE = 1, 2, 3, 4
+#: What the functions return.
+DONE, LOADED, ASK, STRAINED, ELSEWHERE = range(5)
 
 _SOURCE = Path(__file__).with_name("native.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
@@ -69,6 +69,7 @@ def _header() -> str:
     """Constants and `struct tick` for native.c."""
     constants = {
         "AXES": AXES,
+        "DONE": DONE,
         "LOADED": LOADED,
         "ASK": ASK,
         "STRAINED": STRAINED,
@@ -203,7 +204,7 @@ class NativeTick:
             times: progress and remaining time.
 
         Returns:
-            0, or what is left to do: `ELSEWHERE`: all of it; `LOADED`: from the wrench on; `STRAINED`: from the
+            `DONE`, or what is left to do: `ELSEWHERE`: all of it; `LOADED`: from the wrench on; `STRAINED`: from the
             supervision of the drives on; `ASK`: the state.
         """
         rows = self._points

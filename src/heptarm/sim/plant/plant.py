@@ -25,7 +25,7 @@ from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
-from heptarm.sim.plant.native import ASK, ELSEWHERE, LOADED, NativeTick
+from heptarm.sim.plant.native import ASK, DONE, ELSEWHERE, LOADED, NativeTick
 from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.safety_monitor import UNLIMITED, ExternalTorqueMonitor, SafetyLimits
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
@@ -400,7 +400,7 @@ class Plant:
         if native is not None and self._is_plain:
             words, times = self._words(), (progress, remaining)
             left = native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
-        if left == 0:
+        if left == DONE:
             return
         if left == ELSEWHERE:
             self._simulate()

@@ -128,9 +128,8 @@ def compiled(
             solref=COMPLIANCE,
             rgba=[0.7, 0.6, 0.45, 1.0],
         )
-    if (
-        scene is None and not boxes
-    ):  # the arm's links have two shapes: a search by trees takes longer than without
+    if scene is None and not boxes:
+        # each link has two shapes: a search by trees takes longer than none
         spec.option.disableflags |= NO_TREES
     if camera is not None:
         _add_camera(spec, camera)
