@@ -7,13 +7,15 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import heptarm as ha
-from bench.measure.blocks import Placement, by_turns, pin
+from bench.measure.blocks import Comparison, Placement, by_turns, pin
 from bench.measure.cabinet import Cabinet
 from bench.measure.compiler import compiled
 from bench.measure.figure import Figure, benchmark
+from bench.protocol.bare_client import BareClient
 from heptarm.wire import messages
 
 #: Requests of a block, back to back; and with a pause of so many seconds before each.
@@ -29,44 +31,69 @@ CPP_LIMIT = 1.2
 @benchmark("round_trip")
 def round_trip() -> Iterator[Figure]:
     """Round trip of a request, Python API to application and back, beside a raw echo: back to back, with pauses."""
-    payload = b"\x5a" * (messages.HEADER.size + len(messages.SetOverride(value=1.0).encode()))
-    echo = subprocess.Popen(
+    with Cabinet() as cabinet, ha.connect(cabinet.target) as arm, _raw_echo() as echo:
+        for name, count, pause in (("", REQUESTS, 0.0), ("_paused", PAUSED, PAUSE)):
+            for found in _beside_echo(cabinet, lambda: arm.set_override(1.0), echo, count, pause):
+                limit = None if pause else LIMIT
+                yield found.figure(f"round_trip{name}", 50, "us", limit=limit, scale=1e6)
+                yield found.figure(f"round_trip{name}_p99", 99, "us", scale=1e6)
+
+
+@benchmark("round_trip_bare")
+def round_trip_bare() -> Iterator[Figure]:
+    """Round trip of a request by the least Python that speaks the protocol, beside a raw echo."""
+    with Cabinet() as cabinet, _raw_echo() as echo, closing(BareClient(cabinet.port)) as client:
+        for found in _beside_echo(cabinet, lambda: client.set_override(1.0), echo, REQUESTS, 0.0):
+            yield found.figure("round_trip_bare", 50, "us", scale=1e6)
+
+
+class _Echo:
+    """A raw echo of as many bytes as a request has.
+
+    Args:
+        port: of the echo in Java.
+        process: its process.
+    """
+
+    def __init__(self, port: int, process: int) -> None:
+        self.process = process
+        self._payload = b"\x5a" * (messages.HEADER.size + len(messages.SetOverride(value=1.0).encode()))
+        self._socket = socket.create_connection(("127.0.0.1", port))
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def __call__(self) -> None:
+        self._socket.sendall(self._payload)
+        missing = len(self._payload)
+        while missing:
+            missing -= len(self._socket.recv(missing))
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@contextmanager
+def _raw_echo() -> Iterator[_Echo]:
+    with subprocess.Popen(
         ["java", "-Xmx32m", "-XX:+UseSerialGC", str(Path(__file__).parents[1] / "java" / "Echo.java")],
         stdout=subprocess.PIPE,
         text=True,
-    )
-    try:
-        assert echo.stdout is not None
-        port = int(echo.stdout.readline())
-        with (
-            Cabinet() as cabinet,
-            ha.connect(cabinet.target) as arm,
-            socket.create_connection(("127.0.0.1", port)) as raw,
-        ):
-            raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    ) as process:
+        try:
+            assert process.stdout is not None
+            with closing(_Echo(int(process.stdout.readline()), process.pid)) as echo:
+                yield echo
+        finally:
+            process.kill()
 
-            def place(placement: Placement) -> None:
-                pin(cabinet.process.pid, placement.far)
-                pin(echo.pid, placement.far)
 
-            def request() -> object:
-                return arm.set_override(1.0)
+def _beside_echo(
+    cabinet: Cabinet, request: Callable[[], object], echo: _Echo, count: int, pause: float
+) -> Iterator[Comparison]:
+    def place(placement: Placement) -> None:
+        pin(cabinet.process.pid, placement.far)
+        pin(echo.process, placement.far)
 
-            def bare() -> object:
-                return _echo(raw, payload)
-
-            for name, count, pause in (("", REQUESTS, 0.0), ("_paused", PAUSED, PAUSE)):
-                for found in by_turns(
-                    lambda: _times(request, count, pause),  # noqa: B023  called before the loop goes on
-                    lambda: _times(bare, count, pause),  # noqa: B023
-                    place,
-                ):
-                    limit = None if pause else LIMIT
-                    yield found.figure(f"round_trip{name}", 50, "us", limit=limit, scale=1e6)
-                    yield found.figure(f"round_trip{name}_p99", 99, "us", scale=1e6)
-    finally:
-        echo.kill()
-        echo.wait()
+    yield from by_turns(lambda: _times(request, count, pause), lambda: _times(echo, count, pause), place)
 
 
 def _times(call: Callable[[], object], count: int, pause: float) -> list[float]:
@@ -79,13 +106,6 @@ def _times(call: Callable[[], object], count: int, pause: float) -> list[float]:
         call()
         times.append((time.perf_counter_ns() - begin) * 1e-9)
     return times
-
-
-def _echo(raw: socket.socket, payload: bytes) -> None:
-    raw.sendall(payload)
-    missing = len(payload)
-    while missing:
-        missing -= len(raw.recv(missing))
 
 
 @benchmark("round_trip_with_key")
