@@ -14,6 +14,7 @@ import pytest
 from heptarm.io.compiled import SWITCH, Unavailable
 from heptarm.sim.planning.command import Order
 from heptarm.sim.planning.native_inverse import inverse_library
+from heptarm.sim.plant import native
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.seam import StateWords
@@ -77,6 +78,20 @@ def test_a_robot_that_cannot_compile_computes_in_python(monkeypatch: pytest.Monk
     assert plant.shared.read(5) is not None
 
 
+def test_a_mujoco_that_does_not_show_its_functions_is_called_from_python(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tick_library.cache_clear()
+    with monkeypatch.context() as patched:
+        patched.setattr(native, "_CALLED", {"mj_no_such_function": "step1"})
+        with pytest.raises(Unavailable, match="shows no mj_no_such_function"):
+            native._mujoco()
+        plant = Plant("iiwa7", q=READY)
+        plant.step(5)
+    tick_library.cache_clear()
+    assert plant.shared.read(5) is not None
+
+
 def test_a_motion_in_position_control_is_computed_in_c_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     plant = Plant("iiwa14", q=READY)
     plant.submit(Order(1, "ptp", joints=tuple(q + 0.1 for q in READY)))
@@ -84,8 +99,7 @@ def test_a_motion_in_position_control_is_computed_in_c_alone(monkeypatch: pytest
         for name in ("mj_step1", "mj_step2", "mj_step"):
             patched.setattr(mujoco, name, _refuse)
         plant.step(300)
-        here = plant.snapshot.q
-        assert np.abs(here - READY).min() > 1e-3
+        assert np.abs(plant.snapshot.q - READY).min() > 1e-3
         plant.apply_wrench((0.0, 0.0, -10.0))
         with pytest.raises(_RefusedError):  # what pushes is known to Python alone
             plant.step()
@@ -99,7 +113,7 @@ def _refuse(*_: object) -> None:
     raise _RefusedError
 
 
-def test_a_force_on_a_body_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_force_on_a_body_is_seen() -> None:
     plant = Plant("iiwa14", q=READY)
     plant.step(5)
     body = mujoco.mj_name2id(plant.model, mujoco.mjtObj.mjOBJ_BODY, "link_7")

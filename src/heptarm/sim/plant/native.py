@@ -27,6 +27,8 @@ AXES = 7
 #: What the functions return.
 DONE, LOADED, ASK, STRAINED, ELSEWHERE = range(5)
 
+#: MuJoCo's functions that a tick calls, and the members of `struct tick` that point to them.
+_CALLED = {"mj_step1": "step1", "mj_step2": "step2", "mj_mulM": "multiply"}
 _SOURCE = Path(__file__).with_name("native.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 #: `struct tick` of native.c: kind, size (0: a scalar), names.
@@ -98,8 +100,16 @@ def _header() -> str:
 
 
 def _mujoco() -> ctypes.CDLL:
-    """MuJoCo's library, in which its module for Python has its functions."""
-    return ctypes.CDLL(mujoco._functions.__file__)
+    """MuJoCo's library, in which its module for Python has its functions.
+
+    Raises:
+        Unavailable: it does not show the ones that a tick calls.
+    """
+    library = ctypes.CDLL(mujoco._functions.__file__)
+    missing = [name for name in (*_CALLED, "mjcb_time") if not hasattr(library, name)]
+    if missing:
+        raise Unavailable(f"MuJoCo {mujoco.__version__} shows no {', '.join(missing)}")
+    return library
 
 
 @functools.cache
@@ -166,7 +176,7 @@ class NativeTick:
         self._kept = (model, data, shared, ranges, arrays)
         memory.model, memory.data = model._address, data._address
         functions = _mujoco()
-        for name, member in (("mj_step1", "step1"), ("mj_step2", "step2"), ("mj_mulM", "multiply")):
+        for name, member in _CALLED.items():
             setattr(memory, member, ctypes.cast(getattr(functions, name), _POINTER).value)
         memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
         for name, values in arrays.items():

@@ -24,7 +24,7 @@ def whole(arm: Arm) -> None:
     near(state.dq, np.zeros(7), 0.01, "joint speeds at rest", unit="rad/s")
     holds(state.tau.shape == state.tau_ext.shape == (7,), "torques of all joints, measured and external")
     near(state.tau_ext[3], 0.0, 5.0, "external torque of A4", unit="Nm")
-    near(state.pose.xyz, arm.pose().xyz, 1e-4, "place of the motion frame", unit="m")
+    near(state.pose.xyz, arm.pose(state=state).xyz, 1e-6, "place of the motion frame", unit="m")
     near(float(np.linalg.norm(state.pose.quat)), 1.0, 1e-9, "norm of its quaternion")
     below(float(np.linalg.norm(state.wrench.force)), 30.0, "nobody pushes: force", unit="N")
     holds(state.wrench.force_inaccuracy.shape == (3,), "the force comes with its inaccuracy")
