@@ -1,4 +1,4 @@
-"""Write the codecs, the C++ client, the golden vectors, the protocol pages and the header of the native FRI loop from the schema.
+"""Write the codecs, the C++ client, the golden vectors, the protocol pages and the headers of the parts in C from the schema.
 
 python schema/generate.py           write
 python schema/generate.py --check   fail if anything that is committed differs from the schema
@@ -39,6 +39,7 @@ def outputs() -> dict[Path, str]:
         pages / "errors.md": docs.errors(spec),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "include" / "heptarm_law.h": native.law_header(),
+        ROOT / "src" / "heptarm" / "io" / "frame_layout.h": native.frame_header(spec),
         ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",

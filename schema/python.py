@@ -234,9 +234,30 @@ def _methods(name: str, body: Body, fields: list[Field]) -> list[str]:
     lines += ["", "    @classmethod", f"    def _read(cls, data: bytes, pos: int) -> tuple[{name}, int]:"]
     lines += [f"        {line}" for line in body.read]
     lines += [f"        return cls({', '.join(f'{one.name}={one.name}' for one in fields)}), pos"]
-    lines += ["", "    def _check(self, path: str) -> None:"]
-    lines += [f"        {line}" for line in body.check] or ["        pass"]
-    return lines
+    return lines + _check(body)
+
+
+def _run_methods(name: str, body: Body, fields: list[Field]) -> list[str]:
+    """Methods of a message whose body is one struct.Struct: they are in the path of every request."""
+    return [
+        "",
+        "    def encode(self) -> bytes:",
+        '        """The body."""',
+        f"        return {body.write[0].removeprefix('out.append(').removesuffix(')')}",
+        "",
+        "    @classmethod",
+        f"    def decode(cls, data: bytes) -> {name}:",
+        '        """Read one body, all of it."""',
+        f'        v = codec.unpack_all(_{name}_0, data, "{name}")',
+        *(f"        {line}" for line in body.read[2:]),
+        f"        return cls({', '.join(f'{one.name}={one.name}' for one in fields)})",
+        *_check(body),
+    ]
+
+
+def _check(body: Body) -> list[str]:
+    lines = ["", "    def _check(self, path: str) -> None:"]
+    return lines + ([f"        {line}" for line in body.check] or ["        pass"])
 
 
 def encoding(name: str) -> list[str]:
@@ -258,9 +279,8 @@ def encoding(name: str) -> list[str]:
     ]
 
 
-def _message_methods(name: str) -> list[str]:
+def _validation() -> list[str]:
     return [
-        *encoding(name),
         "",
         "    def validate(self) -> None:",
         '        """Raise Violation for a field outside its range."""',
@@ -372,8 +392,9 @@ def messages(spec: Spec) -> str:
         if message.groups:
             lines += _state(message)
         else:
-            lines += fields(spec, message.fields) + _methods(message.name, body, message.fields)
-        lines += _message_methods(message.name) + [""]
+            lines += fields(spec, message.fields)
+            lines += (_run_methods if body.is_run else _methods)(message.name, body, message.fields)
+        lines += ([] if body.is_run else encoding(message.name)) + _validation() + [""]
     lines += ["", f"Message: TypeAlias = {' | '.join(spec.messages)}"]
     one_way = [name for name, message in spec.messages.items() if message.kind == "oneway"]
     lines += [f"OneWay: TypeAlias = {' | '.join(one_way)}", ""]

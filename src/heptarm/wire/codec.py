@@ -44,6 +44,14 @@ def unpack(layout: Struct, data: bytes, pos: int) -> tuple[Any, ...]:
     return layout.unpack_from(data, pos)
 
 
+def unpack_all(layout: Struct, data: bytes, name: str) -> tuple[Any, ...]:
+    """Unpack a body that is one layout; refuse a longer and a shorter one."""
+    if len(data) != layout.size:
+        unpack(layout, data, 0)
+        end(data, layout.size, name)
+    return layout.unpack(data)
+
+
 def read_bool(value: int) -> bool:
     """Read a boolean: 0 or 1."""
     if value > 1:

@@ -2717,31 +2717,19 @@ class Ping:
 
     sent: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Ping_0.pack(self.sent))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Ping, int]:
-        v = codec.unpack(_Ping_0, data, pos)
-        pos += _Ping_0.size
-        sent = v[0]
-        return cls(sent=sent), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Ping_0.pack(self.sent)
 
     @classmethod
     def decode(cls, data: bytes) -> Ping:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Ping")
-        return value
+        v = codec.unpack_all(_Ping_0, data, "Ping")
+        sent = v[0]
+        return cls(sent=sent)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -2763,32 +2751,20 @@ class Pong:
     sent: int
     received: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Pong_0.pack(self.sent, self.received))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Pong, int]:
-        v = codec.unpack(_Pong_0, data, pos)
-        pos += _Pong_0.size
-        sent = v[0]
-        received = v[1]
-        return cls(sent=sent, received=received), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Pong_0.pack(self.sent, self.received)
 
     @classmethod
     def decode(cls, data: bytes) -> Pong:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Pong")
-        return value
+        v = codec.unpack_all(_Pong_0, data, "Pong")
+        sent = v[0]
+        received = v[1]
+        return cls(sent=sent, received=received)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -2857,31 +2833,19 @@ class Halt:
 
     kind: StopKind = StopKind.PATH
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Halt_0.pack(self.kind))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Halt, int]:
-        v = codec.unpack(_Halt_0, data, pos)
-        pos += _Halt_0.size
-        kind = codec.read_enum(StopKind, v[0])
-        return cls(kind=kind), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Halt_0.pack(self.kind)
 
     @classmethod
     def decode(cls, data: bytes) -> Halt:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Halt")
-        return value
+        v = codec.unpack_all(_Halt_0, data, "Halt")
+        kind = codec.read_enum(StopKind, v[0])
+        return cls(kind=kind)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -2942,31 +2906,19 @@ class Accepted:
 
     id: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Accepted_0.pack(self.id))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Accepted, int]:
-        v = codec.unpack(_Accepted_0, data, pos)
-        pos += _Accepted_0.size
-        id = v[0]
-        return cls(id=id), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Accepted_0.pack(self.id)
 
     @classmethod
     def decode(cls, data: bytes) -> Accepted:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Accepted")
-        return value
+        v = codec.unpack_all(_Accepted_0, data, "Accepted")
+        id = v[0]
+        return cls(id=id)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -3088,32 +3040,20 @@ class TakeControl:
     watchdog: float = 0.5
     on_lost: OnLost = OnLost.STOP
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_TakeControl_0.pack(self.watchdog, self.on_lost))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[TakeControl, int]:
-        v = codec.unpack(_TakeControl_0, data, pos)
-        pos += _TakeControl_0.size
-        watchdog = v[0]
-        on_lost = codec.read_enum(OnLost, v[1])
-        return cls(watchdog=watchdog, on_lost=on_lost), pos
-
-    def _check(self, path: str) -> None:
-        codec.check(self.watchdog, path + "watchdog", 0.1, 10.0, False, False)
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _TakeControl_0.pack(self.watchdog, self.on_lost)
 
     @classmethod
     def decode(cls, data: bytes) -> TakeControl:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "TakeControl")
-        return value
+        v = codec.unpack_all(_TakeControl_0, data, "TakeControl")
+        watchdog = v[0]
+        on_lost = codec.read_enum(OnLost, v[1])
+        return cls(watchdog=watchdog, on_lost=on_lost)
+
+    def _check(self, path: str) -> None:
+        codec.check(self.watchdog, path + "watchdog", 0.1, 10.0, False, False)
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -3176,32 +3116,20 @@ class Subscribe:
     groups: Groups
     rate: float
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Subscribe_0.pack(self.groups, self.rate))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Subscribe, int]:
-        v = codec.unpack(_Subscribe_0, data, pos)
-        pos += _Subscribe_0.size
-        groups = Groups(v[0])
-        rate = v[1]
-        return cls(groups=groups, rate=rate), pos
-
-    def _check(self, path: str) -> None:
-        codec.check(self.rate, path + "rate", 0.0, 1000.0, False, False)
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Subscribe_0.pack(self.groups, self.rate)
 
     @classmethod
     def decode(cls, data: bytes) -> Subscribe:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Subscribe")
-        return value
+        v = codec.unpack_all(_Subscribe_0, data, "Subscribe")
+        groups = Groups(v[0])
+        rate = v[1]
+        return cls(groups=groups, rate=rate)
+
+    def _check(self, path: str) -> None:
+        codec.check(self.rate, path + "rate", 0.0, 1000.0, False, False)
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -3279,31 +3207,19 @@ class Cancel:
 
     id: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Cancel_0.pack(self.id))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Cancel, int]:
-        v = codec.unpack(_Cancel_0, data, pos)
-        pos += _Cancel_0.size
-        id = v[0]
-        return cls(id=id), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Cancel_0.pack(self.id)
 
     @classmethod
     def decode(cls, data: bytes) -> Cancel:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Cancel")
-        return value
+        v = codec.unpack_all(_Cancel_0, data, "Cancel")
+        id = v[0]
+        return cls(id=id)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -3324,31 +3240,19 @@ class Stop:
 
     kind: StopKind = StopKind.PATH
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_Stop_0.pack(self.kind))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[Stop, int]:
-        v = codec.unpack(_Stop_0, data, pos)
-        pos += _Stop_0.size
-        kind = codec.read_enum(StopKind, v[0])
-        return cls(kind=kind), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _Stop_0.pack(self.kind)
 
     @classmethod
     def decode(cls, data: bytes) -> Stop:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "Stop")
-        return value
+        v = codec.unpack_all(_Stop_0, data, "Stop")
+        kind = codec.read_enum(StopKind, v[0])
+        return cls(kind=kind)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -3450,31 +3354,19 @@ class SetOverride:
 
     value: float
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_SetOverride_0.pack(self.value))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[SetOverride, int]:
-        v = codec.unpack(_SetOverride_0, data, pos)
-        pos += _SetOverride_0.size
-        value = v[0]
-        return cls(value=value), pos
-
-    def _check(self, path: str) -> None:
-        codec.check(self.value, path + "value", 0.0, 1.0, False, False)
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _SetOverride_0.pack(self.value)
 
     @classmethod
     def decode(cls, data: bytes) -> SetOverride:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "SetOverride")
-        return value
+        v = codec.unpack_all(_SetOverride_0, data, "SetOverride")
+        value = v[0]
+        return cls(value=value)
+
+    def _check(self, path: str) -> None:
+        codec.check(self.value, path + "value", 0.0, 1.0, False, False)
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4050,13 +3942,14 @@ class DatagramStatistics:
     strange: int
     sent: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_DatagramStatistics_0.pack(self.accepted, self.old, self.late, self.forged, self.damaged, self.strange, self.sent))
+    def encode(self) -> bytes:
+        """The body."""
+        return _DatagramStatistics_0.pack(self.accepted, self.old, self.late, self.forged, self.damaged, self.strange, self.sent)
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[DatagramStatistics, int]:
-        v = codec.unpack(_DatagramStatistics_0, data, pos)
-        pos += _DatagramStatistics_0.size
+    def decode(cls, data: bytes) -> DatagramStatistics:
+        """Read one body, all of it."""
+        v = codec.unpack_all(_DatagramStatistics_0, data, "DatagramStatistics")
         accepted = v[0]
         old = v[1]
         late = v[2]
@@ -4064,23 +3957,10 @@ class DatagramStatistics:
         damaged = v[4]
         strange = v[5]
         sent = v[6]
-        return cls(accepted=accepted, old=old, late=late, forged=forged, damaged=damaged, strange=strange, sent=sent), pos
+        return cls(accepted=accepted, old=old, late=late, forged=forged, damaged=damaged, strange=strange, sent=sent)
 
     def _check(self, path: str) -> None:
         pass
-
-    def encode(self) -> bytes:
-        """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
-
-    @classmethod
-    def decode(cls, data: bytes) -> DatagramStatistics:
-        """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "DatagramStatistics")
-        return value
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4254,34 +4134,22 @@ class ServoJoints:
     watchdog: float
     q: tuple[float, ...]
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_ServoJoints_0.pack(self.servo, self.watchdog, *self.q))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ServoJoints, int]:
-        v = codec.unpack(_ServoJoints_0, data, pos)
-        pos += _ServoJoints_0.size
-        servo = v[0]
-        watchdog = v[1]
-        q = v[2:9]
-        return cls(servo=servo, watchdog=watchdog, q=q), pos
-
-    def _check(self, path: str) -> None:
-        codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
-        codec.check_array(self.q, path + "q", -inf, inf, False, False)
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _ServoJoints_0.pack(self.servo, self.watchdog, *self.q)
 
     @classmethod
     def decode(cls, data: bytes) -> ServoJoints:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "ServoJoints")
-        return value
+        v = codec.unpack_all(_ServoJoints_0, data, "ServoJoints")
+        servo = v[0]
+        watchdog = v[1]
+        q = v[2:9]
+        return cls(servo=servo, watchdog=watchdog, q=q)
+
+    def _check(self, path: str) -> None:
+        codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
+        codec.check_array(self.q, path + "q", -inf, inf, False, False)
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4307,36 +4175,24 @@ class ServoJointsVelocity:
     q: tuple[float, ...]
     dq: tuple[float, ...]
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_ServoJointsVelocity_0.pack(self.servo, self.watchdog, *self.q, *self.dq))
+    def encode(self) -> bytes:
+        """The body."""
+        return _ServoJointsVelocity_0.pack(self.servo, self.watchdog, *self.q, *self.dq)
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ServoJointsVelocity, int]:
-        v = codec.unpack(_ServoJointsVelocity_0, data, pos)
-        pos += _ServoJointsVelocity_0.size
+    def decode(cls, data: bytes) -> ServoJointsVelocity:
+        """Read one body, all of it."""
+        v = codec.unpack_all(_ServoJointsVelocity_0, data, "ServoJointsVelocity")
         servo = v[0]
         watchdog = v[1]
         q = v[2:9]
         dq = v[9:16]
-        return cls(servo=servo, watchdog=watchdog, q=q, dq=dq), pos
+        return cls(servo=servo, watchdog=watchdog, q=q, dq=dq)
 
     def _check(self, path: str) -> None:
         codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
         codec.check_array(self.q, path + "q", -inf, inf, False, False)
         codec.check_array(self.dq, path + "dq", -inf, inf, False, False)
-
-    def encode(self) -> bytes:
-        """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
-
-    @classmethod
-    def decode(cls, data: bytes) -> ServoJointsVelocity:
-        """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "ServoJointsVelocity")
-        return value
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4362,37 +4218,25 @@ class ServoPose:
     xyz: tuple[float, ...]
     quat: tuple[float, ...]
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_ServoPose_0.pack(self.servo, self.watchdog, *self.xyz, *self.quat))
+    def encode(self) -> bytes:
+        """The body."""
+        return _ServoPose_0.pack(self.servo, self.watchdog, *self.xyz, *self.quat)
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ServoPose, int]:
-        v = codec.unpack(_ServoPose_0, data, pos)
-        pos += _ServoPose_0.size
+    def decode(cls, data: bytes) -> ServoPose:
+        """Read one body, all of it."""
+        v = codec.unpack_all(_ServoPose_0, data, "ServoPose")
         servo = v[0]
         watchdog = v[1]
         xyz = v[2:5]
         quat = v[5:9]
-        return cls(servo=servo, watchdog=watchdog, xyz=xyz, quat=quat), pos
+        return cls(servo=servo, watchdog=watchdog, xyz=xyz, quat=quat)
 
     def _check(self, path: str) -> None:
         codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
         codec.check_array(self.xyz, path + "xyz", -inf, inf, False, False)
         codec.check_array(self.quat, path + "quat", -inf, inf, False, False)
         codec.check_norm(self.quat, path + "quat")
-
-    def encode(self) -> bytes:
-        """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
-
-    @classmethod
-    def decode(cls, data: bytes) -> ServoPose:
-        """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "ServoPose")
-        return value
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4461,31 +4305,19 @@ class ServoClose:
 
     servo: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_ServoClose_0.pack(self.servo))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ServoClose, int]:
-        v = codec.unpack(_ServoClose_0, data, pos)
-        pos += _ServoClose_0.size
-        servo = v[0]
-        return cls(servo=servo), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _ServoClose_0.pack(self.servo)
 
     @classmethod
     def decode(cls, data: bytes) -> ServoClose:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "ServoClose")
-        return value
+        v = codec.unpack_all(_ServoClose_0, data, "ServoClose")
+        servo = v[0]
+        return cls(servo=servo)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4657,31 +4489,19 @@ class FriClose:
 
     session: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_FriClose_0.pack(self.session))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[FriClose, int]:
-        v = codec.unpack(_FriClose_0, data, pos)
-        pos += _FriClose_0.size
-        session = v[0]
-        return cls(session=session), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _FriClose_0.pack(self.session)
 
     @classmethod
     def decode(cls, data: bytes) -> FriClose:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "FriClose")
-        return value
+        v = codec.unpack_all(_FriClose_0, data, "FriClose")
+        session = v[0]
+        return cls(session=session)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4757,32 +4577,20 @@ class MotionStarted:
     id: int
     item: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_MotionStarted_0.pack(self.id, self.item))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[MotionStarted, int]:
-        v = codec.unpack(_MotionStarted_0, data, pos)
-        pos += _MotionStarted_0.size
-        id = v[0]
-        item = v[1]
-        return cls(id=id, item=item), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _MotionStarted_0.pack(self.id, self.item)
 
     @classmethod
     def decode(cls, data: bytes) -> MotionStarted:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "MotionStarted")
-        return value
+        v = codec.unpack_all(_MotionStarted_0, data, "MotionStarted")
+        id = v[0]
+        item = v[1]
+        return cls(id=id, item=item)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -4804,32 +4612,20 @@ class ItemReached:
     id: int
     item: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_ItemReached_0.pack(self.id, self.item))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ItemReached, int]:
-        v = codec.unpack(_ItemReached_0, data, pos)
-        pos += _ItemReached_0.size
-        id = v[0]
-        item = v[1]
-        return cls(id=id, item=item), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _ItemReached_0.pack(self.id, self.item)
 
     @classmethod
     def decode(cls, data: bytes) -> ItemReached:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "ItemReached")
-        return value
+        v = codec.unpack_all(_ItemReached_0, data, "ItemReached")
+        id = v[0]
+        item = v[1]
+        return cls(id=id, item=item)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -5163,32 +4959,20 @@ class KeyPressed:
     slot: int
     down: bool
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_KeyPressed_0.pack(self.slot, self.down))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[KeyPressed, int]:
-        v = codec.unpack(_KeyPressed_0, data, pos)
-        pos += _KeyPressed_0.size
-        slot = v[0]
-        down = codec.read_bool(v[1])
-        return cls(slot=slot, down=down), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _KeyPressed_0.pack(self.slot, self.down)
 
     @classmethod
     def decode(cls, data: bytes) -> KeyPressed:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "KeyPressed")
-        return value
+        v = codec.unpack_all(_KeyPressed_0, data, "KeyPressed")
+        slot = v[0]
+        down = codec.read_bool(v[1])
+        return cls(slot=slot, down=down)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -5325,33 +5109,21 @@ class SegmentReached:
     item: int
     segment: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_SegmentReached_0.pack(self.id, self.item, self.segment))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[SegmentReached, int]:
-        v = codec.unpack(_SegmentReached_0, data, pos)
-        pos += _SegmentReached_0.size
-        id = v[0]
-        item = v[1]
-        segment = v[2]
-        return cls(id=id, item=item, segment=segment), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _SegmentReached_0.pack(self.id, self.item, self.segment)
 
     @classmethod
     def decode(cls, data: bytes) -> SegmentReached:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "SegmentReached")
-        return value
+        v = codec.unpack_all(_SegmentReached_0, data, "SegmentReached")
+        id = v[0]
+        item = v[1]
+        segment = v[2]
+        return cls(id=id, item=item, segment=segment)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
@@ -5372,31 +5144,19 @@ class StatesMissed:
 
     count: int
 
-    def _write(self, out: list[bytes]) -> None:
-        out.append(_StatesMissed_0.pack(self.count))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[StatesMissed, int]:
-        v = codec.unpack(_StatesMissed_0, data, pos)
-        pos += _StatesMissed_0.size
-        count = v[0]
-        return cls(count=count), pos
-
-    def _check(self, path: str) -> None:
-        pass
-
     def encode(self) -> bytes:
         """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
+        return _StatesMissed_0.pack(self.count)
 
     @classmethod
     def decode(cls, data: bytes) -> StatesMissed:
         """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "StatesMissed")
-        return value
+        v = codec.unpack_all(_StatesMissed_0, data, "StatesMissed")
+        count = v[0]
+        return cls(count=count)
+
+    def _check(self, path: str) -> None:
+        pass
 
     def validate(self) -> None:
         """Raise Violation for a field outside its range."""
