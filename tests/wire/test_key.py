@@ -17,7 +17,7 @@ from heptarm.wire.codes import Code
 from heptarm.wire.frames import HEADER, pack
 from heptarm.wire.key import KeyExchange, without_mac
 from heptarm.wire.messages import Accepted, Challenge, Hello, Ping, Proof, SetOverride, Stop, Welcome
-from heptarm.wire.session import Received, Session, Side
+from heptarm.wire.session import RECEIVED, SENT, Received, Session, Side
 from heptarm.wire.states import SessionState
 from tests.cabinet import fake
 from tests.cabinet.fake import toolchain
@@ -258,7 +258,7 @@ def test_any_changed_byte_is_noticed(place: int, change: int) -> None:
 
 def test_tags_go_on_after_the_sequence_number_wraps() -> None:
     client, cabinet = open_pair(KEY)
-    client._sent = cabinet._received = 0xFFFFFFFF
+    client.counts[SENT] = cabinet.counts[RECEIVED] = 0xFFFFFFFF
     first = client.send(Ping(sent=1))
     second = client.send(Ping(sent=2))
     assert [one.message for one in pour(first + second, cabinet)] == [Ping(sent=1), Ping(sent=2)]  # type: ignore[union-attr]

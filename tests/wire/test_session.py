@@ -32,7 +32,7 @@ from heptarm.wire.messages import (
     Stop,
     Subscribe,
 )
-from heptarm.wire.session import Received, Session, Side, StateReceived
+from heptarm.wire.session import REQUESTED, SENT, Received, Session, Side, StateReceived
 from heptarm.wire.states import TRANSITIONS, SessionState, symbol
 from tests.wire.pairs import open_pair, pour, welcome
 
@@ -110,13 +110,13 @@ def test_requests_and_answers_carry_the_id() -> None:
 
 def test_request_ids_are_never_zero() -> None:
     client, _ = open_pair()
-    client._last_request = 0xFFFFFFFE
+    client.counts[REQUESTED] = 0xFFFFFFFE
     assert [client.next_request(), client.next_request()] == [0xFFFFFFFF, 1]
 
 
 def test_what_a_side_may_not_send() -> None:
     client, cabinet = open_pair()
-    before = client._sent
+    before = client.counts[SENT]
     for message, request in [(Accepted(id=1), 1), (Stop(), 0), (Ping(sent=0), 3), (client.hello(name=""), 0)]:
         with pytest.raises(LocalProtocolError):
             client.send(message, request=request)
@@ -125,7 +125,7 @@ def test_what_a_side_may_not_send() -> None:
     client.send(Stop(), request=4)
     with pytest.raises(LocalProtocolError, match="in use"):
         client.send(Stop(), request=4)
-    assert client._sent == before + 1  # nothing illegal has left a trace
+    assert client.counts[SENT] == before + 1  # nothing illegal has left a trace
 
 
 @pytest.mark.parametrize("kind", ONE_WAY, ids=lambda kind: kind.__name__)
@@ -233,7 +233,7 @@ def conversation() -> tuple[bytes, list[object]]:
 def asked() -> Session:
     client = Session(Side.CLIENT, nonce=NONCES[0])
     client.send(client.hello(name="t"))
-    client._waiting[1] = Subscribe
+    client.waiting[1] = Subscribe
     return client
 
 

@@ -8,7 +8,7 @@ import select
 import socket
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from heptarm.errors import ConnectFailed, ConnectionLost
 from heptarm.io.udp import ConnectedUdp
@@ -46,12 +46,14 @@ class TcpTransport:
         sock: the socket; the transport closes it.
     """
 
-    __slots__ = ("_closed", "_poll", "_sock", "peer")
+    __slots__ = ("_closed", "_poll", "_sock", "fileno", "peer")
 
     peer: str
+    fileno: Callable[[], int]
 
     def __init__(self, sock: socket.socket) -> None:
         self._sock = sock
+        self.fileno = sock.fileno  # not a method: every request calls it
         self._closed = False
         # time-outs are set in the kernel: Python's own cost a poll() before each call
         sock.settimeout(None)
@@ -70,7 +72,7 @@ class TcpTransport:
         try:
             self._sock.sendall(data)
         except OSError as error:
-            raise self._lost(error) from error
+            raise self.lost(error) from error
 
     def receive_into(self, buffer: memoryview, *, wait: bool = True) -> int:
         """Receive bytes; with `wait`, wait for up to the patience."""
@@ -79,9 +81,9 @@ class TcpTransport:
         except OSError as error:
             if error.errno in _NO_DATA and not self._closed:
                 return 0
-            raise self._lost(error) from error
+            raise self.lost(error) from error
         if size == 0:
-            raise self._lost(None)
+            raise self.lost(None)
         return size
 
     def wait_readable(self, seconds: float) -> bool:
@@ -97,6 +99,13 @@ class TcpTransport:
         """Set how long `receive_into` waits for bytes [s]."""
         with contextlib.suppress(OSError):  # a lost connection shows at the next call
             self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _interval(max(seconds, 1e-3)))
+
+    def lost(self, error: OSError | None) -> ConnectionLost:
+        """The error of a connection whose socket has this error; None: of one that the other side has closed."""
+        if self._closed:
+            return ConnectionLost(f"the connection to {self.peer} is closed")
+        reason = "the other side closed it" if error is None else _reason(error, SEND_TIMEOUT)
+        return ConnectionLost(f"the connection to {self.peer} is lost: {reason}")
 
     def close(self) -> None:
         """Close the connection. Closing twice is allowed."""
@@ -116,12 +125,6 @@ class TcpTransport:
             return ConnectedUdp(self._sock.getsockname(), self._sock.getpeername(), family=self._sock.family)
         except (OSError, ConnectFailed):  # the connection has ended, or is no connection of the network
             return None
-
-    def _lost(self, error: OSError | None) -> ConnectionLost:
-        if self._closed:
-            return ConnectionLost(f"the connection to {self.peer} is closed")
-        reason = "the other side closed it" if error is None else _reason(error, SEND_TIMEOUT)
-        return ConnectionLost(f"the connection to {self.peer} is lost: {reason}")
 
 
 class TcpListener:

@@ -53,6 +53,14 @@ class Transport(Protocol):
         """Set how long `receive_into` waits for bytes [s]."""
         ...
 
+    def fileno(self) -> int:
+        """Descriptor of the connected stream socket; -1: there is none, or it is closed."""
+        ...
+
+    def lost(self, error: OSError) -> ConnectionLost:
+        """The error of a connection whose socket has this error."""
+        ...
+
     def close(self) -> None:
         """Close the connection; a waiting `receive_into` raises ConnectionLost. Closing twice is allowed."""
         ...
@@ -110,7 +118,7 @@ class MemoryTransport:
         """Send all the data."""
         with self._out.changed:
             if self._out.is_closed:
-                raise self._lost()
+                raise self.lost()
             self._out.data += data
             self._out.changed.notify_all()
 
@@ -121,7 +129,7 @@ class MemoryTransport:
             if wait and not pipe.data and not pipe.is_closed:
                 pipe.changed.wait(self._patience)
             if self._closed or (pipe.is_closed and not pipe.data):
-                raise self._lost()
+                raise self.lost()
             size = min(len(buffer), len(pipe.data), self._chunk or len(buffer))
             buffer[:size] = pipe.data[:size]
             del pipe.data[:size]
@@ -139,6 +147,16 @@ class MemoryTransport:
         """Set how long `receive_into` waits for bytes [s]."""
         self._patience = seconds
 
+    def fileno(self) -> int:
+        """-1: there is no socket."""
+        return -1
+
+    def lost(self, error: OSError | None = None) -> ConnectionLost:
+        """The error of a connection that has ended."""
+        if self._closed:
+            return ConnectionLost(f"the connection to {self.peer} is closed")
+        return ConnectionLost(f"the connection to {self.peer} is lost: the other side closed it")
+
     def close(self) -> None:
         """Close both directions."""
         self._closed = True
@@ -154,11 +172,6 @@ class MemoryTransport:
     def datagrams(self) -> DatagramSocket | None:
         """None: there are no datagrams in memory."""
         return None
-
-    def _lost(self) -> ConnectionLost:
-        if self._closed:
-            return ConnectionLost(f"the connection to {self.peer} is closed")
-        return ConnectionLost(f"the connection to {self.peer} is lost: the other side closed it")
 
 
 def memory_pair(*, chunk: int | None = None) -> tuple[MemoryTransport, MemoryTransport]:

@@ -178,6 +178,8 @@ def within(value: float, name: str, low: float, high: float, *, above: bool = Fa
         ShapeError: it is no number.
         LimitError: it is outside, or NaN.
     """
+    if type(value) is float and low < value <= high:  # the usual case
+        return value + 0.0
     number = scalar(value, name, unit=unit)
     if not (low < number if above else low <= number) or not number <= high:
         of_unit = f" {unit}" if unit else ""

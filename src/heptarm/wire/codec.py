@@ -44,12 +44,11 @@ def unpack(layout: Struct, data: bytes, pos: int) -> tuple[Any, ...]:
     return layout.unpack_from(data, pos)
 
 
-def unpack_all(layout: Struct, data: bytes, name: str) -> tuple[Any, ...]:
-    """Unpack a body that is one layout; refuse a longer and a shorter one."""
-    if len(data) != layout.size:
-        unpack(layout, data, 0)
-        end(data, layout.size, name)
-    return layout.unpack(data)
+def wrong_size(layout: Struct, data: bytes, name: str) -> DecodeError:
+    """The error of a body that is one layout, and has another size."""
+    if len(data) < layout.size:
+        return DecodeError(f"body is too short: {layout.size} bytes expected at 0, {len(data)} left")
+    return DecodeError(f"{name}: {len(data) - layout.size} bytes behind its end")
 
 
 def read_bool(value: int) -> bool:

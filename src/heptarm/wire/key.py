@@ -88,24 +88,28 @@ class FrameTag:
 
     Args:
         key: the key of this direction [32 bytes].
+
+    Attributes:
+        inner: hash of the inner padding of HMAC and the number of the round.
+        outer: hash of the outer padding.
     """
 
-    __slots__ = ("_inner", "_key", "_outer", "_round")
+    __slots__ = ("_key", "_round", "inner", "outer")
 
     def __init__(self, key: bytes) -> None:
         self._key = key.ljust(64, b"\0")
-        self._outer = hashlib.sha256(self._key.translate(_OUTER))
+        self.outer = hashlib.sha256(self._key.translate(_OUTER))
         self._round = -1
         self.begin_round()
 
     def begin_round(self) -> None:
         """Begin to count the frames from 0; called again each time their sequence number wraps."""
         self._round += 1
-        self._inner = hashlib.sha256(self._key.translate(_INNER) + _ROUND.pack(self._round))
+        self.inner = hashlib.sha256(self._key.translate(_INNER) + _ROUND.pack(self._round))
 
     def of(self, frame: bytes | bytearray | memoryview) -> bytes:
         """The tag of a frame: of its header and its body."""
-        inner, outer = self._inner.copy(), self._outer.copy()
+        inner, outer = self.inner.copy(), self.outer.copy()
         inner.update(frame)
         outer.update(inner.digest())
         return outer.digest()[:TAG]

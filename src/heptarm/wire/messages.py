@@ -2724,7 +2724,9 @@ class Ping:
     @classmethod
     def decode(cls, data: bytes) -> Ping:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Ping_0, data, "Ping")
+        if len(data) != _Ping_0.size:
+            raise codec.wrong_size(_Ping_0, data, "Ping")
+        v = _Ping_0.unpack(data)
         sent = v[0]
         return cls(sent=sent)
 
@@ -2758,7 +2760,9 @@ class Pong:
     @classmethod
     def decode(cls, data: bytes) -> Pong:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Pong_0, data, "Pong")
+        if len(data) != _Pong_0.size:
+            raise codec.wrong_size(_Pong_0, data, "Pong")
+        v = _Pong_0.unpack(data)
         sent = v[0]
         received = v[1]
         return cls(sent=sent, received=received)
@@ -2840,7 +2844,9 @@ class Halt:
     @classmethod
     def decode(cls, data: bytes) -> Halt:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Halt_0, data, "Halt")
+        if len(data) != _Halt_0.size:
+            raise codec.wrong_size(_Halt_0, data, "Halt")
+        v = _Halt_0.unpack(data)
         kind = codec.read_enum(StopKind, v[0])
         return cls(kind=kind)
 
@@ -2913,7 +2919,9 @@ class Accepted:
     @classmethod
     def decode(cls, data: bytes) -> Accepted:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Accepted_0, data, "Accepted")
+        if len(data) != _Accepted_0.size:
+            raise codec.wrong_size(_Accepted_0, data, "Accepted")
+        v = _Accepted_0.unpack(data)
         id = v[0]
         return cls(id=id)
 
@@ -3047,7 +3055,9 @@ class TakeControl:
     @classmethod
     def decode(cls, data: bytes) -> TakeControl:
         """Read one body, all of it."""
-        v = codec.unpack_all(_TakeControl_0, data, "TakeControl")
+        if len(data) != _TakeControl_0.size:
+            raise codec.wrong_size(_TakeControl_0, data, "TakeControl")
+        v = _TakeControl_0.unpack(data)
         watchdog = v[0]
         on_lost = codec.read_enum(OnLost, v[1])
         return cls(watchdog=watchdog, on_lost=on_lost)
@@ -3123,7 +3133,9 @@ class Subscribe:
     @classmethod
     def decode(cls, data: bytes) -> Subscribe:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Subscribe_0, data, "Subscribe")
+        if len(data) != _Subscribe_0.size:
+            raise codec.wrong_size(_Subscribe_0, data, "Subscribe")
+        v = _Subscribe_0.unpack(data)
         groups = Groups(v[0])
         rate = v[1]
         return cls(groups=groups, rate=rate)
@@ -3214,7 +3226,9 @@ class Cancel:
     @classmethod
     def decode(cls, data: bytes) -> Cancel:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Cancel_0, data, "Cancel")
+        if len(data) != _Cancel_0.size:
+            raise codec.wrong_size(_Cancel_0, data, "Cancel")
+        v = _Cancel_0.unpack(data)
         id = v[0]
         return cls(id=id)
 
@@ -3247,7 +3261,9 @@ class Stop:
     @classmethod
     def decode(cls, data: bytes) -> Stop:
         """Read one body, all of it."""
-        v = codec.unpack_all(_Stop_0, data, "Stop")
+        if len(data) != _Stop_0.size:
+            raise codec.wrong_size(_Stop_0, data, "Stop")
+        v = _Stop_0.unpack(data)
         kind = codec.read_enum(StopKind, v[0])
         return cls(kind=kind)
 
@@ -3361,7 +3377,9 @@ class SetOverride:
     @classmethod
     def decode(cls, data: bytes) -> SetOverride:
         """Read one body, all of it."""
-        v = codec.unpack_all(_SetOverride_0, data, "SetOverride")
+        if len(data) != _SetOverride_0.size:
+            raise codec.wrong_size(_SetOverride_0, data, "SetOverride")
+        v = _SetOverride_0.unpack(data)
         value = v[0]
         return cls(value=value)
 
@@ -3949,7 +3967,9 @@ class DatagramStatistics:
     @classmethod
     def decode(cls, data: bytes) -> DatagramStatistics:
         """Read one body, all of it."""
-        v = codec.unpack_all(_DatagramStatistics_0, data, "DatagramStatistics")
+        if len(data) != _DatagramStatistics_0.size:
+            raise codec.wrong_size(_DatagramStatistics_0, data, "DatagramStatistics")
+        v = _DatagramStatistics_0.unpack(data)
         accepted = v[0]
         old = v[1]
         late = v[2]
@@ -4141,7 +4161,9 @@ class ServoJoints:
     @classmethod
     def decode(cls, data: bytes) -> ServoJoints:
         """Read one body, all of it."""
-        v = codec.unpack_all(_ServoJoints_0, data, "ServoJoints")
+        if len(data) != _ServoJoints_0.size:
+            raise codec.wrong_size(_ServoJoints_0, data, "ServoJoints")
+        v = _ServoJoints_0.unpack(data)
         servo = v[0]
         watchdog = v[1]
         q = v[2:9]
@@ -4182,7 +4204,9 @@ class ServoJointsVelocity:
     @classmethod
     def decode(cls, data: bytes) -> ServoJointsVelocity:
         """Read one body, all of it."""
-        v = codec.unpack_all(_ServoJointsVelocity_0, data, "ServoJointsVelocity")
+        if len(data) != _ServoJointsVelocity_0.size:
+            raise codec.wrong_size(_ServoJointsVelocity_0, data, "ServoJointsVelocity")
+        v = _ServoJointsVelocity_0.unpack(data)
         servo = v[0]
         watchdog = v[1]
         q = v[2:9]
@@ -4225,7 +4249,9 @@ class ServoPose:
     @classmethod
     def decode(cls, data: bytes) -> ServoPose:
         """Read one body, all of it."""
-        v = codec.unpack_all(_ServoPose_0, data, "ServoPose")
+        if len(data) != _ServoPose_0.size:
+            raise codec.wrong_size(_ServoPose_0, data, "ServoPose")
+        v = _ServoPose_0.unpack(data)
         servo = v[0]
         watchdog = v[1]
         xyz = v[2:5]
@@ -4312,7 +4338,9 @@ class ServoClose:
     @classmethod
     def decode(cls, data: bytes) -> ServoClose:
         """Read one body, all of it."""
-        v = codec.unpack_all(_ServoClose_0, data, "ServoClose")
+        if len(data) != _ServoClose_0.size:
+            raise codec.wrong_size(_ServoClose_0, data, "ServoClose")
+        v = _ServoClose_0.unpack(data)
         servo = v[0]
         return cls(servo=servo)
 
@@ -4496,7 +4524,9 @@ class FriClose:
     @classmethod
     def decode(cls, data: bytes) -> FriClose:
         """Read one body, all of it."""
-        v = codec.unpack_all(_FriClose_0, data, "FriClose")
+        if len(data) != _FriClose_0.size:
+            raise codec.wrong_size(_FriClose_0, data, "FriClose")
+        v = _FriClose_0.unpack(data)
         session = v[0]
         return cls(session=session)
 
@@ -4584,7 +4614,9 @@ class MotionStarted:
     @classmethod
     def decode(cls, data: bytes) -> MotionStarted:
         """Read one body, all of it."""
-        v = codec.unpack_all(_MotionStarted_0, data, "MotionStarted")
+        if len(data) != _MotionStarted_0.size:
+            raise codec.wrong_size(_MotionStarted_0, data, "MotionStarted")
+        v = _MotionStarted_0.unpack(data)
         id = v[0]
         item = v[1]
         return cls(id=id, item=item)
@@ -4619,7 +4651,9 @@ class ItemReached:
     @classmethod
     def decode(cls, data: bytes) -> ItemReached:
         """Read one body, all of it."""
-        v = codec.unpack_all(_ItemReached_0, data, "ItemReached")
+        if len(data) != _ItemReached_0.size:
+            raise codec.wrong_size(_ItemReached_0, data, "ItemReached")
+        v = _ItemReached_0.unpack(data)
         id = v[0]
         item = v[1]
         return cls(id=id, item=item)
@@ -4966,7 +5000,9 @@ class KeyPressed:
     @classmethod
     def decode(cls, data: bytes) -> KeyPressed:
         """Read one body, all of it."""
-        v = codec.unpack_all(_KeyPressed_0, data, "KeyPressed")
+        if len(data) != _KeyPressed_0.size:
+            raise codec.wrong_size(_KeyPressed_0, data, "KeyPressed")
+        v = _KeyPressed_0.unpack(data)
         slot = v[0]
         down = codec.read_bool(v[1])
         return cls(slot=slot, down=down)
@@ -5116,7 +5152,9 @@ class SegmentReached:
     @classmethod
     def decode(cls, data: bytes) -> SegmentReached:
         """Read one body, all of it."""
-        v = codec.unpack_all(_SegmentReached_0, data, "SegmentReached")
+        if len(data) != _SegmentReached_0.size:
+            raise codec.wrong_size(_SegmentReached_0, data, "SegmentReached")
+        v = _SegmentReached_0.unpack(data)
         id = v[0]
         item = v[1]
         segment = v[2]
@@ -5151,7 +5189,9 @@ class StatesMissed:
     @classmethod
     def decode(cls, data: bytes) -> StatesMissed:
         """Read one body, all of it."""
-        v = codec.unpack_all(_StatesMissed_0, data, "StatesMissed")
+        if len(data) != _StatesMissed_0.size:
+            raise codec.wrong_size(_StatesMissed_0, data, "StatesMissed")
+        v = _StatesMissed_0.unpack(data)
         count = v[0]
         return cls(count=count)
 

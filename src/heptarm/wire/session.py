@@ -46,6 +46,8 @@ from heptarm.wire.messages import (
 from heptarm.wire.states import TRANSITIONS, SessionState, symbol
 
 _WRAP = 0xFFFFFFFF
+#: Places in `Session.counts`.
+SENT, RECEIVED, REQUESTED, UNREAD = range(4)
 _SYMBOLS = {kind: symbol(kind) for kind in MESSAGES.values()}
 _PACKERS = {kind: packer(kind, None) for kind in ONE_WAY}
 #: Messages that are the same in every major version: an error can name both versions, and a stop needs no version.
@@ -106,6 +108,12 @@ class Session:
 
     Attributes:
         is_proven: the other side has proved that it knows the key; False without a key.
+        counts: frames sent, frames received, the last request id, and bytes of a frame that is not complete yet. A
+            list, since `heptarm.io.exchange` counts what it sends and receives itself.
+        waiting: requests without an answer, by their ids.
+        tags: of this side's frames and of the other side's, once the key is proven.
+        simple_requests: what may be requested now without this session, which then interprets the answer (`answer`):
+            requests that keep the state as it is.
     """
 
     def __init__(self, side: Side, *, key: bytes | None = None, nonce: bytes | None = None) -> None:
@@ -115,14 +123,13 @@ class Session:
         self._nonce = secrets.token_bytes(NONCE) if nonce is None else nonce
         self._other_nonce = b""
         self.is_proven = False
+        self.waiting: dict[int, type[Message]] = {}
         self._reader = FrameReader()
         self._tag: FrameTag | None = None
+        self.tags: list[FrameTag] = []
         self._one_way = _PACKERS
         self._enter(SessionState.START)
-        self._sent = 0
-        self._received = 0
-        self._last_request = 0
-        self._waiting: dict[int, type[Message]] = {}
+        self.counts = [0, 0, 0, 0]
         self._failed: RemoteProtocolError | None = None
 
     @property
@@ -139,8 +146,8 @@ class Session:
 
     def next_request(self) -> int:
         """Get an unused request id."""
-        self._last_request = self._last_request % _WRAP + 1
-        return self._last_request
+        self.counts[REQUESTED] = request = self.counts[REQUESTED] % _WRAP + 1
+        return request
 
     def send(self, message: Message, *, request: int = 0, time: int = 0) -> bytes:
         """Pack a message to send.
@@ -154,10 +161,10 @@ class Session:
             LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
         kind = type(message)
-        if kind in self._requests and request != 0 and request not in self._waiting:  # the usual case
+        if kind in self.simple_requests and request != 0 and request not in self.waiting:  # the usual case
             body = message.encode()
-            data = pack(kind.TYPE, body, seq=self._sent, request=request, time=time, tag=self._tag)
-            self._waiting[request] = kind
+            data = pack(kind.TYPE, body, seq=self.counts[SENT], request=request, time=time, tag=self._tag)
+            self.waiting[request] = kind
             self._count_sent()
             return data
         after = self._legal.get(_SYMBOLS[kind])
@@ -166,14 +173,14 @@ class Session:
         is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or request != 0)
         if is_numbered != (request != 0):
             raise LocalProtocolError(f"a {kind.__name__} with request id {request}")
-        if kind.KIND == "request" and request in self._waiting:
+        if kind.KIND == "request" and request in self.waiting:
             raise LocalProtocolError(f"request id {request} is in use")
-        if kind.KIND == "answer" and is_numbered and request not in self._waiting:
+        if kind.KIND == "answer" and is_numbered and request not in self.waiting:
             raise LocalProtocolError(f"no request {request} waits for an answer")
         if kind is Welcome and self._exchange is not None:
             message = self._with_mac(message)
         body = message.encode()
-        data = pack(kind.TYPE, body, seq=self._sent, request=request, time=time, tag=self._tag)
+        data = pack(kind.TYPE, body, seq=self.counts[SENT], request=request, time=time, tag=self._tag)
         self._count_sent()
         self._after(kind, after, request, body)
         return data
@@ -205,7 +212,7 @@ class Session:
         pack = self._packers.get(kind)
         if pack is None:
             raise self._illegal(kind)
-        return pack(self._sent, number, time, *numbers)
+        return pack(self.counts[SENT], number, time, *numbers)
 
     def datagrams(self, session: int, token: bytes) -> Datagrams:
         """This side's end of the datagrams beside the session.
@@ -249,8 +256,8 @@ class Session:
         return replace(bare, mac=self._exchange.cabinet_mac(Welcome.TYPE, bare.encode()))
 
     def _count_sent(self) -> None:
-        self._sent = (self._sent + 1) & _WRAP
-        if self._sent == 0 and self._tag is not None:
+        self.counts[SENT] = (self.counts[SENT] + 1) & _WRAP
+        if self.counts[SENT] == 0 and self._tag is not None:
             self._tag.begin_round()
 
     # ----------------------------------------------------------------------------------- receiving
@@ -268,6 +275,21 @@ class Session:
         """
         return iter(self._next_event, None)
 
+    def answer(self, type: int, body: bytes) -> Message:
+        """Decode the answer to one of `simple_requests`, which `heptarm.io.exchange` has received.
+
+        Raises:
+            RemoteProtocolError: the other side violated the protocol; the session is closed.
+        """
+        try:
+            kind = self._answers.get(type)
+            if kind is None:
+                raise _broken(Code.UNEXPECTED_MESSAGE, f"message {type} came as the answer to a request")
+            return _decoded(kind, body)
+        except RemoteProtocolError as error:
+            self._fail(error)
+            raise
+
     def _next_event(self) -> Received | StateReceived | None:
         """The next event; None until more bytes arrive, and when the session is closed."""
         if self._failed is not None:
@@ -276,11 +298,17 @@ class Session:
             return None
         try:
             frame = self._reader.read()
-            return None if frame is None else self._accept(frame)
+            if frame is None:
+                self.counts[UNREAD] = len(self._reader)
+                return None
+            return self._accept(frame)
         except RemoteProtocolError as error:
-            self._failed = error
-            self._enter(SessionState.CLOSED)
+            self._fail(error)
             raise
+
+    def _fail(self, error: RemoteProtocolError) -> None:
+        self._failed = error
+        self._enter(SessionState.CLOSED)
 
     def _accept(self, frame: Frame) -> Received | StateReceived:
         version, type_, seq, request, time, body = frame
@@ -288,17 +316,21 @@ class Session:
             raise _broken(
                 Code.WRONG_VERSION, f"a frame has protocol version {version}, this side has {MAJOR}"
             )
-        if seq != self._received:
-            raise forged(f"expected frame {self._received}, got frame {seq}")
+        if seq != self.counts[RECEIVED]:
+            raise forged(f"expected frame {self.counts[RECEIVED]}, got frame {seq}")
         self._count_received()
         # states and answers are by far the most frequent
         if type_ == State.TYPE and request == 0 and self._takes_states:
             return StateReceived(body, time)
+        return Received(self._interpret(type_, request, body), request, time)
+
+    def _interpret(self, type_: int, request: int, body: bytes) -> Message:
+        """Decode a message, which must be legal now, and do what it does to the session."""
         kind = self._answers.get(type_)
-        if kind is not None and request in self._waiting:
+        if kind is not None and request in self.waiting:
             message = _decoded(kind, body)
-            del self._waiting[request]
-            return Received(message, request, time)
+            del self.waiting[request]
+            return message
         kind = MESSAGES.get(type_)
         if kind is None:
             raise _broken(Code.UNKNOWN_MESSAGE, f"message id {type_} is not known")
@@ -307,7 +339,7 @@ class Session:
         if kind.KIND == "handshake":
             self._check_handshake(message, body)
         self._after(kind, after, request, body)
-        return Received(message, request, time)
+        return message
 
     def _check_legal(self, kind: type[Message], request: int) -> SessionState:
         """Check that a message may come now, with this request id; returns the state after it."""
@@ -318,15 +350,15 @@ class Session:
         is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or request != 0)
         if is_numbered != (request != 0) and kind.KIND != "oneway":  # a target may have a number
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} with request id {request}")
-        if kind.KIND == "answer" and is_numbered and request not in self._waiting:
+        if kind.KIND == "answer" and is_numbered and request not in self.waiting:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"an answer to request {request}, which was not made")
-        if kind.KIND == "request" and request in self._waiting:
+        if kind.KIND == "request" and request in self.waiting:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"request id {request} is in use")
         return after
 
     def _count_received(self) -> None:
-        self._received = (self._received + 1) & _WRAP
-        if self._received == 0 and self._reader.tag is not None:
+        self.counts[RECEIVED] = (self.counts[RECEIVED] + 1) & _WRAP
+        if self.counts[RECEIVED] == 0 and self._reader.tag is not None:
             self._reader.tag.begin_round()
 
     def _check_handshake(self, message: Message, body: bytes) -> None:
@@ -350,7 +382,7 @@ class Session:
 
     def _enter(self, state: SessionState) -> None:
         self._state, self._legal = state, TRANSITIONS[state]
-        self._requests, self._answers = _plain(state, self._source)
+        self.simple_requests, self._answers = _plain(state, self._source)
         self._takes_states = _SYMBOLS[State] in self._legal and self._source != State.SOURCE
         self._packers = {
             kind: pack
@@ -366,16 +398,18 @@ class Session:
         if after is not self._state:
             self._enter(after)
         if kind.KIND == "request":
-            self._waiting[request] = kind
+            self.waiting[request] = kind
         elif kind.KIND == "answer":
-            self._waiting.pop(request, None)
+            self.waiting.pop(request, None)
 
     def _begin_tags(self, exchange: KeyExchange) -> None:
         """Tag every frame from here on, in both directions."""
         if self._side is Side.CLIENT:
-            self._tag, self._reader.tag = exchange.tags(self._nonce, self._other_nonce)
+            ours, theirs = exchange.tags(self._nonce, self._other_nonce)
         else:
-            self._reader.tag, self._tag = exchange.tags(self._other_nonce, self._nonce)
+            theirs, ours = exchange.tags(self._other_nonce, self._nonce)
+        self._tag, self._reader.tag = ours, theirs
+        self.tags += ours, theirs
         self._one_way = {kind: packer(kind, self._tag) for kind in ONE_WAY}
 
     def _illegal(self, kind: type[Message]) -> LocalProtocolError:

@@ -26,6 +26,7 @@ from heptarm.errors import (
     Timeout,
 )
 from heptarm.io.clock import Clock
+from heptarm.io.exchange import exchange_of
 from heptarm.io.transport import Transport
 from heptarm.wire.clock_sync import ClockOffset, PingDeparture
 from heptarm.wire.codes import Code
@@ -207,6 +208,11 @@ _LOOPED_STATES = 100.0
 _LOOPING, _LOOP_STEP = 5_000_000, 0.002
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
+#: The usual answer, and its type and body.
+_ACCEPTED = Accepted(id=0)
+_PLAIN_ANSWER = (Accepted.TYPE, _ACCEPTED.encode())
+#: Requests that also go by datagram.
+_URGENT = (Stop, Cancel)
 #: Largest number of a target; they begin again at 0, which counts as newer than all.
 _NUMBERS = 0xFFFFFFFF
 
@@ -255,6 +261,17 @@ class Link:
         self._caller_reads = False
         self._reader = 0  # its thread identifier
         self._pending: dict[int, PendingRequest] = {}
+        self._spare = [PendingRequest()]
+        self._left: list[bytes] = []  # received, but not read yet
+        self._exchange = exchange_of(
+            self._session,
+            transport.fileno,
+            left=self._left,
+            pending=self._pending,
+            spare=self._spare,
+            reading=self._reading,
+            sending=self._sending,
+        )
         self._welcome: Welcome | None = None
         self._error: HeptarmError | None = None
         self._closing = False
@@ -417,14 +434,73 @@ class Link:
             ConnectionLost: the link has ended.
             Timeout: no answer in time.
         """
+        answer = self._ask_at_once(message, timeout) if on_answer is None else None
+        if answer is None:
+            answer = self._ask(message, timeout, on_answer)
+        if self._on_answer is not None:
+            self._on_answer(message, answer)
+        if isinstance(answer, Rejected):
+            raise rejection(answer)
+        return answer
+
+    def _ask_at_once(self, message: Message, timeout: float) -> Message | None:
+        """Send a request and read its answer in one call of C; None: `_ask` has to send it.
+
+        This is the usual case: no other thread sends or reads, and the answer is the next frame to come.
+        """
+        exchange, kind = self._exchange, type(message)
+        if exchange is None or kind not in self._session.simple_requests:
+            return None
+        if kind in _URGENT and self._datagrams is not None:
+            return None
+        now = self._requested = self._clock.nanos()
+        try:
+            received = exchange(kind, kind.TYPE, now, message.encode())
+        except OSError as error:
+            self._fail(self._transport.lost(error))
+            raise self._lost() from error
+        if received is None:
+            return None
+        if isinstance(received, PendingRequest):
+            self._spare.append(PendingRequest())
+            return self._answer(message, received, timeout, InterruptShield())
+        self._heartbeat.received = now
+        if received == _PLAIN_ANSWER:
+            return _ACCEPTED
+        try:
+            return printable_message(self._session.answer(*received))
+        except RemoteProtocolError as error:
+            self._fail(error)
+            raise self._lost() from error
+
+    def _ask(self, message: Message, timeout: float, on_answer: Callable[[Message], None] | None) -> Message:
+        """Send a request and wait for its answer, in the cases that `_ask_at_once` leaves."""
+        if not self._spare:  # an interrupt came in the one moment in which it was missing
+            self._spare.append(PendingRequest())
         pending = PendingRequest(on_answer)
-        deadline = self._clock.nanos() + round(timeout * 1e9)
-        line, number = self._datagrams, 0
+        line = self._datagrams if type(message) in _URGENT else None
         shield = InterruptShield()
         try:
             number = self._send(message, pending)
-            if line is not None and isinstance(message, Stop | Cancel):
-                line.repeat(message, number)
+            if line is None:
+                return self._answer(message, pending, timeout, shield)
+            line.repeat(message, number)
+            try:
+                return self._answer(message, pending, timeout, shield)
+            finally:
+                line.answered(number)
+        finally:
+            shield.release()
+
+    def _answer(
+        self, message: Message, pending: PendingRequest, timeout: float, shield: InterruptShield
+    ) -> Message:
+        """Wait for the answer to a request that was sent; this thread reads it itself unless another one reads.
+
+        Releases the shield as soon as this thread reads no more.
+        """
+        deadline = self._clock.nanos() + round(timeout * 1e9)
+        try:
             if self._reader == get_ident():  # called from a callback: this thread is the one that reads
                 self._read_until(pending, deadline, shield)
             elif self._may_read():
@@ -441,21 +517,14 @@ class Link:
             shield.release()
         if pending.answer is None and self._error is None:
             pending.wait((deadline - self._clock.nanos()) * 1e-9)
-        answer = pending.answer
-        if line is not None:
-            line.answered(number)
-        if answer is None:
-            if self._error is not None:
-                raise self._lost()
-            raise Timeout(
-                f"the cabinet did not answer {type(message).__name__} within {timeout:g} s",
-                hint="check the network and the load of both machines, or use connect(..., timeout=...)",
-            )
-        if self._on_answer is not None:
-            self._on_answer(message, answer)
-        if isinstance(answer, Rejected):
-            raise rejection(answer)
-        return answer
+        if pending.answer is not None:
+            return pending.answer
+        if self._error is not None:
+            raise self._lost()
+        raise Timeout(
+            f"the cabinet did not answer {type(message).__name__} within {timeout:g} s",
+            hint="check the network and the load of both machines, or use connect(..., timeout=...)",
+        )
 
     def read_while(self, waits: Callable[[], bool], seconds: float) -> None:
         """Read in the calling thread while it waits for a state, so that each state wakes one thread, not two.
@@ -596,15 +665,18 @@ class Link:
 
     def _read(self, *, wait: bool) -> None:
         """Read and handle what has arrived; the caller holds `_reading`."""
-        view = self._view
+        view, left = self._view, self._left
         view[:8] = _UNTOUCHED
         try:
-            size = self._transport.receive_into(view, wait=wait)
-            if size == 0:
-                return
+            if left:
+                data: bytes | memoryview = left.pop()
+            else:
+                data = view[: self._transport.receive_into(view, wait=wait)]
+                if not data:
+                    return
             now = self._clock.nanos()
             session = self._session
-            session.receive_data(view[:size])
+            session.receive_data(data)
             for event in session.events():
                 self._heartbeat.received = now  # only a whole frame is a sign of life
                 if type(event) is StateReceived:
@@ -677,7 +749,7 @@ class Link:
                     # more requests may follow: an answer should wake only its caller
                     clock.sleep(_STEP)
                     self._read_now()
-                elif transport.wait_readable(rest):
+                elif self._left or transport.wait_readable(rest):
                     self._read_now()
                 else:
                     self._heartbeat.check(now, self.peer)

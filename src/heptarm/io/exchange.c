@@ -1,0 +1,301 @@
+/* A request and its answer over a connected socket, in one function that Python can call.
+
+Python runs signal handlers between two instructions of its own, never within a function in C: so Ctrl-C comes before a
+request or after its answer, and none of the frames is cut.
+
+The interface of Python is declared here, since its headers are a package of its own on many systems. All of it belongs
+to the stable ABI. */
+
+#include <errno.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+
+#include "frame_layout.h"
+
+typedef struct _object PyObject;
+typedef ptrdiff_t Py_ssize_t;
+typedef struct {
+    const char *name;
+    void *function;
+    int flags;
+    const char *text;
+} PyMethodDef;
+
+enum { METH_FASTCALL = 0x80 };
+
+extern PyObject _Py_NoneStruct, _Py_TrueStruct, _Py_FalseStruct;
+extern PyObject *PyExc_OSError;
+extern void Py_IncRef(PyObject *), Py_DecRef(PyObject *);
+extern void *PyEval_SaveThread(void);
+extern void PyEval_RestoreThread(void *);
+extern PyObject *PyErr_Occurred(void), *PyErr_SetFromErrno(PyObject *);
+extern void PyErr_Clear(void);
+extern int PyBytes_AsStringAndSize(PyObject *, char **, Py_ssize_t *);
+extern PyObject *PyBytes_FromStringAndSize(const char *, Py_ssize_t);
+extern PyObject *PyCFunction_NewEx(PyMethodDef *, PyObject *, PyObject *);
+extern int PyDict_SetItem(PyObject *, PyObject *, PyObject *);
+extern int PyList_Append(PyObject *, PyObject *), PyList_SetItem(PyObject *, Py_ssize_t, PyObject *);
+extern int PyList_SetSlice(PyObject *, Py_ssize_t, Py_ssize_t, PyObject *);
+extern PyObject *PyList_GetItem(PyObject *, Py_ssize_t);
+extern Py_ssize_t PyList_Size(PyObject *);
+extern long PyLong_AsLong(PyObject *);
+extern long long PyLong_AsLongLong(PyObject *);
+extern unsigned long PyLong_AsUnsignedLong(PyObject *);
+extern PyObject *PyLong_FromUnsignedLong(unsigned long);
+extern PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...);
+extern PyObject *PyObject_CallMethod(PyObject *, const char *, const char *, ...);
+extern PyObject *PyObject_GetAttrString(PyObject *, const char *);
+extern PyObject *PyTuple_GetItem(PyObject *, Py_ssize_t), *PyTuple_Pack(Py_ssize_t, ...);
+
+/* what `line`, the tuple of a connection, contains: the parameters of `exchange_of` in exchange.py */
+enum { COUNTS, WAITING, TAGS, LEFT, PENDING, SPARE, SOCKET, TAKE_READING, END_READING, TAKE_SENDING, END_SENDING };
+/* what `counts` contains: see heptarm.wire.session */
+enum { SENT, RECEIVED, REQUESTED, UNREAD };
+/* what `tags` contains in a session with a key: of our frames, of the other side's */
+enum { OURS, THEIRS };
+/* longest body of a request, and what is read at once [bytes] */
+enum { LONGEST = 1024, ROOM = 16384 };
+
+static PyObject *part(PyObject *line, Py_ssize_t which)
+{
+    return PyTuple_GetItem(line, which);
+}
+
+static int takes(PyObject *line, Py_ssize_t which)
+{
+    PyObject *taken = PyObject_CallFunctionObjArgs(part(line, which), &_Py_FalseStruct, NULL);
+    Py_DecRef(taken);
+    return taken == &_Py_TrueStruct;
+}
+
+static void ends(PyObject *line, Py_ssize_t which)
+{
+    Py_DecRef(PyObject_CallFunctionObjArgs(part(line, which), NULL));
+}
+
+static int descriptor(PyObject *line)
+{
+    PyObject *number = PyObject_CallFunctionObjArgs(part(line, SOCKET), NULL);
+    int socket = (int)PyLong_AsLong(number);
+    Py_DecRef(number);
+    return socket;
+}
+
+static uint32_t counted(PyObject *line, Py_ssize_t which)
+{
+    return (uint32_t)PyLong_AsUnsignedLong(PyList_GetItem(part(line, COUNTS), which));
+}
+
+static void set(PyObject *line, Py_ssize_t which, uint32_t value)
+{
+    PyList_SetItem(part(line, COUNTS), which, PyLong_FromUnsignedLong(value));
+}
+
+static void put(uint8_t *at, uint64_t value, int size)
+{
+    while (size--) {
+        at[size] = (uint8_t)value;
+        value >>= 8;
+    }
+}
+
+static uint64_t get(const uint8_t *at, int size)
+{
+    uint64_t value = 0;
+    for (int i = 0; i < size; i++)
+        value = value << 8 | at[i];
+    return value;
+}
+
+/* Whether the frames of this session have tags. */
+static int is_tagged(PyObject *line)
+{
+    return PyList_Size(part(line, TAGS)) != 0;
+}
+
+/* Compute the tag of a frame as FrameTag.of does, without running code in Python: from its hash states. Returns whether
+it was possible. */
+static int tag(PyObject *line, Py_ssize_t whose, const uint8_t *frame, size_t size, uint8_t *tag)
+{
+    PyObject *states = PyList_GetItem(part(line, TAGS), whose);
+    PyObject *prepared[2] = {PyObject_GetAttrString(states, "inner"), PyObject_GetAttrString(states, "outer")};
+    PyObject *message = PyBytes_FromStringAndSize((const char *)frame, (Py_ssize_t)size);
+    for (int i = 0; i < 2 && message != NULL; i++) {
+        PyObject *hash = prepared[i] ? PyObject_CallMethod(prepared[i], "copy", NULL) : NULL;
+        PyObject *none = hash ? PyObject_CallMethod(hash, "update", "O", message) : NULL;
+        Py_DecRef(message);
+        message = none ? PyObject_CallMethod(hash, "digest", NULL) : NULL;
+        Py_DecRef(none);
+        Py_DecRef(hash);
+    }
+    char *digest;
+    Py_ssize_t length;
+    int done = message != NULL && PyBytes_AsStringAndSize(message, &digest, &length) == 0 && length >= TAG;
+    if (done)
+        memcpy(tag, digest, TAG);
+    Py_DecRef(message);
+    Py_DecRef(prepared[0]);
+    Py_DecRef(prepared[1]);
+    PyErr_Clear();
+    return done;
+}
+
+/* Send a whole frame. Returns 1; 0 if nothing could be sent at once; -1 with errno. */
+static int sends(int socket, const uint8_t *frame, size_t size)
+{
+    ssize_t done = send(socket, frame, size, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (done < 0)
+        return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR ? 0 : -1;
+    if ((size_t)done == size)
+        return 1;
+    void *thread = PyEval_SaveThread();
+    while ((size_t)done < size) {
+        ssize_t more = send(socket, frame + done, size - (size_t)done, MSG_NOSIGNAL);
+        if (more < 0 && errno != EINTR)
+            break;
+        done += more < 0 ? 0 : more;
+    }
+    int error = errno;
+    PyEval_RestoreThread(thread);
+    errno = error;
+    return (size_t)done == size ? 1 : -1;
+}
+
+/* Send the frame of a request, whose id is put into `request`: as `sends`. */
+static int asks(PyObject *line, int socket, uint32_t *request, long type, int64_t time, const char *body, size_t size)
+{
+    uint8_t frame[HEADER + LONGEST + TAG];
+    if (!takes(line, TAKE_SENDING))
+        return 0;
+    int tagged = is_tagged(line);
+    uint32_t seq = counted(line, SENT), last = counted(line, REQUESTED);
+    *request = last == UINT32_MAX ? 1 : last + 1;
+    put(frame + AT_MAGIC, MAGIC, SIZE_MAGIC);
+    put(frame + AT_VERSION, MAJOR, SIZE_VERSION);
+    put(frame + AT_FLAGS, (uint64_t)tagged, SIZE_FLAGS);
+    put(frame + AT_TYPE, (uint64_t)type, SIZE_TYPE);
+    put(frame + AT_LENGTH, size, SIZE_LENGTH);
+    put(frame + AT_SEQ, seq, SIZE_SEQ);
+    put(frame + AT_REQUEST, *request, SIZE_REQUEST);
+    put(frame + AT_TIME, (uint64_t)time, SIZE_TIME);
+    memcpy(frame + HEADER, body, size);
+    size += HEADER;
+    int sent = 0;
+    if (seq != UINT32_MAX && (!tagged || tag(line, OURS, frame, size, frame + size))) /* then the tags begin again */
+        sent = sends(socket, frame, size + (tagged ? TAG : 0));
+    int error = errno;
+    if (sent > 0) {
+        set(line, SENT, seq + 1);
+        set(line, REQUESTED, *request);
+    }
+    ends(line, END_SENDING);
+    errno = error;
+    return sent;
+}
+
+/* Size of the body of the answer; -1: this is not the answer, or not only. */
+static ssize_t answered(PyObject *line, uint32_t request, const uint8_t *data, ssize_t size)
+{
+    int tagged = is_tagged(line);
+    ssize_t body = size - HEADER - (tagged ? TAG : 0);
+    if (body < 0 || get(data + AT_MAGIC, SIZE_MAGIC) != MAGIC || get(data + AT_VERSION, SIZE_VERSION) != MAJOR
+        || get(data + AT_FLAGS, SIZE_FLAGS) != (uint64_t)tagged || get(data + AT_LENGTH, SIZE_LENGTH) != (uint64_t)body
+        || get(data + AT_SEQ, SIZE_SEQ) != counted(line, RECEIVED) || counted(line, RECEIVED) == UINT32_MAX
+        || get(data + AT_REQUEST, SIZE_REQUEST) != request)
+        return -1;
+    if (tagged) {
+        uint8_t right[TAG];
+        int differs = !tag(line, THEIRS, data, (size_t)(HEADER + body), right);
+        for (int i = 0; i < TAG; i++)
+            differs |= right[i] ^ data[HEADER + body + i];
+        if (differs)
+            return -1;
+    }
+    return body;
+}
+
+/* Leave a request whose answer has not come yet to those who read next. Returns its PendingRequest. */
+static PyObject *leave(PyObject *line, uint32_t request, PyObject *kind, const uint8_t *data, ssize_t size)
+{
+    PyObject *number = PyLong_FromUnsignedLong(request), *spare = part(line, SPARE);
+    Py_ssize_t last = PyList_Size(spare) - 1;
+    PyObject *pending = PyList_GetItem(spare, last);
+    Py_IncRef(pending);
+    PyList_SetSlice(spare, last, last + 1, NULL);
+    PyDict_SetItem(part(line, WAITING), number, kind);
+    PyDict_SetItem(part(line, PENDING), number, pending);
+    if (size > 0) {
+        PyObject *left = PyBytes_FromStringAndSize((const char *)data, size);
+        PyList_Append(part(line, LEFT), left);
+        Py_DecRef(left);
+    }
+    Py_DecRef(number);
+    return pending;
+}
+
+/* Wait for what comes next. Returns (type, body) of the answer, or what `leave` returns; NULL with errno. */
+static PyObject *answer(PyObject *line, int socket, uint32_t request, PyObject *kind)
+{
+    uint8_t data[ROOM];
+    void *thread = PyEval_SaveThread();
+    ssize_t size = recv(socket, data, sizeof data, 0);
+    int error = errno;
+    PyEval_RestoreThread(thread);
+    if (size < 0 && error != EAGAIN && error != EWOULDBLOCK && error != EINTR && error != ETIMEDOUT) {
+        errno = error;
+        return NULL;
+    }
+    ssize_t length = answered(line, request, data, size);
+    if (length < 0)
+        return leave(line, request, kind, data, size);
+    set(line, RECEIVED, counted(line, RECEIVED) + 1);
+    PyObject *type = PyLong_FromUnsignedLong((unsigned long)get(data + AT_TYPE, SIZE_TYPE));
+    PyObject *body = PyBytes_FromStringAndSize((const char *)data + HEADER, length);
+    PyObject *found = PyTuple_Pack(2, type, body);
+    Py_DecRef(type);
+    Py_DecRef(body);
+    return found;
+}
+
+/* exchange(kind, type, time, body): see exchange.py. */
+static PyObject *exchange(PyObject *line, PyObject *const *given, Py_ssize_t count)
+{
+    char *body;
+    Py_ssize_t size;
+    if (count != 4 || PyBytes_AsStringAndSize(given[3], &body, &size))
+        return NULL;
+    long type = PyLong_AsLong(given[1]);
+    int64_t time = PyLong_AsLongLong(given[2]);
+    if (PyErr_Occurred())
+        return NULL;
+    int socket = descriptor(line), sent = 0, error = 0;
+    PyObject *result = NULL;
+    if (socket >= 0 && size <= LONGEST && takes(line, TAKE_READING)) {
+        uint32_t request;
+        if (PyList_Size(part(line, SPARE)) && !PyList_Size(part(line, LEFT)) && !counted(line, UNREAD))
+            sent = asks(line, socket, &request, type, time, body, (size_t)size);
+        if (sent > 0)
+            result = answer(line, socket, request, given[0]);
+        error = errno;
+        ends(line, END_READING);
+    }
+    if (result != NULL)
+        return result;
+    if (sent == 0) {
+        Py_IncRef(&_Py_NoneStruct);
+        return &_Py_NoneStruct;
+    }
+    errno = error;
+    return PyErr_SetFromErrno(PyExc_OSError);
+}
+
+static PyMethodDef method = {"exchange", exchange, METH_FASTCALL, NULL};
+
+/* The function for one connection. */
+PyObject *he_exchange(PyObject *line)
+{
+    return PyCFunction_NewEx(&method, line, NULL);
+}

@@ -1,0 +1,86 @@
+"""A request and its answer over TCP in one call of C, which Ctrl-C cannot cut."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol, TypeVar, cast
+
+from heptarm.io.compiled import Unavailable, compiled_library, with_headers
+from heptarm.wire.messages import Message
+from heptarm.wire.session import Session
+
+_SOURCE = Path(__file__).with_name("exchange.c")
+
+
+P = TypeVar("P", covariant=True)
+
+
+class Exchange(Protocol[P]):
+    """Sends a request and waits for what comes next."""
+
+    def __call__(
+        self, kind: type[Message], type: int, time: int, body: bytes
+    ) -> tuple[int, bytes] | P | None:
+        """Send a request and wait for what comes next, for up to the time-out of the socket.
+
+        Args:
+            kind: class of the request.
+            type: its number.
+            time: our clock [ns].
+            body: of the request.
+
+        Returns:
+            Type and body of the answer. An entry of `pending`: the request was sent, but something else came first,
+            which is in `left` now, or nothing came in time. None: nothing was sent, since another thread sends or
+            reads, a frame has been read in part, the request is long, or the socket takes nothing now.
+
+        Raises:
+            OSError: the connection is lost.
+        """
+        ...
+
+
+def exchange_of(
+    session: Session,
+    socket: Callable[[], int],
+    *,
+    left: list[bytes],
+    pending: dict[int, P],
+    spare: list[P],
+    reading: threading.Lock,
+    sending: threading.Lock,
+) -> Exchange[P] | None:
+    """The function of a connection; None: this system is not supported, or has no compiler.
+
+    Args:
+        session: it sends `simple_requests` of this session.
+        socket: gets the descriptor of the connected socket; negative: there is none.
+        left: receives bytes that the caller has to read before all others.
+        pending: receives the requests whose answers have to be waited for, by their ids.
+        spare: what is put there; without any, nothing is sent.
+        reading: lock of the thread that reads the socket.
+        sending: lock of the thread that writes to it.
+    """
+    make = _library()
+    if make is None:
+        return None
+    locks = reading.acquire, reading.release, sending.acquire, sending.release
+    return cast(
+        "Exchange[P]",
+        make((session.counts, session.waiting, session.tags, left, pending, spare, socket, *locks)),
+    )
+
+
+@functools.cache
+def _library() -> Callable[[tuple[Any, ...]], Any] | None:
+    source = with_headers(_SOURCE, _SOURCE.with_name("frame_layout.h"))
+    try:
+        made = compiled_library("exchange", source, holds_gil=True)
+    except Unavailable:
+        return None
+    made.he_exchange.argtypes, made.he_exchange.restype = (ctypes.py_object,), ctypes.py_object
+    return cast("Callable[[tuple[Any, ...]], Any]", made.he_exchange)
