@@ -27,12 +27,12 @@ typedef struct {
 enum { METH_FASTCALL = 0x80 };
 
 extern PyObject _Py_NoneStruct, _Py_TrueStruct, _Py_FalseStruct;
-extern PyObject *PyExc_OSError;
+extern PyObject *PyExc_OSError, *PyExc_TypeError;
 extern void Py_IncRef(PyObject *), Py_DecRef(PyObject *);
 extern void *PyEval_SaveThread(void);
 extern void PyEval_RestoreThread(void *);
 extern PyObject *PyErr_Occurred(void), *PyErr_SetFromErrno(PyObject *);
-extern void PyErr_Clear(void);
+extern void PyErr_Clear(void), PyErr_SetString(PyObject *, const char *);
 extern int PyBytes_AsStringAndSize(PyObject *, char **, Py_ssize_t *);
 extern PyObject *PyBytes_FromStringAndSize(const char *, Py_ssize_t);
 extern PyObject *PyCFunction_NewEx(PyMethodDef *, PyObject *, PyObject *);
@@ -265,7 +265,11 @@ static PyObject *exchange(PyObject *line, PyObject *const *given, Py_ssize_t cou
 {
     char *body;
     Py_ssize_t size;
-    if (count != 4 || PyBytes_AsStringAndSize(given[3], &body, &size))
+    if (count != 4) {
+        PyErr_SetString(PyExc_TypeError, "exchange takes kind, type, time and body");
+        return NULL;
+    }
+    if (PyBytes_AsStringAndSize(given[3], &body, &size))
         return NULL;
     long type = PyLong_AsLong(given[1]);
     int64_t time = PyLong_AsLongLong(given[2]);

@@ -826,10 +826,12 @@ class Connection:
 
     def _on_answer(self, message: Message, answer: Message) -> None:
         """Note a request and its answer in the journal."""
-        if isinstance(answer, wire.Rejected):
+        if isinstance(answer, wire.Accepted):
+            self.journal.add(REQUEST, message, answer.id)
+        elif isinstance(answer, wire.Rejected):
             self.journal.add(REFUSAL, answer)
         else:
-            self.journal.add(REQUEST, message, answer.id if isinstance(answer, wire.Accepted) else 0)
+            self.journal.add(REQUEST, message)
 
     def _on_event(self, message: Message) -> None:
         """Note an event in the journal and pass it on."""
