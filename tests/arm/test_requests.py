@@ -1,4 +1,4 @@
-"""Requests over TCP, in one call of C and without it: from several threads, beside states, and with Ctrl-C at any moment."""
+"""Requests over TCP, in one call of C and without it: several threads, states between them, Ctrl-C at any moment."""
 
 from __future__ import annotations
 

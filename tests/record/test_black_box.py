@@ -10,7 +10,7 @@ import pytest
 import heptarm as ha
 from heptarm.errors import ConnectionLost, MotionAborted, SafetyStop
 from heptarm.record import black_box
-from heptarm.record.journal import Journal
+from heptarm.record.journal import Journal, JournalEntry
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
@@ -138,7 +138,7 @@ def test_the_journal_keeps_no_more_than_it_needs() -> None:
     assert [one.text for one in journal.since(0)] == [f"at {second}" for second in range(68, 100)]
     queue = journal.open()
     journal.add("fri", "earlier", at=90_000_000_000)
-    assert [one.time for one in queue] == [90_000_000_000]
+    assert [JournalEntry(*one).time for one in queue] == [90_000_000_000]
     journal.close(queue)
     journal.add("note", "late")
     assert len(queue) == 1

@@ -277,7 +277,7 @@ def test_both_sides_refuse_it_with_one_code(arm: Arm, what: str) -> None:
     with pytest.raises(ha.CommandRejected) as here:
         wrong.call(arm)
     with pytest.raises(ha.CommandRejected) as there:
-        arm.connection.link.request(wrong.message, timeout=30.0)
+        arm.connection.link.request(wrong.message, wire.Accepted, timeout=30.0)
     assert (here.value.code, here.value.parameter) == (wrong.code, wrong.name), here.value.text
     assert (there.value.code, there.value.parameter) == (wrong.code, wrong.place), there.value.text
     after = arm.wait_for_rest(timeout=30.0)

@@ -1,4 +1,4 @@
-"""A request and its answer in one call of C: the same bytes as the session's, and nothing lost when something else comes."""
+"""A request and its answer in one call of C: the bytes of the session, and nothing lost when something else comes."""
 
 from __future__ import annotations
 

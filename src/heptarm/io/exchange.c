@@ -46,8 +46,9 @@ extern long long PyLong_AsLongLong(PyObject *);
 extern unsigned long PyLong_AsUnsignedLong(PyObject *);
 extern PyObject *PyLong_FromUnsignedLong(unsigned long);
 extern PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...);
-extern PyObject *PyObject_CallMethod(PyObject *, const char *, const char *, ...);
-extern PyObject *PyObject_GetAttrString(PyObject *, const char *);
+extern PyObject *PyObject_CallMethodObjArgs(PyObject *, PyObject *, ...);
+extern PyObject *PyObject_GetAttr(PyObject *, PyObject *);
+extern PyObject *PyUnicode_InternFromString(const char *);
 extern PyObject *PyTuple_GetItem(PyObject *, Py_ssize_t), *PyTuple_Pack(Py_ssize_t, ...);
 
 /* what `line`, the tuple of a connection, contains: the parameters of `exchange_of` in exchange.py */
@@ -56,6 +57,10 @@ enum { COUNTS, WAITING, TAGS, LEFT, PENDING, SPARE, SOCKET, TAKE_READING, END_RE
 enum { SENT, RECEIVED, REQUESTED, UNREAD };
 /* what `tags` contains in a session with a key: of our frames, of the other side's */
 enum { OURS, THEIRS };
+/* an attribute of a FrameTag, methods of a hash */
+enum { BEGINS, UPDATE, DIGEST, NAMES };
+static const char *const NAME[NAMES] = {"begins", "update", "digest"};
+static PyObject *name[NAMES];
 /* longest body of a request, and what is read at once [bytes] */
 enum { LONGEST = 1024, ROOM = 16384 };
 
@@ -116,18 +121,16 @@ static int is_tagged(PyObject *line)
     return PyList_Size(part(line, TAGS)) != 0;
 }
 
-/* Compute the tag of a frame as FrameTag.of does, without running code in Python: from its hash states. Returns whether
-it was possible. */
+/* Compute the tag of a frame as FrameTag.of does, without running code in Python. Returns whether it was possible. */
 static int tag(PyObject *line, Py_ssize_t whose, const uint8_t *frame, size_t size, uint8_t *tag)
 {
-    PyObject *states = PyList_GetItem(part(line, TAGS), whose);
-    PyObject *prepared[2] = {PyObject_GetAttrString(states, "inner"), PyObject_GetAttrString(states, "outer")};
-    PyObject *message = PyBytes_FromStringAndSize((const char *)frame, (Py_ssize_t)size);
+    PyObject *begins = PyObject_GetAttr(PyList_GetItem(part(line, TAGS), whose), name[BEGINS]);
+    PyObject *message = begins ? PyBytes_FromStringAndSize((const char *)frame, (Py_ssize_t)size) : NULL;
     for (int i = 0; i < 2 && message != NULL; i++) {
-        PyObject *hash = prepared[i] ? PyObject_CallMethod(prepared[i], "copy", NULL) : NULL;
-        PyObject *none = hash ? PyObject_CallMethod(hash, "update", "O", message) : NULL;
+        PyObject *begin = PyTuple_GetItem(begins, i), *hash = begin ? PyObject_CallFunctionObjArgs(begin, NULL) : NULL;
+        PyObject *none = hash ? PyObject_CallMethodObjArgs(hash, name[UPDATE], message, NULL) : NULL;
         Py_DecRef(message);
-        message = none ? PyObject_CallMethod(hash, "digest", NULL) : NULL;
+        message = none ? PyObject_CallMethodObjArgs(hash, name[DIGEST], NULL) : NULL;
         Py_DecRef(none);
         Py_DecRef(hash);
     }
@@ -137,8 +140,7 @@ static int tag(PyObject *line, Py_ssize_t whose, const uint8_t *frame, size_t si
     if (done)
         memcpy(tag, digest, TAG);
     Py_DecRef(message);
-    Py_DecRef(prepared[0]);
-    Py_DecRef(prepared[1]);
+    Py_DecRef(begins);
     PyErr_Clear();
     return done;
 }
@@ -301,5 +303,8 @@ static PyMethodDef method = {"exchange", exchange, METH_FASTCALL, NULL};
 /* The function for one connection. */
 PyObject *he_exchange(PyObject *line)
 {
+    for (int i = 0; i < NAMES; i++)
+        if (name[i] == NULL && (name[i] = PyUnicode_InternFromString(NAME[i])) == NULL)
+            return NULL;
     return PyCFunction_NewEx(&method, line, NULL);
 }

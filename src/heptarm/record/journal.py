@@ -8,7 +8,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.wire import messages as wire
@@ -20,7 +20,7 @@ KEPT, KEPT_TIME, WAITING = 5_000, 31_000_000_000, 100_000
 
 
 class JournalEntry(NamedTuple):
-    """Something that happened; a tuple, since every request makes one.
+    """Something that happened.
 
     Attributes:
         time: our clock [ns].
@@ -116,6 +116,10 @@ def _short(value: Any) -> str:
     return str(value)
 
 
+#: What a JournalEntry is made of. A plain tuple takes half the time, and every request adds one.
+Record: TypeAlias = tuple[int, str, Any, int]
+
+
 class Journal:
     """Entries of a connection, the newest kept in memory; and the FRI sessions that are open.
 
@@ -128,33 +132,32 @@ class Journal:
 
     def __init__(self, clock: Callable[[], int]) -> None:
         self._clock = clock
-        self._kept: deque[JournalEntry] = deque(maxlen=KEPT)
-        self._queues: tuple[deque[JournalEntry], ...] = ()
+        self._kept: deque[Record] = deque(maxlen=KEPT)
+        self._queues: tuple[deque[Record], ...] = ()
         self.sessions: tuple[Reader, ...] = ()
 
     def add(self, kind: str, content: Any, number: int = 0, *, at: int | None = None) -> None:
         """Add an entry of a time of our clock [ns], None: now; costs a microsecond, blocks never."""
         time = self._clock() if at is None else at
-        # not JournalEntry(...), which calls a function of Python: every request makes one
-        entry = tuple.__new__(JournalEntry, (time, kind, content, number))
+        record = time, kind, content, number
         kept = self._kept
-        kept.append(entry)
+        kept.append(record)
         while kept[0][0] < time - KEPT_TIME:  # programs of a thousand motions are large
             kept.popleft()
         for queue in self._queues:
-            queue.append(entry)
+            queue.append(record)
 
     def since(self, time: int) -> list[JournalEntry]:
         """The kept entries from a time of our clock on [ns], oldest first."""
-        return [one for one in list(self._kept) if one.time >= time]
+        return [JournalEntry(*one) for one in list(self._kept) if one[0] >= time]
 
-    def open(self) -> deque[JournalEntry]:
-        """A queue that receives every entry from now on; its reader takes them from the left."""
-        queue: deque[JournalEntry] = deque(maxlen=WAITING)
+    def open(self) -> deque[Record]:
+        """A queue that receives every entry from now on, as `Record`; its reader takes them from the left."""
+        queue: deque[Record] = deque(maxlen=WAITING)
         self._queues = (*self._queues, queue)
         return queue
 
-    def close(self, queue: deque[JournalEntry]) -> None:
+    def close(self, queue: deque[Record]) -> None:
         """End a queue."""
         self._queues = tuple(one for one in self._queues if one is not queue)
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.record.camera import CameraFeed
-from heptarm.record.journal import NOTE, Journal, JournalEntry
+from heptarm.record.journal import NOTE, Journal, JournalEntry, Record
 from heptarm.record.layout import STATE
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.samples import SampleQueue, StateSample, state_rows
@@ -204,7 +204,7 @@ class _Tap:
 
     def __init__(self, source: RecordSource, file: RecordSink, film: _Film | None) -> None:
         self._source, self._file, self._film = source, file, film
-        self._entries: deque[JournalEntry] = source.journal.open()
+        self._entries: deque[Record] = source.journal.open()
         self._samples = source.open_samples(_WAITING)
         self._cycles = CycleTap()
 
@@ -223,7 +223,7 @@ class _Tap:
             if self._film is not None:
                 self._film.offer(batch[-1])
         while self._entries:
-            self._file.entry(self._entries.popleft())
+            self._file.entry(JournalEntry(*self._entries.popleft()))
         self._cycles.write(journal.sessions, self._file)
         if self._film is not None:
             self._film.write()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from heptarm.arm.link.connection import Connection
-from heptarm.errors import CommandRejected, RemoteProtocolError, ShapeError, Timeout
+from heptarm.errors import CommandRejected, ShapeError, Timeout
 from heptarm.values.arrays import callback as check_callback
 from heptarm.values.arrays import finite, flag, instance, integer, shown, within, word
 from heptarm.values.frames import check_name
@@ -93,11 +93,7 @@ class Pad:
         """Send a question and wait for its button, or for what went wrong."""
         connection, clock = self._connection, self._connection.clock
         link = connection.link
-        answer = link.request(message, timeout=connection.options.timeout)
-        if not isinstance(answer, wire.Accepted):
-            raise RemoteProtocolError(
-                f"the cabinet answered AskOperator with {type(answer).__name__}, not with Accepted"
-            )
+        asked = link.request(message, wire.Accepted, timeout=connection.options.timeout).id
         deadline = clock.nanos() + round(timeout * 1e9)
         while True:
             rest = max(0.0, (deadline - clock.nanos()) * 1e-9)
@@ -112,7 +108,7 @@ class Pad:
                         hint="the dialog stays on the smartPAD until somebody does; that answer is dropped",
                     ) from None
                 continue
-            if number == answer.id:
+            if number == asked:
                 return button, problem
 
     def set_key(
@@ -199,12 +195,8 @@ class Pad:
         """
         check_name(name, "name")
         connection = self._connection
-        answer = connection.link.request(wire.GetProcessData(name=name), timeout=connection.options.timeout)
-        if not isinstance(answer, wire.ProcessData):
-            raise RemoteProtocolError(
-                f"the cabinet answered GetProcessData with {type(answer).__name__}, not with ProcessData"
-            )
-        return answer.value
+        request = wire.GetProcessData(name=name)
+        return connection.link.request(request, wire.ProcessData, timeout=connection.options.timeout).value
 
     def set_process_data(self, name: str, value: str | bool | float) -> None:
         """Change a value of the project's process data; it keeps its type.

@@ -125,7 +125,9 @@ class Fri(Block):
         message = replace(self._request.message, host=self._host, port=client.port)
         try:
             if self.kind == "monitor":
-                self._number = link.submit(message, timeout=self._connection.options.timeout)
+                self._number = link.request(
+                    message, wire.Accepted, timeout=self._connection.options.timeout
+                ).id
             else:
                 self._handle = MotionHandle.send(self._connection, message)
                 self._number = self._handle.id

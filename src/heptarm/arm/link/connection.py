@@ -37,7 +37,7 @@ from heptarm.errors import (
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.record.black_box import BlackBox, BlackBoxFile
-from heptarm.record.journal import ERROR, EVENT, REFUSAL, REQUEST, Journal
+from heptarm.record.journal import ERROR, EVENT, Journal
 from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.arrays import within
 from heptarm.values.io import Signal
@@ -497,7 +497,7 @@ class Connection:
             on_event=on_event,
             on_state=on_state,
             on_lost=on_lost,
-            on_answer=self._on_answer,
+            journal=self.journal,
         )
 
     # ---------------------------------------------------------------------------------- requests
@@ -505,7 +505,7 @@ class Connection:
     def request(self, message: Message) -> None:
         """Send a request that is only accepted or refused; raises as `Link.request` does."""
         try:
-            self.link.submit(message, timeout=self.options.timeout)
+            self.link.request(message, wire.Accepted, timeout=self.options.timeout)
         except (SafetyStop, ConnectionLost) as error:
             error.with_black_box(self.black_box.last)  # of the incident that caused it
             raise
@@ -539,7 +539,7 @@ class Connection:
                 self.events.claim(program, answer.id)
 
         try:
-            self.link.submit(message, timeout=self.options.timeout, on_answer=claim)
+            self.link.request(message, wire.Accepted, timeout=self.options.timeout, on_answer=claim)
         except (SafetyStop, ConnectionLost) as error:
             error.with_black_box(self.black_box.last)
             raise
@@ -823,15 +823,6 @@ class Connection:
         return self.black_box.capture(reason)
 
     # ---------------------------------------------------------------------------- from the link
-
-    def _on_answer(self, message: Message, answer: Message) -> None:
-        """Note a request and its answer in the journal."""
-        if isinstance(answer, wire.Accepted):
-            self.journal.add(REQUEST, message, answer.id)
-        elif isinstance(answer, wire.Rejected):
-            self.journal.add(REFUSAL, answer)
-        else:
-            self.journal.add(REQUEST, message)
 
     def _on_event(self, message: Message) -> None:
         """Note an event in the journal and pass it on."""

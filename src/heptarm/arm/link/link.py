@@ -12,7 +12,7 @@ import threading
 from _thread import allocate_lock, get_ident
 from collections.abc import Callable, Iterable, Sequence
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
 from heptarm.arm.link.datagrams import DatagramLine, DatagramReport
 from heptarm.arm.translate.errors import farewell, refusal, rejection
@@ -28,6 +28,7 @@ from heptarm.errors import (
 from heptarm.io.clock import Clock
 from heptarm.io.exchange import exchange_of
 from heptarm.io.transport import Transport
+from heptarm.record.journal import REFUSAL, REQUEST, Journal
 from heptarm.wire.clock_sync import ClockOffset, PingDeparture
 from heptarm.wire.codes import Code
 from heptarm.wire.messages import (
@@ -61,6 +62,9 @@ except ImportError:  # another Python than CPython
     from signal import signal as set_signal
 
 _SIGINT = int(signal.SIGINT)
+
+
+A = TypeVar("A", bound=Message)
 
 
 class InterruptShield:
@@ -227,7 +231,7 @@ class Link:
         on_event: called with each event, in the order received; must not block.
         on_state: called with (body, our clock at its receipt [ns]) of each pushed state; must not block.
         on_lost: called once, from the link thread, with the error that ended the link; not after `close`.
-        on_answer: called with each request and its answer, by the thread that has sent it; must not block.
+        journal: where each request and its answer are noted.
 
     Attributes:
         offset: estimate of the cabinet's clock.
@@ -243,7 +247,7 @@ class Link:
         on_event: Callable[[Message], None],
         on_state: Callable[[bytes, int], None],
         on_lost: Callable[[HeptarmError], None],
-        on_answer: Callable[[Message, Message], None] | None = None,
+        journal: Journal,
     ) -> None:
         self.offset = ClockOffset()
         self.peer = transport.peer
@@ -254,7 +258,7 @@ class Link:
         self._on_event = on_event
         self._on_state = on_state
         self._on_lost = on_lost
-        self._on_answer = on_answer
+        self._journal = journal
         self._view = memoryview(bytearray(_BUFFER))
         self._sending = threading.Lock()
         self._reading = threading.Lock()  # held by the one thread that reads the socket
@@ -330,7 +334,7 @@ class Link:
         if socket is None:
             return f"no UDP socket can be opened to {self.peer}"
         try:
-            answer = self.request(OpenDatagrams(), timeout=timeout)
+            answer = self.request(OpenDatagrams(), DatagramToken, timeout=timeout)
         except (
             CommandRejected,
             RemoteProtocolError,
@@ -340,11 +344,7 @@ class Link:
         except BaseException:
             socket.close()
             raise
-        if self._welcome is None or not isinstance(answer, DatagramToken):
-            socket.close()
-            raise RemoteProtocolError(
-                f"the cabinet answered OpenDatagrams with {type(answer).__name__}, not with DatagramToken"
-            )
+        assert self._welcome is not None  # an open session has one
         self._datagrams = DatagramLine(
             socket,
             self._session.datagrams(self._welcome.session, answer.token),
@@ -364,12 +364,7 @@ class Link:
 
     def datagram_counts(self, *, timeout: float) -> DatagramStatistics:
         """What the cabinet has counted of this session's datagrams; raises as `request` does."""
-        answer = self.request(GetDatagramStatistics(), timeout=timeout)
-        if not isinstance(answer, DatagramStatistics):
-            raise RemoteProtocolError(
-                f"the cabinet answered GetDatagramStatistics with {type(answer).__name__}, not with DatagramStatistics"
-            )
-        return answer
+        return self.request(GetDatagramStatistics(), DatagramStatistics, timeout=timeout)
 
     def _step(self, deadline: int, late: str) -> None:
         with self._reading:
@@ -420,28 +415,39 @@ class Link:
         self._may_loop = rate >= _LOOPED_STATES
 
     def request(
-        self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
-    ) -> Message:
+        self,
+        message: Message,
+        wanted: type[A],
+        *,
+        timeout: float,
+        on_answer: Callable[[Message], None] | None = None,
+    ) -> A:
         """Send a request and wait for its answer.
 
         Args:
             message: the request.
+            wanted: class of the answer of a cabinet that accepts it.
             timeout: how long to wait [s].
             on_answer: called with the answer before later messages are handled; must not block.
 
         Raises:
             CommandRejected: the cabinet refuses; the code decides which subclass or other error it is.
             ConnectionLost: the link has ended.
+            RemoteProtocolError: the cabinet answers with something else.
             Timeout: no answer in time.
         """
         answer = self._ask_at_once(message, timeout) if on_answer is None else None
         if answer is None:
             answer = self._ask(message, timeout, on_answer)
-        if self._on_answer is not None:
-            self._on_answer(message, answer)
+        if isinstance(answer, wanted):
+            self._journal.add(REQUEST, message, answer.id if isinstance(answer, Accepted) else 0)
+            return answer
         if isinstance(answer, Rejected):
+            self._journal.add(REFUSAL, answer)
             raise rejection(answer)
-        return answer
+        raise RemoteProtocolError(
+            f"the cabinet answered {type(message).__name__} with {type(answer).__name__}, not with {wanted.__name__}"
+        )
 
     def _ask_at_once(self, message: Message, timeout: float) -> Message | None:
         """Send a request and read its answer in one call of C; None: `_ask` has to send it.
@@ -451,7 +457,7 @@ class Link:
         exchange, kind = self._exchange, type(message)
         if exchange is None or kind not in self._session.simple_requests:
             return None
-        if kind in _URGENT and self._datagrams is not None:
+        if self._datagrams is not None and kind in _URGENT:
             return None
         now = self._requested = self._clock.nanos()
         try:
@@ -459,14 +465,15 @@ class Link:
         except OSError as error:
             self._fail(self._transport.lost(error))
             raise self._lost() from error
+        if received == _PLAIN_ANSWER:
+            self._heartbeat.received = now
+            return _ACCEPTED
         if received is None:
             return None
         if isinstance(received, PendingRequest):
             self._spare.append(PendingRequest())
             return self._answer(message, received, timeout, InterruptShield())
         self._heartbeat.received = now
-        if received == _PLAIN_ANSWER:
-            return _ACCEPTED
         try:
             return printable_message(self._session.answer(*received))
         except RemoteProtocolError as error:
@@ -553,17 +560,6 @@ class Link:
             self._reader = 0
             self._reading.release()
             shield.release()
-
-    def submit(
-        self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
-    ) -> int:
-        """Send a request that is answered with Accepted, and return its id; raises as `request` does."""
-        answer = self.request(message, timeout=timeout, on_answer=on_answer)
-        if not isinstance(answer, Accepted):
-            raise RemoteProtocolError(
-                f"the cabinet answered {type(message).__name__} with {type(answer).__name__}, not with Accepted"
-            )
-        return answer.id
 
     def send_target(self, kind: type[OneWay], numbers: Sequence[float], *, now: int, watchdog: float) -> None:
         """Send a servo target, stamped with the estimated time of the cabinet: by datagram while datagrams get through.
