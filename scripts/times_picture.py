@@ -24,7 +24,7 @@ PICTURE = ROOT / "docs" / "_static" / "times.png"
 #: Figures that have a floor, without their placement, and what they and their floors are.
 BESIDE_FLOORS = {
     "round_trip": "a request | raw echo",
-    "round_trip_key": "a request with a key | without",
+    "round_trip_key": "a request with a key | raw echo",
     "push_age": "age of a state at 1 kHz | bare path",
     "tick": "a tick of the plant | mj_step",
     "servo_set": "set of a servo | bare send",
@@ -38,10 +38,9 @@ BESIDE_FLOORS = {
 #: Parts of a request in their order.
 PARTS = {
     "request_encode": "Python: check, encode",
-    "request_send": "Python: send",
-    "request_path": "kernel: there and back, wake two threads",
-    "request_java": "Java: decode, act, answer",
-    "request_decode": "Python: decode, return",
+    "request_path": "kernel: both directions, wake two threads",
+    "request_java": "C: frames; Java: decode, act, answer",
+    "request_decode": "Python: answer, journal",
 }
 OWN, FLOOR = "#d9622b", "#9aa5b1"
 

@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -17,7 +18,6 @@ from bench.measure.blocks import BLOCKS, pin, placed, placements
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
-from heptarm.io.tcp import TcpTransport
 from heptarm.wire import messages
 
 #: Requests of a block.
@@ -25,66 +25,45 @@ REQUESTS = 2000
 _ECHO = Path(__file__).parents[1] / "java" / "Echo.java"
 #: Parts of a request, and what happens in each.
 PARTS = {
-    "request_encode": "Python: check the arguments, build the frame",
-    "request_send": "Python: `send`, until the kernel returns",
-    "request_path": "kernel, and waking the threads that sleep: as for a raw echo",
-    "request_java": "Java: read and decode, check the role, act, encode the answer",
-    "request_decode": "Python: decode the answer, return",
+    "request_encode": "Python: check the value, make and encode the message",
+    "request_path": "kernel: both directions, and waking the threads that sleep; as for a raw echo",
+    "request_java": "C: build and check the frames; Java: decode, check the role, act, answer",
+    "request_decode": "Python: take the answer, note it in the journal, return",
 }
 
 
-class _Marks:
-    """Times at which a request passes the socket [ns]."""
+def _watched(arm: ha.Arm, count: int) -> np.ndarray:
+    """Duration of the parts of requests, shape (count, 3) [us]: Python before the call of C, the call, Python after."""
+    link, clock = arm.connection.link, time.perf_counter_ns
+    exchange, began, ended = link._exchange, 0, 0
+    assert exchange is not None, "this table needs the compiled part: install a C compiler"
 
-    def __init__(self) -> None:
-        self.sending = self.sent = self.received = 0
-
-
-def _watched(arm: ha.Arm, marks: _Marks, count: int) -> np.ndarray:
-    """Duration of the parts of requests, shape (count, 4) [us]: encode, send, wait, decode."""
-    send, receive, clock = TcpTransport.send, TcpTransport.receive_into, time.perf_counter_ns
-
-    def timed_send(self: TcpTransport, data: bytes) -> None:
-        marks.sending = clock()
-        send(self, data)
-        marks.sent = clock()
-
-    def timed_receive(self: TcpTransport, buffer: memoryview, *, wait: bool = True) -> int:
-        size = receive(self, buffer, wait=wait)
-        if size:
-            marks.received = clock()
-        return size
+    def timed(*request: Any) -> Any:
+        nonlocal began, ended
+        began = clock()
+        answer = exchange(*request)
+        ended = clock()
+        return answer
 
     rows = []
-    with (
-        mock.patch.object(TcpTransport, "send", timed_send),
-        mock.patch.object(TcpTransport, "receive_into", timed_receive),
-    ):
+    with mock.patch.object(link, "_exchange", timed):
         for _ in range(count):
             begin = clock()
             arm.set_override(1.0)
-            end = clock()
-            rows.append(
-                (
-                    marks.sending - begin,
-                    marks.sent - marks.sending,
-                    marks.received - marks.sent,
-                    end - marks.received,
-                )
-            )
+            rows.append((began - begin, ended - began, clock() - ended))
     return np.array(rows) * 1e-3
 
 
 def _echoed(raw: socket.socket, payload: bytes, count: int) -> np.ndarray:
-    """Duration of the wait for each echo, without the `send` [us]."""
-    waits = []
+    """Duration of each echo [us]."""
+    times = []
     for _ in range(count):
+        begin, missing = time.perf_counter_ns(), len(payload)
         raw.sendall(payload)
-        sent, missing = time.perf_counter_ns(), len(payload)
         while missing:
             missing -= len(raw.recv(missing))
-        waits.append(time.perf_counter_ns() - sent)
-    return np.array(waits) * 1e-3
+        times.append(time.perf_counter_ns() - begin)
+    return np.array(times) * 1e-3
 
 
 #: Percentiles of a part's durations: a busy machine changes the first one little.
@@ -116,13 +95,13 @@ def parts() -> tuple[dict[str, list[tuple[float, float]]], Noise]:
                 pin(os.getpid(), placement.near)
                 pin(cabinet.process.pid, placement.far)
                 pin(echo.pid, placement.far)
-                _watched(arm, _Marks(), REQUESTS)  # warm caches, and the compiler of Java
+                _watched(arm, REQUESTS)  # warm caches, and the compiler of Java
                 _echoed(raw, payload, REQUESTS)
                 for _ in range(BLOCKS):
-                    rows, waits = _watched(arm, _Marks(), REQUESTS), _echoed(raw, payload, REQUESTS)
-                    path = np.percentile(waits, (FASTEST, MEDIAN))
-                    encode, send, wait, decode = np.percentile(rows, (FASTEST, MEDIAN), axis=0).T
-                    for name, values in zip(PARTS, (encode, send, path, wait - path, decode), strict=True):
+                    rows, echoes = _watched(arm, REQUESTS), _echoed(raw, payload, REQUESTS)
+                    path = np.percentile(echoes, (FASTEST, MEDIAN))
+                    encode, call, decode = np.percentile(rows, (FASTEST, MEDIAN), axis=0).T
+                    for name, values in zip(PARTS, (encode, path, call - path, decode), strict=True):
                         found[name].append(tuple(values.tolist()))
                     whole = np.percentile(rows.sum(axis=1), (FASTEST, MEDIAN))
                     found["request_whole"].append(tuple(whole.tolist()))
@@ -133,7 +112,7 @@ def parts() -> tuple[dict[str, list[tuple[float, float]]], Noise]:
 
 @benchmark("request_parts")
 def request_parts() -> Iterator[Figure]:
-    """Where the time of a request goes: encoding, sending, the kernel, Java, decoding."""
+    """Where the time of a request goes: encoding, the kernel, C and Java, decoding."""
     found, noise = parts()
     for name, values in found.items():
         fastest, median = np.median(values, axis=0).tolist()
