@@ -28,6 +28,8 @@ import heptarm.wire.WrenchState;
  */
 public final class StateSampler {
     private static final long IDLE_NS = 20000000L;
+    /** Later than this [ns], and than so many states, the past states are given up: the ring of a virtual robot has 0.25 s. */
+    private static final long TOO_LATE_NS = 200000000L;
     private static final int TOO_LATE = 50;
 
     /** Groups cheaper than this [ns] are read whenever they are due. */
@@ -214,7 +216,7 @@ public final class StateSampler {
             if (one.due <= now) { // this thread woke too late for past states
                 one.due = now / one.period * one.period + one.period;
             }
-            if (clock.nanos() - one.due > TOO_LATE * one.period) {
+            if (clock.nanos() - one.due > Math.max(TOO_LATE_NS, TOO_LATE * one.period)) {
                 one.due = clock.nanos() / one.period * one.period + one.period;
             }
             one.missed = one.hasBegun ? (one.due - planned) / one.period : 0;
