@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import socket
 import struct
 import threading
@@ -16,9 +17,10 @@ from hypothesis import strategies as st
 
 from heptarm.errors import RemoteProtocolError
 from heptarm.io.compiled import SWITCH
-from heptarm.io.exchange import Exchange, _library, exchange_of
-from heptarm.wire.messages import Accepted, Message, Ping, Rejected, SetOverride
-from heptarm.wire.session import RECEIVED, REQUESTED, SENT, UNREAD, Received
+from heptarm.io.exchange import Exchange, ReceiveState, _library, compiled_link
+from heptarm.io.tcp import MSG_DONTWAIT
+from heptarm.wire.messages import Accepted, JointState, Message, Ping, Rejected, SetOverride, State
+from heptarm.wire.session import RECEIVED, REQUESTED, SENT, UNREAD, Received, StateReceived
 from tests.wire.pairs import open_pair, pour
 
 KEYS = (None, b"k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj")
@@ -45,7 +47,7 @@ class Line:
         patience = struct.pack("@ll", 0, round(PATIENCE * 1e6))
         self.near.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, patience)
         self.far.settimeout(10.0)
-        made = exchange_of(
+        made = compiled_link(
             self.client,
             self.near.fileno,
             left=self.left,
@@ -55,7 +57,8 @@ class Line:
             sending=self.sending,
         )
         assert made is not None, "these tests need a C compiler"
-        self.exchange: Exchange[str] = made
+        self.exchange: Exchange[str] = made[0]
+        self.state: ReceiveState = made[1]
 
     def ask(self, message: Message = HALF, now: int = 5) -> tuple[int, bytes] | str | None:
         return self.exchange(type(message), message.TYPE, now, message.encode())
@@ -264,6 +267,55 @@ def test_wrong_arguments_are_refused(line: Line) -> None:
         with pytest.raises(TypeError):
             exchange(*wrong)
     assert line.client.counts == counts
+
+
+STATE = State(joints=JointState(stamp=7, q=(0.1,) * 7, q_cmd=(0.2,) * 7, dq=(0.3,) * 7))
+
+
+def sent(line: Line, data: bytes) -> tuple[int, bytes] | bool | None:
+    """What is received after the cabinet has sent this."""
+    line.far.sendall(data)
+    select.select([line.near], [], [], 10.0)
+    return line.state(State.TYPE, 0)
+
+
+def test_a_state(line: Line) -> None:
+    for now in (-5, 0, 1 << 62):
+        assert sent(line, line.cabinet.send(STATE, time=now)) == (now, STATE.encode())
+    assert line.client.counts[RECEIVED] == line.cabinet.counts[SENT] and not line.left
+    assert line.state(State.TYPE, MSG_DONTWAIT) is None and line.state(State.TYPE, 0) is None
+
+
+def test_whatever_is_no_single_state_is_left_to_the_session(line: Line) -> None:
+    assert sent(line, line.cabinet.send(Ping(sent=1))) is False
+    assert line.state(State.TYPE, 0) is False, "what was left comes first"
+    assert line.read() == [Ping(sent=1)]
+    first, second = (line.cabinet.send(STATE, time=now) for now in (1, 2))
+    assert sent(line, first + second) is False
+    states = pour(b"".join(line.left), line.client)
+    assert [state.time for state in states] == [1, 2]
+    line.left.clear()
+    third = line.cabinet.send(STATE, time=3)
+    assert sent(line, third[:100]) is False and pour(line.left.pop(), line.client) == []
+    line.far.sendall(third[100:])
+    assert line.state(State.TYPE, 0) is False and not line.left, "the session has a part of it"
+    assert pour(line.near.recv(65536), line.client) == [StateReceived(STATE.encode(), 3)]
+    assert sent(line, line.cabinet.send(STATE, time=4)) == (4, STATE.encode())
+
+
+@pytest.mark.parametrize("at", [0, 2, 3, 5, 9, 13, 17])
+def test_a_changed_state_is_left_to_the_session(line: Line, at: int) -> None:
+    data = bytearray(line.cabinet.send(STATE, time=1))
+    data[at] ^= 0x40
+    assert sent(line, bytes(data)) is False
+    assert bytes(data) == b"".join(line.left)
+
+
+def test_the_end_of_a_connection_is_left_to_the_transport(line: Line) -> None:
+    line.far.shutdown(socket.SHUT_WR)
+    assert line.state(State.TYPE, 0) is False
+    line.near.close()
+    assert line.state(State.TYPE, 0) is False
 
 
 def test_without_a_compiler_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-/* A request and its answer over a connected socket, in one function that Python can call.
+/* A request and its answer over a connected socket in one function that Python can call, and a state in another.
 
 Python runs signal handlers between two instructions of its own, never within a function in C: so Ctrl-C comes before a
 request or after its answer, and none of the frames is cut.
@@ -44,14 +44,14 @@ extern Py_ssize_t PyList_Size(PyObject *);
 extern long PyLong_AsLong(PyObject *);
 extern long long PyLong_AsLongLong(PyObject *);
 extern unsigned long PyLong_AsUnsignedLong(PyObject *);
-extern PyObject *PyLong_FromUnsignedLong(unsigned long);
+extern PyObject *PyLong_FromLongLong(long long), *PyLong_FromUnsignedLong(unsigned long);
 extern PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...);
 extern PyObject *PyObject_CallMethodObjArgs(PyObject *, PyObject *, ...);
 extern PyObject *PyObject_GetAttr(PyObject *, PyObject *);
 extern PyObject *PyUnicode_InternFromString(const char *);
 extern PyObject *PyTuple_GetItem(PyObject *, Py_ssize_t), *PyTuple_Pack(Py_ssize_t, ...);
 
-/* what `line`, the tuple of a connection, contains: the parameters of `exchange_of` in exchange.py */
+/* what `line`, the tuple of a connection, contains: the parameters of `compiled_link` in exchange.py */
 enum { COUNTS, WAITING, TAGS, LEFT, PENDING, SPARE, SOCKET, TAKE_READING, END_READING, TAKE_SENDING, END_SENDING };
 /* what `counts` contains: see heptarm.wire.session */
 enum { SENT, RECEIVED, REQUESTED, UNREAD };
@@ -198,8 +198,39 @@ static int asks(PyObject *line, int socket, uint32_t *request, long type, int64_
     return sent;
 }
 
-/* Size of the body of the answer; -1: this is not the answer, or not only. */
-static ssize_t answered(PyObject *line, uint32_t request, const uint8_t *data, ssize_t size)
+/* The first of a pair, and the body of a frame. */
+static PyObject *pair(PyObject *first, const uint8_t *frame, ssize_t length)
+{
+    PyObject *body = PyBytes_FromStringAndSize((const char *)frame + HEADER, length);
+    PyObject *both = first && body ? PyTuple_Pack(2, first, body) : NULL;
+    Py_DecRef(first);
+    Py_DecRef(body);
+    return both;
+}
+
+static void keep(PyObject *line, const uint8_t *data, ssize_t size)
+{
+    PyObject *left = PyBytes_FromStringAndSize((const char *)data, size);
+    PyList_Append(part(line, LEFT), left);
+    Py_DecRef(left);
+}
+
+/* Receive what has come, or wait for it. Returns its size; 0 at the end; -1: nothing; -2 with errno: the connection is
+lost. */
+static ssize_t receives(int socket, uint8_t *data, int flags)
+{
+    void *thread = PyEval_SaveThread();
+    ssize_t size = recv(socket, data, ROOM, flags);
+    int error = errno;
+    PyEval_RestoreThread(thread);
+    errno = error;
+    if (size >= 0)
+        return size;
+    return error == EAGAIN || error == EWOULDBLOCK || error == EINTR || error == ETIMEDOUT ? -1 : -2;
+}
+
+/* Size of the body if the data are the next frame of the other side, of this request, and nothing else; otherwise -1. */
+static ssize_t whole(PyObject *line, uint32_t request, const uint8_t *data, ssize_t size)
 {
     int tagged = is_tagged(line);
     ssize_t body = size - HEADER - (tagged ? TAG : 0);
@@ -229,11 +260,8 @@ static PyObject *leave(PyObject *line, uint32_t request, PyObject *kind, const u
     PyList_SetSlice(spare, last, last + 1, NULL);
     PyDict_SetItem(part(line, WAITING), number, kind);
     PyDict_SetItem(part(line, PENDING), number, pending);
-    if (size > 0) {
-        PyObject *left = PyBytes_FromStringAndSize((const char *)data, size);
-        PyList_Append(part(line, LEFT), left);
-        Py_DecRef(left);
-    }
+    if (size > 0)
+        keep(line, data, size);
     Py_DecRef(number);
     return pending;
 }
@@ -242,24 +270,14 @@ static PyObject *leave(PyObject *line, uint32_t request, PyObject *kind, const u
 static PyObject *answer(PyObject *line, int socket, uint32_t request, PyObject *kind)
 {
     uint8_t data[ROOM];
-    void *thread = PyEval_SaveThread();
-    ssize_t size = recv(socket, data, sizeof data, 0);
-    int error = errno;
-    PyEval_RestoreThread(thread);
-    if (size < 0 && error != EAGAIN && error != EWOULDBLOCK && error != EINTR && error != ETIMEDOUT) {
-        errno = error;
+    ssize_t size = receives(socket, data, 0);
+    if (size < -1)
         return NULL;
-    }
-    ssize_t length = answered(line, request, data, size);
+    ssize_t length = whole(line, request, data, size);
     if (length < 0)
         return leave(line, request, kind, data, size);
     set(line, RECEIVED, counted(line, RECEIVED) + 1);
-    PyObject *type = PyLong_FromUnsignedLong((unsigned long)get(data + AT_TYPE, SIZE_TYPE));
-    PyObject *body = PyBytes_FromStringAndSize((const char *)data + HEADER, length);
-    PyObject *found = PyTuple_Pack(2, type, body);
-    Py_DecRef(type);
-    Py_DecRef(body);
-    return found;
+    return pair(PyLong_FromUnsignedLong((unsigned long)get(data + AT_TYPE, SIZE_TYPE)), data, length);
 }
 
 /* exchange(kind, type, time, body): see exchange.py. */
@@ -298,13 +316,51 @@ static PyObject *exchange(PyObject *line, PyObject *const *given, Py_ssize_t cou
     return PyErr_SetFromErrno(PyExc_OSError);
 }
 
-static PyMethodDef method = {"exchange", exchange, METH_FASTCALL, NULL};
+/* state(type, flags): see exchange.py. */
+static PyObject *state(PyObject *line, PyObject *const *given, Py_ssize_t count)
+{
+    if (count != 2) {
+        PyErr_SetString(PyExc_TypeError, "state takes type and flags");
+        return NULL;
+    }
+    long type = PyLong_AsLong(given[0]), flags = PyLong_AsLong(given[1]);
+    if (PyErr_Occurred())
+        return NULL;
+    int socket = descriptor(line);
+    PyObject *result = &_Py_FalseStruct;
+    if (socket >= 0 && !PyList_Size(part(line, LEFT)) && !counted(line, UNREAD)) {
+        uint8_t data[ROOM];
+        ssize_t size = receives(socket, data, (int)flags);
+        if (size < -1)
+            return PyErr_SetFromErrno(PyExc_OSError);
+        ssize_t length = size >= HEADER && get(data + AT_TYPE, SIZE_TYPE) == (uint64_t)type ? whole(line, 0, data, size) : -1;
+        if (length >= 0) {
+            set(line, RECEIVED, counted(line, RECEIVED) + 1);
+            return pair(PyLong_FromLongLong((int64_t)get(data + AT_TIME, SIZE_TIME)), data, length);
+        }
+        if (size > 0)
+            keep(line, data, size);
+        if (size < 0)
+            result = &_Py_NoneStruct;
+    }
+    Py_IncRef(result);
+    return result;
+}
 
-/* The function for one connection. */
-PyObject *he_exchange(PyObject *line)
+static PyMethodDef methods[] = {
+    {"exchange", exchange, METH_FASTCALL, NULL},
+    {"state", state, METH_FASTCALL, NULL},
+};
+
+/* Both functions for one connection. */
+PyObject *he_functions(PyObject *line)
 {
     for (int i = 0; i < NAMES; i++)
         if (name[i] == NULL && (name[i] = PyUnicode_InternFromString(NAME[i])) == NULL)
             return NULL;
-    return PyCFunction_NewEx(&method, line, NULL);
+    PyObject *first = PyCFunction_NewEx(&methods[0], line, NULL), *second = PyCFunction_NewEx(&methods[1], line, NULL);
+    PyObject *both = first && second ? PyTuple_Pack(2, first, second) : NULL;
+    Py_DecRef(first);
+    Py_DecRef(second);
+    return both;
 }

@@ -1,4 +1,4 @@
-"""A request and its answer over TCP in one call of C, which Ctrl-C cannot cut."""
+"""A request and its answer over TCP in one call of C, which Ctrl-C cannot cut; a state is received in another."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import functools
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, Literal, Protocol, TypeVar, cast
 
 from heptarm.io.compiled import Unavailable, compiled_library, with_headers
 from heptarm.wire.messages import Message
@@ -44,7 +44,27 @@ class Exchange(Protocol[P]):
         ...
 
 
-def exchange_of(
+class ReceiveState(Protocol):
+    """Receives the next state."""
+
+    def __call__(self, type: int, flags: int) -> tuple[int, bytes] | Literal[False] | None:
+        """Receive a state; the caller holds the lock of the thread that reads.
+
+        Args:
+            type: number of the message State.
+            flags: of recv(2); 0: wait for up to the time-out of the socket.
+
+        Returns:
+            The sender's clock [ns] and the body of a state, if that and nothing else has come. None: nothing has come.
+            False: something else, which is in `left`, or there is something to be read first, or the connection ends.
+
+        Raises:
+            OSError: the connection is lost.
+        """
+        ...
+
+
+def compiled_link(
     session: Session,
     socket: Callable[[], int],
     *,
@@ -53,8 +73,8 @@ def exchange_of(
     spare: list[P],
     reading: threading.Lock,
     sending: threading.Lock,
-) -> Exchange[P] | None:
-    """The function of a connection; None: this system is not supported, or has no compiler.
+) -> tuple[Exchange[P], ReceiveState] | None:
+    """The functions of a connection; None: this system is not supported, has no compiler, or there is no socket.
 
     Args:
         session: it sends `simple_requests` of this session.
@@ -65,14 +85,12 @@ def exchange_of(
         reading: lock of the thread that reads the socket.
         sending: lock of the thread that writes to it.
     """
-    make = _library()
+    make = _library() if socket() >= 0 else None
     if make is None:
         return None
     locks = reading.acquire, reading.release, sending.acquire, sending.release
-    return cast(
-        "Exchange[P]",
-        make((session.counts, session.waiting, session.tags, left, pending, spare, socket, *locks)),
-    )
+    made = make((session.counts, session.waiting, session.tags, left, pending, spare, socket, *locks))
+    return cast("tuple[Exchange[P], ReceiveState]", made)
 
 
 @functools.cache
@@ -82,5 +100,5 @@ def _library() -> Callable[[tuple[Any, ...]], Any] | None:
         made = compiled_library("exchange", source, holds_gil=True)
     except Unavailable:
         return None
-    made.he_exchange.argtypes, made.he_exchange.restype = (ctypes.py_object,), ctypes.py_object
-    return cast("Callable[[tuple[Any, ...]], Any]", made.he_exchange)
+    made.he_functions.argtypes, made.he_functions.restype = (ctypes.py_object,), ctypes.py_object
+    return cast("Callable[[tuple[Any, ...]], Any]", made.he_functions)

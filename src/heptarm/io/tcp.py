@@ -15,7 +15,8 @@ from heptarm.io.udp import ConnectedUdp
 
 #: The connection is lost if the other side reads nothing for this long [s].
 SEND_TIMEOUT = 2.0
-_DO_NOT_WAIT: int = getattr(socket, "MSG_DONTWAIT", 0)  # without it, the patience bounds the wait
+#: A flag of recv(2).
+MSG_DONTWAIT: int = getattr(socket, "MSG_DONTWAIT", 0)  # without it, the patience bounds the wait
 _NO_DATA = (errno.EAGAIN, errno.EWOULDBLOCK, errno.ETIMEDOUT)
 _WARM_UP_BYTES = 4096
 
@@ -77,7 +78,7 @@ class TcpTransport:
     def receive_into(self, buffer: memoryview, *, wait: bool = True) -> int:
         """Receive bytes; with `wait`, wait for up to the patience."""
         try:
-            size = self._sock.recv_into(buffer, 0, 0 if wait else _DO_NOT_WAIT)
+            size = self._sock.recv_into(buffer, 0, 0 if wait else MSG_DONTWAIT)
         except OSError as error:
             if error.errno in _NO_DATA and not self._closed:
                 return 0

@@ -112,6 +112,7 @@ class Session:
             list, since `heptarm.io.exchange` counts what it sends and receives itself.
         waiting: requests without an answer, by their ids.
         tags: of this side's frames and of the other side's, once the key is proven.
+        takes_states: whether states may come now.
         simple_requests: what may be requested now without this session, which then interprets the answer (`answer`):
             requests that keep the state as it is.
     """
@@ -320,7 +321,7 @@ class Session:
             raise forged(f"expected frame {self.counts[RECEIVED]}, got frame {seq}")
         self._count_received()
         # states and answers are by far the most frequent
-        if type_ == State.TYPE and request == 0 and self._takes_states:
+        if type_ == State.TYPE and request == 0 and self.takes_states:
             return StateReceived(body, time)
         return Received(self._interpret(type_, request, body), request, time)
 
@@ -383,7 +384,7 @@ class Session:
     def _enter(self, state: SessionState) -> None:
         self._state, self._legal = state, TRANSITIONS[state]
         self.simple_requests, self._answers = _plain(state, self._source)
-        self._takes_states = _SYMBOLS[State] in self._legal and self._source != State.SOURCE
+        self.takes_states = _SYMBOLS[State] in self._legal and self._source != State.SOURCE
         self._packers = {
             kind: pack
             for kind, pack in self._one_way.items()

@@ -26,7 +26,8 @@ from heptarm.errors import (
     Timeout,
 )
 from heptarm.io.clock import Clock
-from heptarm.io.exchange import exchange_of
+from heptarm.io.exchange import compiled_link
+from heptarm.io.tcp import MSG_DONTWAIT
 from heptarm.io.transport import Transport
 from heptarm.record.journal import REFUSAL, REQUEST, Journal
 from heptarm.wire.clock_sync import ClockOffset, PingDeparture
@@ -48,6 +49,7 @@ from heptarm.wire.messages import (
     Pong,
     Refusal,
     Rejected,
+    State,
     Stop,
     Welcome,
 )
@@ -267,7 +269,7 @@ class Link:
         self._pending: dict[int, PendingRequest] = {}
         self._spare = [PendingRequest()]
         self._left: list[bytes] = []  # received, but not read yet
-        self._exchange = exchange_of(
+        compiled = compiled_link(
             self._session,
             transport.fileno,
             left=self._left,
@@ -276,6 +278,8 @@ class Link:
             reading=self._reading,
             sending=self._sending,
         )
+        self._exchange = None if compiled is None else compiled[0]
+        self._receive_state = None if compiled is None else compiled[1]
         self._welcome: Welcome | None = None
         self._error: HeptarmError | None = None
         self._closing = False
@@ -662,8 +666,17 @@ class Link:
     def _read(self, *, wait: bool) -> None:
         """Read and handle what has arrived; the caller holds `_reading`."""
         view, left = self._view, self._left
-        view[:8] = _UNTOUCHED
         try:
+            if self._receive_state is not None and self._session.takes_states:  # most of what arrives
+                received = self._receive_state(State.TYPE, 0 if wait else MSG_DONTWAIT)
+                if received is None:
+                    return
+                if received:
+                    time, body = received
+                    self._heartbeat.received = now = self._clock.nanos()
+                    self._take_state(body, time, now)
+                    return
+            view[:8] = _UNTOUCHED
             if left:
                 data: bytes | memoryview = left.pop()
             else:
@@ -681,6 +694,8 @@ class Link:
                     self._dispatch(event, now)
         except HeptarmError as error:
             self._fail(error)
+        except OSError as error:
+            self._fail(self._transport.lost(error))
         except BaseException:
             if view[:8] != _UNTOUCHED:
                 self._fail(ConnectionLost("interrupted while reading"))

@@ -333,7 +333,7 @@ class States(Iterator[State]):
         assert queue is not None
         if self._read is not None and queue.is_empty:
             self._read(lambda: queue.is_empty, self._rest())
-        return queue.get(self._rest())
+        return queue.get(self._rest() if queue.is_empty else 0.0)
 
     def _next_paced(self) -> StateSample | None:
         assert self._period is not None
