@@ -111,7 +111,7 @@ def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
     asked, interrupted, over = 0, 0, threading.Event()
 
     def interrupt() -> None:
-        while not over.wait(chance.uniform(1e-4, 3e-3)):
+        while not over.wait(chance.uniform(1e-4, chance.choice((1e-3, 2e-2)))):
             signal.pthread_kill(main, signal.SIGINT)  # type: ignore[arg-type]
 
     handler = CtrlC()
@@ -120,8 +120,8 @@ def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
     try:
         with peer.arm() as arm:
             thread.start()
-            end = time.monotonic() + 4.0
-            while time.monotonic() < end:
+            end = time.monotonic() + 60.0
+            while min(asked, interrupted) < 500 and time.monotonic() < end:
                 try:
                     handler.may_raise = True
                     arm.stop()
@@ -132,7 +132,7 @@ def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
             over.set()
             thread.join()
             arm.stop()
-            assert arm.connected and asked > 100 and interrupted > 100
+            assert arm.connected and min(asked, interrupted) >= 500, (asked, interrupted)
             link = arm.connection.link
             assert not link._reading.locked() and not link._sending.locked()
     finally:
