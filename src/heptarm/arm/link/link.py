@@ -668,7 +668,10 @@ class Link:
         view, left = self._view, self._left
         try:
             if self._receive_state is not None and self._session.takes_states:  # most of what arrives
-                received = self._receive_state(State.TYPE, 0 if wait else MSG_DONTWAIT)
+                try:
+                    received = self._receive_state(State.TYPE, 0 if wait else MSG_DONTWAIT)
+                except OSError as error:
+                    raise self._transport.lost(error) from error
                 if received is None:
                     return
                 if received:
@@ -694,8 +697,6 @@ class Link:
                     self._dispatch(event, now)
         except HeptarmError as error:
             self._fail(error)
-        except OSError as error:
-            self._fail(self._transport.lost(error))
         except BaseException:
             if view[:8] != _UNTOUCHED:
                 self._fail(ConnectionLost("interrupted while reading"))
