@@ -7,6 +7,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 TESTS="tests/values tests/wire tests/model tests/schema/test_golden.py tests/arm/test_arm.py tests/arm/test_errors_advise.py
+    tests/arm/test_requests.py tests/transports/test_exchange.py
     tests/cli/test_commands.py tests/cli/test_targets.py"
 
 python_of() { # the path of a working Python of this version
