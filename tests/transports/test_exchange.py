@@ -47,6 +47,7 @@ class Line:
         patience = struct.pack("@ll", 0, round(PATIENCE * 1e6))
         self.near.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, patience)
         self.far.settimeout(10.0)
+        self.far.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         made = compiled_link(
             self.client,
             self.near.fileno,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -74,7 +75,7 @@ def compiled_link(
     reading: threading.Lock,
     sending: threading.Lock,
 ) -> tuple[Exchange[P], ReceiveState] | None:
-    """The functions of a connection; None: this system is not supported, has no compiler, or there is no socket.
+    """The functions of a connection; None: the system or Python is not supported, or there is no compiler or socket.
 
     Args:
         session: it sends `simple_requests` of this session.
@@ -95,6 +96,8 @@ def compiled_link(
 
 @functools.cache
 def _library() -> Callable[[tuple[Any, ...]], Any] | None:
+    if not getattr(sys, "_is_gil_enabled", lambda: True)():
+        return None  # Python's lock protects the counts
     source = with_headers(_SOURCE, _SOURCE.with_name("frame_layout.h"))
     try:
         made = compiled_library("exchange", source, holds_gil=True)
