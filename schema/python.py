@@ -249,7 +249,7 @@ def _run_methods(name: str, body: Body, fields: list[Field]) -> list[str]:
         f"    def decode(cls, data: bytes) -> {name}:",
         '        """Read one body, all of it."""',
         f"        if len(data) != _{name}_0.size:",
-        f'            raise codec.wrong_size(_{name}_0, data, "{name}")',
+        f'            codec.refuse_size(_{name}_0, data, "{name}")',
         f"        v = _{name}_0.unpack(data)",
         *(f"        {line}" for line in body.read[2:]),
         f"        return cls({', '.join(f'{one.name}={one.name}' for one in fields)})",

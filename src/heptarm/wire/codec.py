@@ -44,11 +44,10 @@ def unpack(layout: Struct, data: bytes, pos: int) -> tuple[Any, ...]:
     return layout.unpack_from(data, pos)
 
 
-def wrong_size(layout: Struct, data: bytes, name: str) -> DecodeError:
-    """The error of a body that is one layout, and has another size."""
-    if len(data) < layout.size:
-        return DecodeError(f"body is too short: {layout.size} bytes expected at 0, {len(data)} left")
-    return DecodeError(f"{name}: {len(data) - layout.size} bytes behind its end")
+def refuse_size(layout: Struct, data: bytes, name: str) -> None:
+    """Raise DecodeError for a body that is one layout, and has another size."""
+    unpack(layout, data, 0)
+    end(data, layout.size, name)
 
 
 def read_bool(value: int) -> bool:

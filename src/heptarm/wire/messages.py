@@ -2725,7 +2725,7 @@ class Ping:
     def decode(cls, data: bytes) -> Ping:
         """Read one body, all of it."""
         if len(data) != _Ping_0.size:
-            raise codec.wrong_size(_Ping_0, data, "Ping")
+            codec.refuse_size(_Ping_0, data, "Ping")
         v = _Ping_0.unpack(data)
         sent = v[0]
         return cls(sent=sent)
@@ -2761,7 +2761,7 @@ class Pong:
     def decode(cls, data: bytes) -> Pong:
         """Read one body, all of it."""
         if len(data) != _Pong_0.size:
-            raise codec.wrong_size(_Pong_0, data, "Pong")
+            codec.refuse_size(_Pong_0, data, "Pong")
         v = _Pong_0.unpack(data)
         sent = v[0]
         received = v[1]
@@ -2845,7 +2845,7 @@ class Halt:
     def decode(cls, data: bytes) -> Halt:
         """Read one body, all of it."""
         if len(data) != _Halt_0.size:
-            raise codec.wrong_size(_Halt_0, data, "Halt")
+            codec.refuse_size(_Halt_0, data, "Halt")
         v = _Halt_0.unpack(data)
         kind = codec.read_enum(StopKind, v[0])
         return cls(kind=kind)
@@ -2920,7 +2920,7 @@ class Accepted:
     def decode(cls, data: bytes) -> Accepted:
         """Read one body, all of it."""
         if len(data) != _Accepted_0.size:
-            raise codec.wrong_size(_Accepted_0, data, "Accepted")
+            codec.refuse_size(_Accepted_0, data, "Accepted")
         v = _Accepted_0.unpack(data)
         id = v[0]
         return cls(id=id)
@@ -3056,7 +3056,7 @@ class TakeControl:
     def decode(cls, data: bytes) -> TakeControl:
         """Read one body, all of it."""
         if len(data) != _TakeControl_0.size:
-            raise codec.wrong_size(_TakeControl_0, data, "TakeControl")
+            codec.refuse_size(_TakeControl_0, data, "TakeControl")
         v = _TakeControl_0.unpack(data)
         watchdog = v[0]
         on_lost = codec.read_enum(OnLost, v[1])
@@ -3134,7 +3134,7 @@ class Subscribe:
     def decode(cls, data: bytes) -> Subscribe:
         """Read one body, all of it."""
         if len(data) != _Subscribe_0.size:
-            raise codec.wrong_size(_Subscribe_0, data, "Subscribe")
+            codec.refuse_size(_Subscribe_0, data, "Subscribe")
         v = _Subscribe_0.unpack(data)
         groups = Groups(v[0])
         rate = v[1]
@@ -3227,7 +3227,7 @@ class Cancel:
     def decode(cls, data: bytes) -> Cancel:
         """Read one body, all of it."""
         if len(data) != _Cancel_0.size:
-            raise codec.wrong_size(_Cancel_0, data, "Cancel")
+            codec.refuse_size(_Cancel_0, data, "Cancel")
         v = _Cancel_0.unpack(data)
         id = v[0]
         return cls(id=id)
@@ -3262,7 +3262,7 @@ class Stop:
     def decode(cls, data: bytes) -> Stop:
         """Read one body, all of it."""
         if len(data) != _Stop_0.size:
-            raise codec.wrong_size(_Stop_0, data, "Stop")
+            codec.refuse_size(_Stop_0, data, "Stop")
         v = _Stop_0.unpack(data)
         kind = codec.read_enum(StopKind, v[0])
         return cls(kind=kind)
@@ -3378,7 +3378,7 @@ class SetOverride:
     def decode(cls, data: bytes) -> SetOverride:
         """Read one body, all of it."""
         if len(data) != _SetOverride_0.size:
-            raise codec.wrong_size(_SetOverride_0, data, "SetOverride")
+            codec.refuse_size(_SetOverride_0, data, "SetOverride")
         v = _SetOverride_0.unpack(data)
         value = v[0]
         return cls(value=value)
@@ -3968,7 +3968,7 @@ class DatagramStatistics:
     def decode(cls, data: bytes) -> DatagramStatistics:
         """Read one body, all of it."""
         if len(data) != _DatagramStatistics_0.size:
-            raise codec.wrong_size(_DatagramStatistics_0, data, "DatagramStatistics")
+            codec.refuse_size(_DatagramStatistics_0, data, "DatagramStatistics")
         v = _DatagramStatistics_0.unpack(data)
         accepted = v[0]
         old = v[1]
@@ -4162,7 +4162,7 @@ class ServoJoints:
     def decode(cls, data: bytes) -> ServoJoints:
         """Read one body, all of it."""
         if len(data) != _ServoJoints_0.size:
-            raise codec.wrong_size(_ServoJoints_0, data, "ServoJoints")
+            codec.refuse_size(_ServoJoints_0, data, "ServoJoints")
         v = _ServoJoints_0.unpack(data)
         servo = v[0]
         watchdog = v[1]
@@ -4205,7 +4205,7 @@ class ServoJointsVelocity:
     def decode(cls, data: bytes) -> ServoJointsVelocity:
         """Read one body, all of it."""
         if len(data) != _ServoJointsVelocity_0.size:
-            raise codec.wrong_size(_ServoJointsVelocity_0, data, "ServoJointsVelocity")
+            codec.refuse_size(_ServoJointsVelocity_0, data, "ServoJointsVelocity")
         v = _ServoJointsVelocity_0.unpack(data)
         servo = v[0]
         watchdog = v[1]
@@ -4250,7 +4250,7 @@ class ServoPose:
     def decode(cls, data: bytes) -> ServoPose:
         """Read one body, all of it."""
         if len(data) != _ServoPose_0.size:
-            raise codec.wrong_size(_ServoPose_0, data, "ServoPose")
+            codec.refuse_size(_ServoPose_0, data, "ServoPose")
         v = _ServoPose_0.unpack(data)
         servo = v[0]
         watchdog = v[1]
@@ -4339,7 +4339,7 @@ class ServoClose:
     def decode(cls, data: bytes) -> ServoClose:
         """Read one body, all of it."""
         if len(data) != _ServoClose_0.size:
-            raise codec.wrong_size(_ServoClose_0, data, "ServoClose")
+            codec.refuse_size(_ServoClose_0, data, "ServoClose")
         v = _ServoClose_0.unpack(data)
         servo = v[0]
         return cls(servo=servo)
@@ -4525,7 +4525,7 @@ class FriClose:
     def decode(cls, data: bytes) -> FriClose:
         """Read one body, all of it."""
         if len(data) != _FriClose_0.size:
-            raise codec.wrong_size(_FriClose_0, data, "FriClose")
+            codec.refuse_size(_FriClose_0, data, "FriClose")
         v = _FriClose_0.unpack(data)
         session = v[0]
         return cls(session=session)
@@ -4615,7 +4615,7 @@ class MotionStarted:
     def decode(cls, data: bytes) -> MotionStarted:
         """Read one body, all of it."""
         if len(data) != _MotionStarted_0.size:
-            raise codec.wrong_size(_MotionStarted_0, data, "MotionStarted")
+            codec.refuse_size(_MotionStarted_0, data, "MotionStarted")
         v = _MotionStarted_0.unpack(data)
         id = v[0]
         item = v[1]
@@ -4652,7 +4652,7 @@ class ItemReached:
     def decode(cls, data: bytes) -> ItemReached:
         """Read one body, all of it."""
         if len(data) != _ItemReached_0.size:
-            raise codec.wrong_size(_ItemReached_0, data, "ItemReached")
+            codec.refuse_size(_ItemReached_0, data, "ItemReached")
         v = _ItemReached_0.unpack(data)
         id = v[0]
         item = v[1]
@@ -5001,7 +5001,7 @@ class KeyPressed:
     def decode(cls, data: bytes) -> KeyPressed:
         """Read one body, all of it."""
         if len(data) != _KeyPressed_0.size:
-            raise codec.wrong_size(_KeyPressed_0, data, "KeyPressed")
+            codec.refuse_size(_KeyPressed_0, data, "KeyPressed")
         v = _KeyPressed_0.unpack(data)
         slot = v[0]
         down = codec.read_bool(v[1])
@@ -5153,7 +5153,7 @@ class SegmentReached:
     def decode(cls, data: bytes) -> SegmentReached:
         """Read one body, all of it."""
         if len(data) != _SegmentReached_0.size:
-            raise codec.wrong_size(_SegmentReached_0, data, "SegmentReached")
+            codec.refuse_size(_SegmentReached_0, data, "SegmentReached")
         v = _SegmentReached_0.unpack(data)
         id = v[0]
         item = v[1]
@@ -5190,7 +5190,7 @@ class StatesMissed:
     def decode(cls, data: bytes) -> StatesMissed:
         """Read one body, all of it."""
         if len(data) != _StatesMissed_0.size:
-            raise codec.wrong_size(_StatesMissed_0, data, "StatesMissed")
+            codec.refuse_size(_StatesMissed_0, data, "StatesMissed")
         v = _StatesMissed_0.unpack(data)
         count = v[0]
         return cls(count=count)
