@@ -46,7 +46,6 @@ extern long long PyLong_AsLongLong(PyObject *);
 extern unsigned long PyLong_AsUnsignedLong(PyObject *);
 extern PyObject *PyLong_FromLongLong(long long), *PyLong_FromUnsignedLong(unsigned long);
 extern PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...);
-extern PyObject *PyObject_CallMethodObjArgs(PyObject *, PyObject *, ...);
 extern PyObject *PyObject_GetAttr(PyObject *, PyObject *);
 extern PyObject *PyUnicode_InternFromString(const char *);
 extern PyObject *PyTuple_GetItem(PyObject *, Py_ssize_t), *PyTuple_Pack(Py_ssize_t, ...);
@@ -57,12 +56,18 @@ enum { COUNTS, WAITING, TAGS, LEFT, PENDING, SPARE, SOCKET, TAKE_READING, END_RE
 enum { SENT, RECEIVED, REQUESTED, UNREAD };
 /* what `tags` contains in a session with a key: of our frames, of the other side's */
 enum { OURS, THEIRS };
-/* an attribute of a FrameTag, methods of a hash */
-enum { BEGINS, UPDATE, DIGEST, NAMES };
-static const char *const NAME[NAMES] = {"begins", "update", "digest"};
-static PyObject *name[NAMES];
-/* longest body of a request, and what is read at once [bytes] */
-enum { LONGEST = 1024, ROOM = 16384 };
+/* what `begins` of a FrameTag contains */
+enum { INNER, OUTER, HASHES };
+static PyObject *begins;
+/* longest body of a request, what is read at once, a digest of SHA-256 [bytes] */
+enum { LONGEST = 1024, ROOM = 16384, DIGEST = 32 };
+
+/* SHA-256 of OpenSSL's libcrypto (openssl/sha.h): a SHA256_CTX is 112 bytes long and needs no memory of its own, unlike
+the hashes of hashlib. */
+typedef struct {
+    uint64_t words[14];
+} Hash;
+static int (*hash_init)(Hash *), (*hash_update)(Hash *, const void *, size_t), (*hash_final)(uint8_t *, Hash *);
 
 static PyObject *part(PyObject *line, Py_ssize_t which)
 {
@@ -121,28 +126,30 @@ static int is_tagged(PyObject *line)
     return PyList_Size(part(line, TAGS)) != 0;
 }
 
-/* Compute the tag of a frame as FrameTag.of does, without running code in Python. Returns whether it was possible. */
+/* Compute the tag of a frame as FrameTag.of does. Returns whether it was possible. */
 static int tag(PyObject *line, Py_ssize_t whose, const uint8_t *frame, size_t size, uint8_t *tag)
 {
-    PyObject *begins = PyObject_GetAttr(PyList_GetItem(part(line, TAGS), whose), name[BEGINS]);
-    PyObject *message = begins ? PyBytes_FromStringAndSize((const char *)frame, (Py_ssize_t)size) : NULL;
-    for (int i = 0; i < 2 && message != NULL; i++) {
-        PyObject *begin = PyTuple_GetItem(begins, i), *hash = begin ? PyObject_CallFunctionObjArgs(begin, NULL) : NULL;
-        PyObject *none = hash ? PyObject_CallMethodObjArgs(hash, name[UPDATE], message, NULL) : NULL;
-        Py_DecRef(message);
-        message = none ? PyObject_CallMethodObjArgs(hash, name[DIGEST], NULL) : NULL;
-        Py_DecRef(none);
-        Py_DecRef(hash);
+    PyObject *begin = PyObject_GetAttr(PyList_GetItem(part(line, TAGS), whose), begins);
+    uint8_t digest[DIGEST];
+    const void *message = frame;
+    int i = 0;
+    for (; i < HASHES && begin != NULL; i++) {
+        Hash hash;
+        char *first;
+        Py_ssize_t length;
+        if (PyBytes_AsStringAndSize(PyTuple_GetItem(begin, i), &first, &length))
+            break;
+        if (!hash_init(&hash) || !hash_update(&hash, first, (size_t)length) || !hash_update(&hash, message, size)
+            || !hash_final(digest, &hash))
+            break;
+        message = digest;
+        size = DIGEST;
     }
-    char *digest;
-    Py_ssize_t length;
-    int done = message != NULL && PyBytes_AsStringAndSize(message, &digest, &length) == 0 && length >= TAG;
-    if (done)
-        memcpy(tag, digest, TAG);
-    Py_DecRef(message);
-    Py_DecRef(begins);
+    Py_DecRef(begin);
     PyErr_Clear();
-    return done;
+    if (i == HASHES)
+        memcpy(tag, digest, TAG);
+    return i == HASHES;
 }
 
 /* Send a whole frame. Returns 1; 0 if nothing could be sent at once; -1 with errno. */
@@ -352,12 +359,19 @@ static PyMethodDef methods[] = {
     {"state", state, METH_FASTCALL, NULL},
 };
 
+/* Where SHA256_Init, SHA256_Update and SHA256_Final are: once, before a session with a key. */
+void he_hash(int (*init)(Hash *), int (*update)(Hash *, const void *, size_t), int (*final)(uint8_t *, Hash *))
+{
+    hash_init = init;
+    hash_update = update;
+    hash_final = final;
+}
+
 /* Both functions for one connection. */
 PyObject *he_functions(PyObject *line)
 {
-    for (int i = 0; i < NAMES; i++)
-        if (name[i] == NULL && (name[i] = PyUnicode_InternFromString(NAME[i])) == NULL)
-            return NULL;
+    if (begins == NULL && (begins = PyUnicode_InternFromString("begins")) == NULL)
+        return NULL;
     PyObject *first = PyCFunction_NewEx(&methods[0], line, NULL), *second = PyCFunction_NewEx(&methods[1], line, NULL);
     PyObject *both = first && second ? PyTuple_Pack(2, first, second) : NULL;
     Py_DecRef(first);

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import importlib.util
 import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeVar, cast
+from typing import Literal, Protocol, TypeVar, cast
 
 from heptarm.io.compiled import Unavailable, compiled_library, with_headers
 from heptarm.wire.messages import Message
@@ -75,7 +76,9 @@ def compiled_link(
     reading: threading.Lock,
     sending: threading.Lock,
 ) -> tuple[Exchange[P], ReceiveState] | None:
-    """The functions of a connection; None: the system or Python is not supported, or there is no compiler or socket.
+    """The functions of a connection.
+
+    None: the system or Python is not supported, there is no compiler or socket, or no libcrypto for a session with a key.
 
     Args:
         session: it sends `simple_requests` of this session.
@@ -86,16 +89,18 @@ def compiled_link(
         reading: lock of the thread that reads the socket.
         sending: lock of the thread that writes to it.
     """
-    make = _library() if socket() >= 0 else None
-    if make is None:
+    library = _library() if socket() >= 0 else None
+    if library is None or (session.has_key and not _takes_hash(library)):
         return None
     locks = reading.acquire, reading.release, sending.acquire, sending.release
-    made = make((session.counts, session.waiting, session.tags, left, pending, spare, socket, *locks))
+    made = library.he_functions(
+        (session.counts, session.waiting, session.tags, left, pending, spare, socket, *locks)
+    )
     return cast("tuple[Exchange[P], ReceiveState]", made)
 
 
 @functools.cache
-def _library() -> Callable[[tuple[Any, ...]], Any] | None:
+def _library() -> ctypes.CDLL | None:
     if not getattr(sys, "_is_gil_enabled", lambda: True)():
         return None  # Python's lock protects the counts
     source = with_headers(_SOURCE, _SOURCE.with_name("frame_layout.h"))
@@ -104,4 +109,18 @@ def _library() -> Callable[[tuple[Any, ...]], Any] | None:
     except Unavailable:
         return None
     made.he_functions.argtypes, made.he_functions.restype = (ctypes.py_object,), ctypes.py_object
-    return cast("Callable[[tuple[Any, ...]], Any]", made.he_functions)
+    return made
+
+
+def _takes_hash(library: ctypes.CDLL) -> bool:
+    """Give a library the SHA-256 of libcrypto: of Python's own, or of the system's where Python's is not visible."""
+    pythons = importlib.util.find_spec("_hashlib")
+    names = [pythons.origin] if pythons else []
+    for name in (*names, "libcrypto.so.3", "libcrypto.so.1.1"):
+        try:
+            crypto = ctypes.CDLL(name)
+            library.he_hash(crypto.SHA256_Init, crypto.SHA256_Update, crypto.SHA256_Final)
+            return True
+        except (OSError, AttributeError):
+            continue
+    return False

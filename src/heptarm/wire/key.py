@@ -90,28 +90,27 @@ class FrameTag:
         key: the key of this direction [32 bytes].
 
     Attributes:
-        begins: make the inner and the outer hash of a frame, which have taken the padded key; the inner one also the
-            number of the round.
+        begins: what the inner and the outer hash of a frame take first: the padded key, the inner one also the number
+            of the round.
     """
 
-    __slots__ = ("_key", "_outer", "_round", "begins")
+    __slots__ = ("_hashes", "_key", "_round", "begins")
 
     def __init__(self, key: bytes) -> None:
         self._key = key.ljust(64, b"\0")
-        self._outer = hashlib.sha256(self._key.translate(_OUTER))
         self._round = -1
         self.begin_round()
 
     def begin_round(self) -> None:
         """Begin to count the frames from 0; called again each time their sequence number wraps."""
         self._round += 1
-        inner = hashlib.sha256(self._key.translate(_INNER) + _ROUND.pack(self._round))
-        self.begins = inner.copy, self._outer.copy
+        self.begins = self._key.translate(_INNER) + _ROUND.pack(self._round), self._key.translate(_OUTER)
+        self._hashes = tuple(hashlib.sha256(begin).copy for begin in self.begins)
 
     def of(self, frame: bytes | bytearray | memoryview) -> bytes:
         """The tag of a frame: of its header and its body."""
-        begin_inner, begin_outer = self.begins
-        inner, outer = begin_inner(), begin_outer()
+        copy_inner, copy_outer = self._hashes
+        inner, outer = copy_inner(), copy_outer()
         inner.update(frame)
         outer.update(inner.digest())
         return outer.digest()[:TAG]

@@ -139,6 +139,11 @@ class Session:
         return self._side
 
     @property
+    def has_key(self) -> bool:
+        """Whether this side has a key."""
+        return self._exchange is not None
+
+    @property
     def state(self) -> SessionState:
         """State of the session."""
         return self._state

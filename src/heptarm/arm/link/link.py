@@ -255,7 +255,6 @@ class Link:
         self.peer = transport.peer
         self._transport = transport
         self._clock = clock
-        self._has_key = key is not None
         self._session = Session(Side.CLIENT, key=key)
         self._on_event = on_event
         self._on_state = on_state
@@ -383,7 +382,7 @@ class Link:
 
     def _handshake(self, message: Message) -> None:
         if isinstance(message, Challenge):
-            if not self._has_key:
+            if not self._session.has_key:
                 raise ConnectFailed(
                     f"the cabinet at {self.peer} asks for a pre-shared key, none was given",
                     code=int(Code.WRONG_KEY),
