@@ -168,14 +168,16 @@ def _python_struct(seam: Seam, struct: Struct) -> list[str]:
     name, body = struct.name, python.Body(seam.spec, struct.name, struct.fields)
     lines = ["", *body.layouts, "", ""] if body.layouts else ["", ""]
     lines += [
-        "@dataclass(frozen=True, slots=True, kw_only=True)",
+        python.DATACLASS,
         f"class {name}:",
         f'    """{struct.doc}"""',
         "",
     ]
-    for one in struct.fields:
-        lines += [*_python_doc(one), *python.fields(seam.spec, [one])]
+    own = python.typed(seam.spec, struct.fields)
+    for one, line in zip(struct.fields, python.fields(own), strict=True):
+        lines += [*_python_doc(one), line]
     lines += [
+        *python.constructor(name, own),
         "",
         "    def _write(self, out: list[bytes]) -> None:",
         *(f"        {line}" for line in body.write),
@@ -185,7 +187,7 @@ def _python_struct(seam: Seam, struct: Struct) -> list[str]:
     lines += [f"        return cls({', '.join(f'{one.name}={one.name}' for one in struct.fields)}), pos"]
     if name in seam.roots:
         lines += python.encoding(name)
-    return lines
+    return lines + python.setters(name, own)
 
 
 # ----------------------------------------------------------------------------------------------------------- Java

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import count
+from typing import TypeAlias
 
 from spec import PRIMITIVES, Field, Message, Spec, Type, ordered_structs
 
@@ -214,9 +215,38 @@ def _doc(text: str) -> str:
     return text.replace('"', "'")
 
 
-def fields(spec: Spec, chosen: list[Field]) -> list[str]:
+Typed: TypeAlias = list[tuple[str, str]]
+"""Names of fields, and their annotations with defaults."""
+
+
+def typed(spec: Spec, chosen: list[Field]) -> Typed:
+    """Fields of a class."""
+    return [(one.name, f"{annotation(one.type)}{default(spec, one)}") for one in chosen]
+
+
+def fields(chosen: Typed) -> list[str]:
     """Annotated fields of a dataclass."""
-    return [f"    {one.name}: {annotation(one.type)}{default(spec, one)}" for one in chosen]
+    return [f"    {name}: {annotated}" for name, annotated in chosen]
+
+
+#: The dataclass of a message: its constructor is `constructor`'s.
+DATACLASS = "@dataclass(frozen=True, slots=True, kw_only=True, init=False)"
+
+
+def constructor(name: str, chosen: Typed) -> list[str]:
+    """Constructor that writes the slots directly, which takes half the time of a frozen dataclass's own."""
+    if not chosen:
+        return []
+    parameters = ", ".join(f"{field}: {annotated}" for field, annotated in chosen)
+    calls = [f"        _{name}_{field}(self, {field})" for field, _ in chosen]
+    return ["", f"    def __init__(self, *, {parameters}) -> None:", *calls]
+
+
+def setters(name: str, chosen: Typed) -> list[str]:
+    """What the constructor of a class calls, for the lines after the class."""
+    names = [f"_{name}_{field}" for field, _ in chosen]
+    left = ", ".join(names) if len(names) > 1 else f"({''.join(names)},)"
+    return ["", "", f"{left} = codec.setters({name})"] if chosen else []
 
 
 def _ranges(chosen: list[Field]) -> list[str]:
@@ -291,8 +321,7 @@ def _validation() -> list[str]:
 
 
 def _state(message: Message) -> list[str]:
-    lines = [f"    {bit}: {kind} | None = None" for bit, _, kind in message.groups]
-    lines += ["", "    def _write(self, out: list[bytes]) -> None:", "        mask = 0"]
+    lines = ["", "    def _write(self, out: list[bytes]) -> None:", "        mask = 0"]
     for bit, number, _ in message.groups:
         lines += [f"        if self.{bit} is not None:", f"            mask |= {1 << number}"]
     lines += ["        out.append(_MASK.pack(mask))"]
@@ -362,13 +391,16 @@ def messages(spec: Spec) -> str:
             *body.layouts,
             "",
             "",
-            "@dataclass(frozen=True, slots=True, kw_only=True)",
+            DATACLASS,
             f"class {name}:",
         ]
         lines += [f'    """{_doc(struct.doc)}"""', ""]
         if ranges := _ranges(struct.fields):
             lines += [*ranges, ""]
-        lines += fields(spec, struct.fields) + _methods(name, body, struct.fields) + [""]
+        own = typed(spec, struct.fields)
+        lines += (
+            fields(own) + constructor(name, own) + _methods(name, body, struct.fields) + setters(name, own)
+        )
     for message in spec.messages.values():
         body = Body(spec, message.name, message.fields)
         lines += [
@@ -376,7 +408,7 @@ def messages(spec: Spec) -> str:
             *body.layouts,
             "",
             "",
-            "@dataclass(frozen=True, slots=True, kw_only=True)",
+            DATACLASS,
             f"class {message.name}:",
         ]
         lines += [f'    """{_doc(message.doc)}"""', ""]
@@ -390,13 +422,14 @@ def messages(spec: Spec) -> str:
                 raise ValueError(f"{message.name}: a one-way message is one run of numbers")
             lines += [f"    LAYOUT: ClassVar[Struct] = _{message.name}_0"]
         lines += _ranges(message.fields)
-        lines += [""]
-        if message.groups:
+        groups = [(bit, f"{kind} | None = None") for bit, _, kind in message.groups]
+        own = groups or typed(spec, message.fields)
+        lines += ["", *fields(own), *constructor(message.name, own)]
+        if groups:
             lines += _state(message)
         else:
-            lines += fields(spec, message.fields)
             lines += (_run_methods if body.is_run else _methods)(message.name, body, message.fields)
-        lines += ([] if body.is_run else encoding(message.name)) + _validation() + [""]
+        lines += ([] if body.is_run else encoding(message.name)) + _validation() + setters(message.name, own)
     lines += ["", f"Message: TypeAlias = {' | '.join(spec.messages)}"]
     one_way = [name for name, message in spec.messages.items() if message.kind == "oneway"]
     lines += [f"OneWay: TypeAlias = {' | '.join(one_way)}", ""]

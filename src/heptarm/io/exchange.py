@@ -78,7 +78,7 @@ def compiled_link(
 ) -> tuple[Exchange[P], ReceiveState] | None:
     """The functions of a connection.
 
-    None: the system or Python is not supported, there is no compiler or socket, or no libcrypto for a session with a key.
+    None: no socket, no compiler, no libcrypto for a session with a key, or a system or Python that is not supported.
 
     Args:
         session: it sends `simple_requests` of this session.

@@ -248,7 +248,7 @@ MEMORY_WORDS = 17174
 _RobotDescription_0 = Struct(">7d7d7d7ddddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class RobotDescription:
     """The simulated robot: name, limits and dimensions."""
 
@@ -270,6 +270,17 @@ class RobotDescription:
     d_ew: float
     #: Wrist to flange [m]
     d_wf: float
+
+    def __init__(self, *, title: str = "", q_min: tuple[float, ...], q_max: tuple[float, ...], dq_max: tuple[float, ...], tau_max: tuple[float, ...], d_bs: float, d_se: float, d_ew: float, d_wf: float) -> None:
+        _RobotDescription_title(self, title)
+        _RobotDescription_q_min(self, q_min)
+        _RobotDescription_q_max(self, q_max)
+        _RobotDescription_dq_max(self, dq_max)
+        _RobotDescription_tau_max(self, tau_max)
+        _RobotDescription_d_bs(self, d_bs)
+        _RobotDescription_d_se(self, d_se)
+        _RobotDescription_d_ew(self, d_ew)
+        _RobotDescription_d_wf(self, d_wf)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.title))
@@ -303,10 +314,13 @@ class RobotDescription:
         codec.end(data, pos, "RobotDescription")
         return value
 
+
+_RobotDescription_title, _RobotDescription_q_min, _RobotDescription_q_max, _RobotDescription_dq_max, _RobotDescription_tau_max, _RobotDescription_d_bs, _RobotDescription_d_se, _RobotDescription_d_ew, _RobotDescription_d_wf = codec.setters(RobotDescription)
+
 _AttachedLoad_0 = Struct(">d3d6d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AttachedLoad:
     """Everything attached to the flange as one body, in the flange's axes."""
 
@@ -316,6 +330,11 @@ class AttachedLoad:
     centre: tuple[float, ...]
     #: About the centre of mass: xx yy zz xy xz yz [kg m²]
     inertia: tuple[float, ...]
+
+    def __init__(self, *, mass: float, centre: tuple[float, ...], inertia: tuple[float, ...]) -> None:
+        _AttachedLoad_mass(self, mass)
+        _AttachedLoad_centre(self, centre)
+        _AttachedLoad_inertia(self, inertia)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_AttachedLoad_0.pack(self.mass, *self.centre, *self.inertia))
@@ -342,10 +361,13 @@ class AttachedLoad:
         codec.end(data, pos, "AttachedLoad")
         return value
 
+
+_AttachedLoad_mass, _AttachedLoad_centre, _AttachedLoad_inertia = codec.setters(AttachedLoad)
+
 _BodyShape_0 = Struct(">B3d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class BodyShape:
     """A shape of a body on the flange."""
 
@@ -354,6 +376,11 @@ class BodyShape:
     size: tuple[float, ...]
     #: Of its middle in the body's frame [m]
     pose: tuple[float, ...]
+
+    def __init__(self, *, kind: ShapeKind = ShapeKind.BOX, size: tuple[float, ...], pose: tuple[float, ...]) -> None:
+        _BodyShape_kind(self, kind)
+        _BodyShape_size(self, size)
+        _BodyShape_pose(self, pose)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_BodyShape_0.pack(self.kind, *self.size, *self.pose))
@@ -367,10 +394,13 @@ class BodyShape:
         pose = v[4:11]
         return cls(kind=kind, size=size, pose=pose), pos
 
+
+_BodyShape_kind, _BodyShape_size, _BodyShape_pose = codec.setters(BodyShape)
+
 _CarriedBody_0 = Struct(">B7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CarriedBody:
     """A tool or a workpiece with its shapes."""
 
@@ -380,6 +410,12 @@ class CarriedBody:
     #: Of its frame in the flange frame [m]
     pose: tuple[float, ...]
     shapes: tuple[BodyShape, ...] = ()
+
+    def __init__(self, *, name: str = "", is_tool: bool, pose: tuple[float, ...], shapes: tuple[BodyShape, ...] = ()) -> None:
+        _CarriedBody_name(self, name)
+        _CarriedBody_is_tool(self, is_tool)
+        _CarriedBody_pose(self, pose)
+        _CarriedBody_shapes(self, shapes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -404,11 +440,17 @@ class CarriedBody:
         return cls(name=name, is_tool=is_tool, pose=pose, shapes=shapes), pos
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+_CarriedBody_name, _CarriedBody_is_tool, _CarriedBody_pose, _CarriedBody_shapes = codec.setters(CarriedBody)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CarriedBodies:
     """Everything with shapes that is attached to the flange."""
 
     bodies: tuple[CarriedBody, ...] = ()
+
+    def __init__(self, *, bodies: tuple[CarriedBody, ...] = ()) -> None:
+        _CarriedBodies_bodies(self, bodies)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.bodies)))
@@ -438,16 +480,23 @@ class CarriedBodies:
         codec.end(data, pos, "CarriedBodies")
         return value
 
+
+(_CarriedBodies_bodies,) = codec.setters(CarriedBodies)
+
 _JointImpedance_0 = Struct(">7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointImpedance:
     """A spring and a damper in every joint."""
 
     #: [Nm/rad]
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
+
+    def __init__(self, *, stiffness: tuple[float, ...], damping: tuple[float, ...]) -> None:
+        _JointImpedance_stiffness(self, stiffness)
+        _JointImpedance_damping(self, damping)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointImpedance_0.pack(*self.stiffness, *self.damping))
@@ -460,11 +509,14 @@ class JointImpedance:
         damping = v[7:14]
         return cls(stiffness=stiffness, damping=damping), pos
 
+
+_JointImpedance_stiffness, _JointImpedance_damping = codec.setters(JointImpedance)
+
 _CartesianImpedance_0 = Struct(">6d6ddd6d6dB6d6d")
 _CartesianImpedance_1 = Struct(">4d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CartesianImpedance:
     """A spring and a damper at the motion frame, and one in the null space."""
 
@@ -485,6 +537,18 @@ class CartesianImpedance:
     max_deviation: tuple[float, ...] = (nan,) * 6
     #: Quaternion of the directions in the base; none: axes of the motion frame
     axes: tuple[float, ...] | None = None
+
+    def __init__(self, *, stiffness: tuple[float, ...], damping: tuple[float, ...], nullspace_stiffness: float, nullspace_damping: float, additional_force: tuple[float, ...], max_force: tuple[float, ...] = (nan,) * 6, max_force_stops: bool = False, max_velocity: tuple[float, ...] = (nan,) * 6, max_deviation: tuple[float, ...] = (nan,) * 6, axes: tuple[float, ...] | None = None) -> None:
+        _CartesianImpedance_stiffness(self, stiffness)
+        _CartesianImpedance_damping(self, damping)
+        _CartesianImpedance_nullspace_stiffness(self, nullspace_stiffness)
+        _CartesianImpedance_nullspace_damping(self, nullspace_damping)
+        _CartesianImpedance_additional_force(self, additional_force)
+        _CartesianImpedance_max_force(self, max_force)
+        _CartesianImpedance_max_force_stops(self, max_force_stops)
+        _CartesianImpedance_max_velocity(self, max_velocity)
+        _CartesianImpedance_max_deviation(self, max_deviation)
+        _CartesianImpedance_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_CartesianImpedance_0.pack(*self.stiffness, *self.damping, self.nullspace_stiffness, self.nullspace_damping, *self.additional_force, *self.max_force, self.max_force_stops, *self.max_velocity, *self.max_deviation))
@@ -513,10 +577,13 @@ class CartesianImpedance:
             axes, pos = codec.unpack(_CartesianImpedance_1, data, pos), pos + _CartesianImpedance_1.size
         return cls(stiffness=stiffness, damping=damping, nullspace_stiffness=nullspace_stiffness, nullspace_damping=nullspace_damping, additional_force=additional_force, max_force=max_force, max_force_stops=max_force_stops, max_velocity=max_velocity, max_deviation=max_deviation, axes=axes), pos
 
+
+_CartesianImpedance_stiffness, _CartesianImpedance_damping, _CartesianImpedance_nullspace_stiffness, _CartesianImpedance_nullspace_damping, _CartesianImpedance_additional_force, _CartesianImpedance_max_force, _CartesianImpedance_max_force_stops, _CartesianImpedance_max_velocity, _CartesianImpedance_max_deviation, _CartesianImpedance_axes = codec.setters(CartesianImpedance)
+
 _SineImpedance_0 = Struct(">6d6d6d6d6d6dddddB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SineImpedance:
     """Cartesian impedance with an overlaid force: bias + amplitude sin(2 pi frequency t + phase)."""
 
@@ -544,6 +611,20 @@ class SineImpedance:
     #: the motion ends only after the pattern has finished
     stay_active: bool = False
 
+    def __init__(self, *, base: CartesianImpedance, amplitude: tuple[float, ...], frequency: tuple[float, ...], phase: tuple[float, ...], bias: tuple[float, ...], force_limit: tuple[float, ...] = (nan,) * 6, position_limit: tuple[float, ...] = (nan,) * 6, total_time: float = nan, rise_time: float = 0.0, hold_time: float = nan, fall_time: float = 0.0, stay_active: bool = False) -> None:
+        _SineImpedance_base(self, base)
+        _SineImpedance_amplitude(self, amplitude)
+        _SineImpedance_frequency(self, frequency)
+        _SineImpedance_phase(self, phase)
+        _SineImpedance_bias(self, bias)
+        _SineImpedance_force_limit(self, force_limit)
+        _SineImpedance_position_limit(self, position_limit)
+        _SineImpedance_total_time(self, total_time)
+        _SineImpedance_rise_time(self, rise_time)
+        _SineImpedance_hold_time(self, hold_time)
+        _SineImpedance_fall_time(self, fall_time)
+        _SineImpedance_stay_active(self, stay_active)
+
     def _write(self, out: list[bytes]) -> None:
         self.base._write(out)
         out.append(_SineImpedance_0.pack(*self.amplitude, *self.frequency, *self.phase, *self.bias, *self.force_limit, *self.position_limit, self.total_time, self.rise_time, self.hold_time, self.fall_time, self.stay_active))
@@ -566,10 +647,13 @@ class SineImpedance:
         stay_active = codec.read_bool(v[40])
         return cls(base=base, amplitude=amplitude, frequency=frequency, phase=phase, bias=bias, force_limit=force_limit, position_limit=position_limit, total_time=total_time, rise_time=rise_time, hold_time=hold_time, fall_time=fall_time, stay_active=stay_active), pos
 
+
+_SineImpedance_base, _SineImpedance_amplitude, _SineImpedance_frequency, _SineImpedance_phase, _SineImpedance_bias, _SineImpedance_force_limit, _SineImpedance_position_limit, _SineImpedance_total_time, _SineImpedance_rise_time, _SineImpedance_hold_time, _SineImpedance_fall_time, _SineImpedance_stay_active = codec.setters(SineImpedance)
+
 _MeasuringFrame_0 = Struct(">B3dB4d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class MeasuringFrame:
     """Point and axes in which an external wrench is measured."""
 
@@ -581,6 +665,12 @@ class MeasuringFrame:
     axes_move: bool
     #: Their quaternion seen from the flange, otherwise from the base
     axes: tuple[float, ...]
+
+    def __init__(self, *, point_moves: bool, point: tuple[float, ...], axes_move: bool, axes: tuple[float, ...]) -> None:
+        _MeasuringFrame_point_moves(self, point_moves)
+        _MeasuringFrame_point(self, point)
+        _MeasuringFrame_axes_move(self, axes_move)
+        _MeasuringFrame_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_MeasuringFrame_0.pack(self.point_moves, *self.point, self.axes_move, *self.axes))
@@ -595,10 +685,13 @@ class MeasuringFrame:
         axes = v[5:9]
         return cls(point_moves=point_moves, point=point, axes_move=axes_move, axes=axes), pos
 
+
+_MeasuringFrame_point_moves, _MeasuringFrame_point, _MeasuringFrame_axes_move, _MeasuringFrame_axes = codec.setters(MeasuringFrame)
+
 _JointTorqueOutside_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointTorqueOutside:
     """The external torque of a joint is outside a band."""
 
@@ -608,6 +701,11 @@ class JointTorqueOutside:
     low: float
     #: [Nm]
     high: float
+
+    def __init__(self, *, joint: int, low: float, high: float) -> None:
+        _JointTorqueOutside_joint(self, joint)
+        _JointTorqueOutside_low(self, low)
+        _JointTorqueOutside_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointTorqueOutside_0.pack(self.joint, self.low, self.high))
@@ -621,10 +719,13 @@ class JointTorqueOutside:
         high = v[2]
         return cls(joint=joint, low=low, high=high), pos
 
+
+_JointTorqueOutside_joint, _JointTorqueOutside_low, _JointTorqueOutside_high = codec.setters(JointTorqueOutside)
+
 _WrenchAbove_0 = Struct(">Bd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class WrenchAbove:
     """The magnitude of some components of the external wrench is above a threshold."""
 
@@ -632,6 +733,11 @@ class WrenchAbove:
     components: WrenchComponents
     #: [N, Nm]
     threshold: float
+
+    def __init__(self, *, frame: MeasuringFrame, components: WrenchComponents, threshold: float) -> None:
+        _WrenchAbove_frame(self, frame)
+        _WrenchAbove_components(self, components)
+        _WrenchAbove_threshold(self, threshold)
 
     def _write(self, out: list[bytes]) -> None:
         self.frame._write(out)
@@ -646,10 +752,13 @@ class WrenchAbove:
         threshold = v[1]
         return cls(frame=frame, components=components, threshold=threshold), pos
 
+
+_WrenchAbove_frame, _WrenchAbove_components, _WrenchAbove_threshold = codec.setters(WrenchAbove)
+
 _WrenchOutside_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class WrenchOutside:
     """A component of the external wrench is outside a band."""
 
@@ -660,6 +769,12 @@ class WrenchOutside:
     low: float
     #: [N, Nm]
     high: float
+
+    def __init__(self, *, frame: MeasuringFrame, component: int, low: float, high: float) -> None:
+        _WrenchOutside_frame(self, frame)
+        _WrenchOutside_component(self, component)
+        _WrenchOutside_low(self, low)
+        _WrenchOutside_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         self.frame._write(out)
@@ -675,16 +790,23 @@ class WrenchOutside:
         high = v[2]
         return cls(frame=frame, component=component, low=low, high=high), pos
 
+
+_WrenchOutside_frame, _WrenchOutside_component, _WrenchOutside_low, _WrenchOutside_high = codec.setters(WrenchOutside)
+
 _SignalIs_0 = Struct(">HB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SignalIs:
     """A boolean signal has a value."""
 
     #: In the IO image
     place: int
     value: bool = False
+
+    def __init__(self, *, place: int, value: bool = False) -> None:
+        _SignalIs_place(self, place)
+        _SignalIs_value(self, value)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SignalIs_0.pack(self.place, self.value))
@@ -697,10 +819,13 @@ class SignalIs:
         value = codec.read_bool(v[1])
         return cls(place=place, value=value), pos
 
+
+_SignalIs_place, _SignalIs_value = codec.setters(SignalIs)
+
 _SignalOutside_0 = Struct(">Hdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SignalOutside:
     """A number signal is outside a band."""
 
@@ -708,6 +833,11 @@ class SignalOutside:
     place: int
     low: float
     high: float
+
+    def __init__(self, *, place: int, low: float, high: float) -> None:
+        _SignalOutside_place(self, place)
+        _SignalOutside_low(self, low)
+        _SignalOutside_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SignalOutside_0.pack(self.place, self.low, self.high))
@@ -721,10 +851,13 @@ class SignalOutside:
         high = v[2]
         return cls(place=place, low=low, high=high), pos
 
+
+_SignalOutside_place, _SignalOutside_low, _SignalOutside_high = codec.setters(SignalOutside)
+
 _PathReached_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class PathReached:
     """A point of the path is passed."""
 
@@ -733,6 +866,11 @@ class PathReached:
     distance: float
     #: After the point; negative: before it [s]
     delay: float
+
+    def __init__(self, *, reference: PathReference = PathReference.START, distance: float, delay: float) -> None:
+        _PathReached_reference(self, reference)
+        _PathReached_distance(self, distance)
+        _PathReached_delay(self, delay)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PathReached_0.pack(self.reference, self.distance, self.delay))
@@ -747,11 +885,17 @@ class PathReached:
         return cls(reference=reference, distance=distance, delay=delay), pos
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+_PathReached_reference, _PathReached_distance, _PathReached_delay = codec.setters(PathReached)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AllOf:
     """All conditions hold."""
 
     parts: tuple[Condition, ...] = ()
+
+    def __init__(self, *, parts: tuple[Condition, ...] = ()) -> None:
+        _AllOf_parts(self, parts)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.parts)))
@@ -769,11 +913,17 @@ class AllOf:
         return cls(parts=parts), pos
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+(_AllOf_parts,) = codec.setters(AllOf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AnyOf:
     """At least one condition holds."""
 
     parts: tuple[Condition, ...] = ()
+
+    def __init__(self, *, parts: tuple[Condition, ...] = ()) -> None:
+        _AnyOf_parts(self, parts)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.parts)))
@@ -791,11 +941,17 @@ class AnyOf:
         return cls(parts=parts), pos
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+(_AnyOf_parts,) = codec.setters(AnyOf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Inverted:
     """A condition does not hold."""
 
     part: Condition
+
+    def __init__(self, *, part: Condition) -> None:
+        _Inverted_part(self, part)
 
     def _write(self, out: list[bytes]) -> None:
         _write_Condition(self.part, out)
@@ -805,10 +961,13 @@ class Inverted:
         part, pos = _read_Condition(data, pos)
         return cls(part=part), pos
 
+
+(_Inverted_part,) = codec.setters(Inverted)
+
 _Redundancy_0 = Struct(">dii")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Redundancy:
     """Which arm posture reaches a pose."""
 
@@ -818,6 +977,11 @@ class Redundancy:
     status: int = -1
     #: -1: keep
     turn: int = -1
+
+    def __init__(self, *, e1: float = nan, status: int = -1, turn: int = -1) -> None:
+        _Redundancy_e1(self, e1)
+        _Redundancy_status(self, status)
+        _Redundancy_turn(self, turn)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Redundancy_0.pack(self.e1, self.status, self.turn))
@@ -831,16 +995,24 @@ class Redundancy:
         turn = v[2]
         return cls(e1=e1, status=status, turn=turn), pos
 
+
+_Redundancy_e1, _Redundancy_status, _Redundancy_turn = codec.setters(Redundancy)
+
 _JointDynamics_0 = Struct(">7d7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointDynamics:
     """Fractions of each axis' maximum; NaN: not given."""
 
     velocity: tuple[float, ...] = (nan,) * 7
     acceleration: tuple[float, ...] = (nan,) * 7
     jerk: tuple[float, ...] = (nan,) * 7
+
+    def __init__(self, *, velocity: tuple[float, ...] = (nan,) * 7, acceleration: tuple[float, ...] = (nan,) * 7, jerk: tuple[float, ...] = (nan,) * 7) -> None:
+        _JointDynamics_velocity(self, velocity)
+        _JointDynamics_acceleration(self, acceleration)
+        _JointDynamics_jerk(self, jerk)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointDynamics_0.pack(*self.velocity, *self.acceleration, *self.jerk))
@@ -854,10 +1026,13 @@ class JointDynamics:
         jerk = v[14:21]
         return cls(velocity=velocity, acceleration=acceleration, jerk=jerk), pos
 
+
+_JointDynamics_velocity, _JointDynamics_acceleration, _JointDynamics_jerk = codec.setters(JointDynamics)
+
 _CartesianDynamics_0 = Struct(">dddddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CartesianDynamics:
     """Largest values on a Cartesian path; NaN: not given."""
 
@@ -874,6 +1049,14 @@ class CartesianDynamics:
     #: [rad/s³]
     orientation_jerk: float = nan
 
+    def __init__(self, *, velocity: float = nan, acceleration: float = nan, jerk: float = nan, orientation_velocity: float = nan, orientation_acceleration: float = nan, orientation_jerk: float = nan) -> None:
+        _CartesianDynamics_velocity(self, velocity)
+        _CartesianDynamics_acceleration(self, acceleration)
+        _CartesianDynamics_jerk(self, jerk)
+        _CartesianDynamics_orientation_velocity(self, orientation_velocity)
+        _CartesianDynamics_orientation_acceleration(self, orientation_acceleration)
+        _CartesianDynamics_orientation_jerk(self, orientation_jerk)
+
     def _write(self, out: list[bytes]) -> None:
         out.append(_CartesianDynamics_0.pack(self.velocity, self.acceleration, self.jerk, self.orientation_velocity, self.orientation_acceleration, self.orientation_jerk))
 
@@ -889,10 +1072,13 @@ class CartesianDynamics:
         orientation_jerk = v[5]
         return cls(velocity=velocity, acceleration=acceleration, jerk=jerk, orientation_velocity=orientation_velocity, orientation_acceleration=orientation_acceleration, orientation_jerk=orientation_jerk), pos
 
+
+_CartesianDynamics_velocity, _CartesianDynamics_acceleration, _CartesianDynamics_jerk, _CartesianDynamics_orientation_velocity, _CartesianDynamics_orientation_acceleration, _CartesianDynamics_orientation_jerk = codec.setters(CartesianDynamics)
+
 _Blending_0 = Struct(">ddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Blending:
     """Where a motion may blend into its successor; NaN: not given."""
 
@@ -902,6 +1088,11 @@ class Blending:
     distance: float = nan
     #: To the final orientation [rad]
     angle: float = nan
+
+    def __init__(self, *, relative: float = nan, distance: float = nan, angle: float = nan) -> None:
+        _Blending_relative(self, relative)
+        _Blending_distance(self, distance)
+        _Blending_angle(self, angle)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Blending_0.pack(self.relative, self.distance, self.angle))
@@ -915,10 +1106,13 @@ class Blending:
         angle = v[2]
         return cls(relative=relative, distance=distance, angle=angle), pos
 
+
+_Blending_relative, _Blending_distance, _Blending_angle = codec.setters(Blending)
+
 _ServoTiming_0 = Struct(">ddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoTiming:
     """Timing of a servo motion."""
 
@@ -928,6 +1122,11 @@ class ServoTiming:
     goal_timeout: float = 300.0
     #: of the smart engine: how long a target's velocity is kept after the target was passed [s]
     speed_timeout: float = 0.1
+
+    def __init__(self, *, min_trajectory_time: float = 0.02, goal_timeout: float = 300.0, speed_timeout: float = 0.1) -> None:
+        _ServoTiming_min_trajectory_time(self, min_trajectory_time)
+        _ServoTiming_goal_timeout(self, goal_timeout)
+        _ServoTiming_speed_timeout(self, speed_timeout)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
@@ -941,10 +1140,13 @@ class ServoTiming:
         speed_timeout = v[2]
         return cls(min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
 
+
+_ServoTiming_min_trajectory_time, _ServoTiming_goal_timeout, _ServoTiming_speed_timeout = codec.setters(ServoTiming)
+
 _StraightLimits_0 = Struct(">6d6d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class StraightLimits:
     """Limits of a straight servo motion; NaN: the default."""
 
@@ -952,6 +1154,10 @@ class StraightLimits:
     velocity: tuple[float, ...] = (nan,) * 6
     #: [m/s², rad/s²]
     acceleration: tuple[float, ...] = (nan,) * 6
+
+    def __init__(self, *, velocity: tuple[float, ...] = (nan,) * 6, acceleration: tuple[float, ...] = (nan,) * 6) -> None:
+        _StraightLimits_velocity(self, velocity)
+        _StraightLimits_acceleration(self, acceleration)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_StraightLimits_0.pack(*self.velocity, *self.acceleration))
@@ -964,10 +1170,13 @@ class StraightLimits:
         acceleration = v[6:12]
         return cls(velocity=velocity, acceleration=acceleration), pos
 
+
+_StraightLimits_velocity, _StraightLimits_acceleration = codec.setters(StraightLimits)
+
 _HandGuiding_0 = Struct(">7d7dddBB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class HandGuiding:
     """Limits of hand guiding."""
 
@@ -981,6 +1190,14 @@ class HandGuiding:
     cartesian_velocity: float = nan
     at_limit: AtLimit = AtLimit.AXIS
     outside: OutsideLimit = OutsideLimit.FREE
+
+    def __init__(self, *, q_min: tuple[float, ...] = (nan,) * 7, q_max: tuple[float, ...] = (nan,) * 7, joint_velocity: float = nan, cartesian_velocity: float = nan, at_limit: AtLimit = AtLimit.AXIS, outside: OutsideLimit = OutsideLimit.FREE) -> None:
+        _HandGuiding_q_min(self, q_min)
+        _HandGuiding_q_max(self, q_max)
+        _HandGuiding_joint_velocity(self, joint_velocity)
+        _HandGuiding_cartesian_velocity(self, cartesian_velocity)
+        _HandGuiding_at_limit(self, at_limit)
+        _HandGuiding_outside(self, outside)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_HandGuiding_0.pack(*self.q_min, *self.q_max, self.joint_velocity, self.cartesian_velocity, self.at_limit, self.outside))
@@ -997,10 +1214,13 @@ class HandGuiding:
         outside = codec.read_enum(OutsideLimit, v[17])
         return cls(q_min=q_min, q_max=q_max, joint_velocity=joint_velocity, cartesian_velocity=cartesian_velocity, at_limit=at_limit, outside=outside), pos
 
+
+_HandGuiding_q_min, _HandGuiding_q_max, _HandGuiding_joint_velocity, _HandGuiding_cartesian_velocity, _HandGuiding_at_limit, _HandGuiding_outside = codec.setters(HandGuiding)
+
 _FriOverlay_0 = Struct(">qB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FriOverlay:
     """The FRI session whose client overlays the motion."""
 
@@ -1008,6 +1228,10 @@ class FriOverlay:
     session: int
     #: Command mode as FRI numbers it
     command: int
+
+    def __init__(self, *, session: int, command: int) -> None:
+        _FriOverlay_session(self, session)
+        _FriOverlay_command(self, command)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_FriOverlay_0.pack(self.session, self.command))
@@ -1019,6 +1243,9 @@ class FriOverlay:
         session = v[0]
         command = v[1]
         return cls(session=session, command=command), pos
+
+
+_FriOverlay_session, _FriOverlay_command = codec.setters(FriOverlay)
 
 _MotionOrder_0 = Struct(">qB")
 _MotionOrder_1 = Struct(">7d")
@@ -1032,7 +1259,7 @@ _MotionOrder_8 = Struct(">4d")
 _MotionOrder_9 = Struct(">d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class MotionOrder:
     """One motion with all its parameters."""
 
@@ -1073,6 +1300,31 @@ class MotionOrder:
     triggers: tuple[Condition, ...] = ()
     #: Motions of a batch, segments of a spline
     parts: tuple[MotionOrder, ...] = ()
+
+    def __init__(self, *, id: int, kind: MotionKind = MotionKind.PTP, joints: tuple[float, ...] | None = None, pose: tuple[float, ...] | None = None, via: tuple[float, ...] | None = None, redundancy: Redundancy = Redundancy(), orientation_type: OrientationType | None = None, orientation_reference: OrientationReference | None = None, blending: Blending = Blending(), joint_dynamics: JointDynamics = JointDynamics(), cartesian_dynamics: CartesianDynamics = CartesianDynamics(), tcp: tuple[float, ...], offset: tuple[float, ...] | None = None, reference: tuple[float, ...] | None = None, duration: float = nan, mode: ImpedanceMode | None = None, servo_timing: ServoTiming = ServoTiming(), straight_limits: StraightLimits | None = None, hand_guiding: HandGuiding | None = None, fri_overlay: FriOverlay | None = None, breaks: tuple[Condition, ...] = (), triggers: tuple[Condition, ...] = (), parts: tuple[MotionOrder, ...] = ()) -> None:
+        _MotionOrder_id(self, id)
+        _MotionOrder_kind(self, kind)
+        _MotionOrder_joints(self, joints)
+        _MotionOrder_pose(self, pose)
+        _MotionOrder_via(self, via)
+        _MotionOrder_redundancy(self, redundancy)
+        _MotionOrder_orientation_type(self, orientation_type)
+        _MotionOrder_orientation_reference(self, orientation_reference)
+        _MotionOrder_blending(self, blending)
+        _MotionOrder_joint_dynamics(self, joint_dynamics)
+        _MotionOrder_cartesian_dynamics(self, cartesian_dynamics)
+        _MotionOrder_tcp(self, tcp)
+        _MotionOrder_offset(self, offset)
+        _MotionOrder_reference(self, reference)
+        _MotionOrder_duration(self, duration)
+        _MotionOrder_mode(self, mode)
+        _MotionOrder_servo_timing(self, servo_timing)
+        _MotionOrder_straight_limits(self, straight_limits)
+        _MotionOrder_hand_guiding(self, hand_guiding)
+        _MotionOrder_fri_overlay(self, fri_overlay)
+        _MotionOrder_breaks(self, breaks)
+        _MotionOrder_triggers(self, triggers)
+        _MotionOrder_parts(self, parts)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_MotionOrder_0.pack(self.id, self.kind))
@@ -1242,10 +1494,13 @@ class MotionOrder:
         codec.end(data, pos, "MotionOrder")
         return value
 
+
+_MotionOrder_id, _MotionOrder_kind, _MotionOrder_joints, _MotionOrder_pose, _MotionOrder_via, _MotionOrder_redundancy, _MotionOrder_orientation_type, _MotionOrder_orientation_reference, _MotionOrder_blending, _MotionOrder_joint_dynamics, _MotionOrder_cartesian_dynamics, _MotionOrder_tcp, _MotionOrder_offset, _MotionOrder_reference, _MotionOrder_duration, _MotionOrder_mode, _MotionOrder_servo_timing, _MotionOrder_straight_limits, _MotionOrder_hand_guiding, _MotionOrder_fri_overlay, _MotionOrder_breaks, _MotionOrder_triggers, _MotionOrder_parts = codec.setters(MotionOrder)
+
 _FriSignal_0 = Struct(">BBHdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FriSignal:
     """A signal that an FRI session carries."""
 
@@ -1260,6 +1515,14 @@ class FriSignal:
     low: float
     #: Largest legal value
     high: float
+
+    def __init__(self, *, name: str = "", type: SignalType = SignalType.BOOLEAN, is_output: bool = False, place: int, low: float, high: float) -> None:
+        _FriSignal_name(self, name)
+        _FriSignal_type(self, type)
+        _FriSignal_is_output(self, is_output)
+        _FriSignal_place(self, place)
+        _FriSignal_low(self, low)
+        _FriSignal_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -1277,10 +1540,13 @@ class FriSignal:
         high = v[4]
         return cls(name=name, type=type, is_output=is_output, place=place, low=low, high=high), pos
 
+
+_FriSignal_name, _FriSignal_type, _FriSignal_is_output, _FriSignal_place, _FriSignal_low, _FriSignal_high = codec.setters(FriSignal)
+
 _FriSessionSettings_0 = Struct(">HHHH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FriSessionSettings:
     """Settings with which an FRI session opens."""
 
@@ -1296,6 +1562,15 @@ class FriSessionSettings:
     #: Names of the frames that the client provides
     transformations: tuple[str, ...] = ()
     signals: tuple[FriSignal, ...] = ()
+
+    def __init__(self, *, host: str = "", send_period: int, receive_multiplier: int, remote_port: int, local_port: int, transformations: tuple[str, ...] = (), signals: tuple[FriSignal, ...] = ()) -> None:
+        _FriSessionSettings_host(self, host)
+        _FriSessionSettings_send_period(self, send_period)
+        _FriSessionSettings_receive_multiplier(self, receive_multiplier)
+        _FriSessionSettings_remote_port(self, remote_port)
+        _FriSessionSettings_local_port(self, local_port)
+        _FriSessionSettings_transformations(self, transformations)
+        _FriSessionSettings_signals(self, signals)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.host))
@@ -1342,6 +1617,9 @@ class FriSessionSettings:
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "FriSessionSettings")
         return value
+
+
+_FriSessionSettings_host, _FriSessionSettings_send_period, _FriSessionSettings_receive_multiplier, _FriSessionSettings_remote_port, _FriSessionSettings_local_port, _FriSessionSettings_transformations, _FriSessionSettings_signals = codec.setters(FriSessionSettings)
 
 ImpedanceMode: TypeAlias = JointImpedance | CartesianImpedance | SineImpedance
 _ImpedanceMode_TAGS = {

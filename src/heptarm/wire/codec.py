@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
+from dataclasses import fields
 from math import inf, isnan
 from struct import Struct
 from typing import Any, TypeVar
@@ -123,6 +125,11 @@ def put_count(size: int) -> bytes:
     if size > 65535:
         raise ValueError(f"a list must have at most 65535 entries, got {size}")
     return _U16.pack(size)
+
+
+def setters(kind: type) -> tuple[Callable[[Any, Any], None], ...]:
+    """What writes the slots of a frozen dataclass, in the order of its fields; for its constructor."""
+    return tuple(getattr(kind, one.name).__set__ for one in fields(kind))
 
 
 def end(data: bytes, pos: int, name: str) -> None:

@@ -246,12 +246,16 @@ class SafetyBits(enum.IntFlag):
 _Pose_0 = Struct(">3d4d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Pose:
     """Pose of a frame."""
 
     xyz: tuple[float, ...]
     quat: tuple[float, ...]
+
+    def __init__(self, *, xyz: tuple[float, ...], quat: tuple[float, ...]) -> None:
+        _Pose_xyz(self, xyz)
+        _Pose_quat(self, quat)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Pose_0.pack(*self.xyz, *self.quat))
@@ -270,10 +274,12 @@ class Pose:
         codec.check_norm(self.quat, path + "quat")
 
 
+_Pose_xyz, _Pose_quat = codec.setters(Pose)
+
 _Redundancy_0 = Struct(">dii")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Redundancy:
     """KUKA's redundancy of an LBR pose."""
 
@@ -282,6 +288,11 @@ class Redundancy:
     e1: float = nan
     status: int = -1
     turn: int = -1
+
+    def __init__(self, *, e1: float = nan, status: int = -1, turn: int = -1) -> None:
+        _Redundancy_e1(self, e1)
+        _Redundancy_status(self, status)
+        _Redundancy_turn(self, turn)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Redundancy_0.pack(self.e1, self.status, self.turn))
@@ -301,10 +312,12 @@ class Redundancy:
         codec.check(self.turn, path + "turn", -1.0, 127.0, False, False)
 
 
+_Redundancy_e1, _Redundancy_status, _Redundancy_turn = codec.setters(Redundancy)
+
 _JointDynamics_0 = Struct(">7d7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointDynamics:
     """Fractions of each axis' maximum; NaN keeps the cabinet's default (1)."""
 
@@ -313,6 +326,11 @@ class JointDynamics:
     velocity: tuple[float, ...] = (nan,) * 7
     acceleration: tuple[float, ...] = (nan,) * 7
     jerk: tuple[float, ...] = (nan,) * 7
+
+    def __init__(self, *, velocity: tuple[float, ...] = (nan,) * 7, acceleration: tuple[float, ...] = (nan,) * 7, jerk: tuple[float, ...] = (nan,) * 7) -> None:
+        _JointDynamics_velocity(self, velocity)
+        _JointDynamics_acceleration(self, acceleration)
+        _JointDynamics_jerk(self, jerk)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointDynamics_0.pack(*self.velocity, *self.acceleration, *self.jerk))
@@ -332,10 +350,12 @@ class JointDynamics:
         codec.check_array(self.jerk, path + "jerk", 0.0, 1.0, True, True)
 
 
+_JointDynamics_velocity, _JointDynamics_acceleration, _JointDynamics_jerk = codec.setters(JointDynamics)
+
 _CartesianDynamics_0 = Struct(">dddddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CartesianDynamics:
     """Limits along a Cartesian path; NaN keeps the cabinet's default."""
 
@@ -347,6 +367,14 @@ class CartesianDynamics:
     orientation_velocity: float = nan
     orientation_acceleration: float = nan
     orientation_jerk: float = nan
+
+    def __init__(self, *, velocity: float = nan, acceleration: float = nan, jerk: float = nan, orientation_velocity: float = nan, orientation_acceleration: float = nan, orientation_jerk: float = nan) -> None:
+        _CartesianDynamics_velocity(self, velocity)
+        _CartesianDynamics_acceleration(self, acceleration)
+        _CartesianDynamics_jerk(self, jerk)
+        _CartesianDynamics_orientation_velocity(self, orientation_velocity)
+        _CartesianDynamics_orientation_acceleration(self, orientation_acceleration)
+        _CartesianDynamics_orientation_jerk(self, orientation_jerk)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_CartesianDynamics_0.pack(self.velocity, self.acceleration, self.jerk, self.orientation_velocity, self.orientation_acceleration, self.orientation_jerk))
@@ -372,10 +400,12 @@ class CartesianDynamics:
         codec.check(self.orientation_jerk, path + "orientation_jerk", 0.0, 20000.0, True, True)
 
 
+_CartesianDynamics_velocity, _CartesianDynamics_acceleration, _CartesianDynamics_jerk, _CartesianDynamics_orientation_velocity, _CartesianDynamics_orientation_acceleration, _CartesianDynamics_orientation_jerk = codec.setters(CartesianDynamics)
+
 _Blending_0 = Struct(">ddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Blending:
     """Where the motion may start to blend into the next one; 0: exact stop."""
 
@@ -384,6 +414,11 @@ class Blending:
     relative: float = 0.0
     distance: float = 0.0
     orientation: float = 0.0
+
+    def __init__(self, *, relative: float = 0.0, distance: float = 0.0, orientation: float = 0.0) -> None:
+        _Blending_relative(self, relative)
+        _Blending_distance(self, distance)
+        _Blending_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Blending_0.pack(self.relative, self.distance, self.orientation))
@@ -403,15 +438,21 @@ class Blending:
         codec.check(self.orientation, path + "orientation", 0.0, 6.3, False, False)
 
 
+_Blending_relative, _Blending_distance, _Blending_orientation = codec.setters(Blending)
+
 _Orientation_0 = Struct(">BB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Orientation:
     """How the orientation changes along the path."""
 
     type: OrientationType = OrientationType.VARIABLE
     reference: OrientationReference = OrientationReference.BASE
+
+    def __init__(self, *, type: OrientationType = OrientationType.VARIABLE, reference: OrientationReference = OrientationReference.BASE) -> None:
+        _Orientation_type(self, type)
+        _Orientation_reference(self, reference)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Orientation_0.pack(self.type, self.reference))
@@ -428,16 +469,23 @@ class Orientation:
         pass
 
 
+_Orientation_type, _Orientation_reference = codec.setters(Orientation)
+
 _Ptp_0 = Struct(">7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Ptp:
     """Point to point in joint space, to joint positions."""
 
     q: tuple[float, ...]
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
+
+    def __init__(self, *, q: tuple[float, ...], dynamics: JointDynamics = JointDynamics(), blending: Blending = Blending()) -> None:
+        _Ptp_q(self, q)
+        _Ptp_dynamics(self, dynamics)
+        _Ptp_blending(self, blending)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Ptp_0.pack(*self.q))
@@ -459,14 +507,20 @@ class Ptp:
         self.blending._check(path + "blending.")
 
 
+_Ptp_q, _Ptp_dynamics, _Ptp_blending = codec.setters(Ptp)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class PtpHome:
     """Point to point in joint space, to the home position of the cabinet's project; all zeros without one."""
 
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
+
+    def __init__(self, *, dynamics: JointDynamics = JointDynamics(), blending: Blending = Blending()) -> None:
+        _PtpHome_dynamics(self, dynamics)
+        _PtpHome_blending(self, blending)
 
     def _write(self, out: list[bytes]) -> None:
         self.dynamics._write(out)
@@ -483,9 +537,11 @@ class PtpHome:
         self.blending._check(path + "blending.")
 
 
+_PtpHome_dynamics, _PtpHome_blending = codec.setters(PtpHome)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class PtpPose:
     """Point to point in joint space, to a pose of the motion frame."""
 
@@ -493,6 +549,12 @@ class PtpPose:
     redundancy: Redundancy = Redundancy()
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
+
+    def __init__(self, *, target: Pose, redundancy: Redundancy = Redundancy(), dynamics: JointDynamics = JointDynamics(), blending: Blending = Blending()) -> None:
+        _PtpPose_target(self, target)
+        _PtpPose_redundancy(self, redundancy)
+        _PtpPose_dynamics(self, dynamics)
+        _PtpPose_blending(self, blending)
 
     def _write(self, out: list[bytes]) -> None:
         self.target._write(out)
@@ -515,9 +577,11 @@ class PtpPose:
         self.blending._check(path + "blending.")
 
 
+_PtpPose_target, _PtpPose_redundancy, _PtpPose_dynamics, _PtpPose_blending = codec.setters(PtpPose)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Lin:
     """Straight line of the motion frame."""
 
@@ -527,6 +591,14 @@ class Lin:
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
     orientation: Orientation = Orientation()
+
+    def __init__(self, *, target: Pose, redundancy: Redundancy = Redundancy(), dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), blending: Blending = Blending(), orientation: Orientation = Orientation()) -> None:
+        _Lin_target(self, target)
+        _Lin_redundancy(self, redundancy)
+        _Lin_dynamics(self, dynamics)
+        _Lin_joints(self, joints)
+        _Lin_blending(self, blending)
+        _Lin_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         self.target._write(out)
@@ -555,9 +627,11 @@ class Lin:
         self.orientation._check(path + "orientation.")
 
 
+_Lin_target, _Lin_redundancy, _Lin_dynamics, _Lin_joints, _Lin_blending, _Lin_orientation = codec.setters(Lin)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class LinRel:
     """Straight line relative to the pose of the motion frame at the start."""
 
@@ -567,6 +641,14 @@ class LinRel:
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
     orientation: Orientation = Orientation()
+
+    def __init__(self, *, offset: Pose, reference: str = "", dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), blending: Blending = Blending(), orientation: Orientation = Orientation()) -> None:
+        _LinRel_offset(self, offset)
+        _LinRel_reference(self, reference)
+        _LinRel_dynamics(self, dynamics)
+        _LinRel_joints(self, joints)
+        _LinRel_blending(self, blending)
+        _LinRel_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         self.offset._write(out)
@@ -595,9 +677,11 @@ class LinRel:
         self.orientation._check(path + "orientation.")
 
 
+_LinRel_offset, _LinRel_reference, _LinRel_dynamics, _LinRel_joints, _LinRel_blending, _LinRel_orientation = codec.setters(LinRel)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Circ:
     """Arc of a circle through an auxiliary point."""
 
@@ -608,6 +692,15 @@ class Circ:
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
     orientation: Orientation = Orientation()
+
+    def __init__(self, *, via: Pose, end: Pose, redundancy: Redundancy = Redundancy(), dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), blending: Blending = Blending(), orientation: Orientation = Orientation()) -> None:
+        _Circ_via(self, via)
+        _Circ_end(self, end)
+        _Circ_redundancy(self, redundancy)
+        _Circ_dynamics(self, dynamics)
+        _Circ_joints(self, joints)
+        _Circ_blending(self, blending)
+        _Circ_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         self.via._write(out)
@@ -639,15 +732,22 @@ class Circ:
         self.orientation._check(path + "orientation.")
 
 
+_Circ_via, _Circ_end, _Circ_redundancy, _Circ_dynamics, _Circ_joints, _Circ_blending, _Circ_orientation = codec.setters(Circ)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SplSegment:
     """Spline segment to a pose."""
 
     target: Pose
     dynamics: CartesianDynamics = CartesianDynamics()
     orientation: Orientation = Orientation()
+
+    def __init__(self, *, target: Pose, dynamics: CartesianDynamics = CartesianDynamics(), orientation: Orientation = Orientation()) -> None:
+        _SplSegment_target(self, target)
+        _SplSegment_dynamics(self, dynamics)
+        _SplSegment_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         self.target._write(out)
@@ -667,15 +767,22 @@ class SplSegment:
         self.orientation._check(path + "orientation.")
 
 
+_SplSegment_target, _SplSegment_dynamics, _SplSegment_orientation = codec.setters(SplSegment)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class LinSegment:
     """Straight segment of a spline block."""
 
     target: Pose
     dynamics: CartesianDynamics = CartesianDynamics()
     orientation: Orientation = Orientation()
+
+    def __init__(self, *, target: Pose, dynamics: CartesianDynamics = CartesianDynamics(), orientation: Orientation = Orientation()) -> None:
+        _LinSegment_target(self, target)
+        _LinSegment_dynamics(self, dynamics)
+        _LinSegment_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         self.target._write(out)
@@ -695,9 +802,11 @@ class LinSegment:
         self.orientation._check(path + "orientation.")
 
 
+_LinSegment_target, _LinSegment_dynamics, _LinSegment_orientation = codec.setters(LinSegment)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CircSegment:
     """Arc segment of a spline block."""
 
@@ -705,6 +814,12 @@ class CircSegment:
     end: Pose
     dynamics: CartesianDynamics = CartesianDynamics()
     orientation: Orientation = Orientation()
+
+    def __init__(self, *, via: Pose, end: Pose, dynamics: CartesianDynamics = CartesianDynamics(), orientation: Orientation = Orientation()) -> None:
+        _CircSegment_via(self, via)
+        _CircSegment_end(self, end)
+        _CircSegment_dynamics(self, dynamics)
+        _CircSegment_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
         self.via._write(out)
@@ -726,6 +841,8 @@ class CircSegment:
         self.dynamics._check(path + "dynamics.")
         self.orientation._check(path + "orientation.")
 
+
+_CircSegment_via, _CircSegment_end, _CircSegment_dynamics, _CircSegment_orientation = codec.setters(CircSegment)
 
 SplineSegment: TypeAlias = SplSegment | LinSegment | CircSegment
 _SplineSegment_TAGS = {
@@ -753,13 +870,18 @@ def _read_SplineSegment(data: bytes, pos: int) -> tuple[SplineSegment, int]:
 
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Spline:
     """Cartesian spline block."""
 
     segments: tuple[SplineSegment, ...]
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
+
+    def __init__(self, *, segments: tuple[SplineSegment, ...], dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics()) -> None:
+        _Spline_segments(self, segments)
+        _Spline_dynamics(self, dynamics)
+        _Spline_joints(self, joints)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.segments)))
@@ -788,15 +910,21 @@ class Spline:
         self.joints._check(path + "joints.")
 
 
+_Spline_segments, _Spline_dynamics, _Spline_joints = codec.setters(Spline)
+
 _JointPoint_0 = Struct(">7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointPoint:
     """Point of a joint spline."""
 
     q: tuple[float, ...]
     dynamics: JointDynamics = JointDynamics()
+
+    def __init__(self, *, q: tuple[float, ...], dynamics: JointDynamics = JointDynamics()) -> None:
+        _JointPoint_q(self, q)
+        _JointPoint_dynamics(self, dynamics)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointPoint_0.pack(*self.q))
@@ -815,14 +943,20 @@ class JointPoint:
         self.dynamics._check(path + "dynamics.")
 
 
+_JointPoint_q, _JointPoint_dynamics = codec.setters(JointPoint)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointSpline:
     """Joint spline block."""
 
     points: tuple[JointPoint, ...]
     dynamics: JointDynamics = JointDynamics()
+
+    def __init__(self, *, points: tuple[JointPoint, ...], dynamics: JointDynamics = JointDynamics()) -> None:
+        _JointSpline_points(self, points)
+        _JointSpline_dynamics(self, dynamics)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.points)))
@@ -848,16 +982,21 @@ class JointSpline:
         self.dynamics._check(path + "dynamics.")
 
 
+_JointSpline_points, _JointSpline_dynamics = codec.setters(JointSpline)
+
 _Hold_0 = Struct(">d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Hold:
     """Holds the position (under the item's control mode)."""
 
     RANGES: ClassVar[dict[str, tuple[float, float]]] = {"duration": (0.0, 1000000.0)}
 
     duration: float
+
+    def __init__(self, *, duration: float) -> None:
+        _Hold_duration(self, duration)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Hold_0.pack(self.duration))
@@ -873,10 +1012,12 @@ class Hold:
         codec.check(self.duration, path + "duration", 0.0, 1000000.0, True, True)
 
 
+(_Hold_duration,) = codec.setters(Hold)
+
 _HandGuide_0 = Struct(">7d7dddBB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class HandGuide:
     """Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released."""
 
@@ -888,6 +1029,14 @@ class HandGuide:
     cartesian_velocity: float = nan
     freezes_all: bool = False
     pulls_back: bool = False
+
+    def __init__(self, *, q_min: tuple[float, ...] = (nan,) * 7, q_max: tuple[float, ...] = (nan,) * 7, joint_velocity: float = nan, cartesian_velocity: float = nan, freezes_all: bool = False, pulls_back: bool = False) -> None:
+        _HandGuide_q_min(self, q_min)
+        _HandGuide_q_max(self, q_max)
+        _HandGuide_joint_velocity(self, joint_velocity)
+        _HandGuide_cartesian_velocity(self, cartesian_velocity)
+        _HandGuide_freezes_all(self, freezes_all)
+        _HandGuide_pulls_back(self, pulls_back)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_HandGuide_0.pack(*self.q_min, *self.q_max, self.joint_velocity, self.cartesian_velocity, self.freezes_all, self.pulls_back))
@@ -911,10 +1060,12 @@ class HandGuide:
         codec.check(self.cartesian_velocity, path + "cartesian_velocity", 0.0, 10.0, True, True)
 
 
+_HandGuide_q_min, _HandGuide_q_max, _HandGuide_joint_velocity, _HandGuide_cartesian_velocity, _HandGuide_freezes_all, _HandGuide_pulls_back = codec.setters(HandGuide)
+
 _ServoTiming_0 = Struct(">ddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoTiming:
     """Timing of a servo motion."""
 
@@ -923,6 +1074,11 @@ class ServoTiming:
     min_trajectory_time: float = 0.02
     goal_timeout: float = 300.0
     speed_timeout: float = 0.1
+
+    def __init__(self, *, min_trajectory_time: float = 0.02, goal_timeout: float = 300.0, speed_timeout: float = 0.1) -> None:
+        _ServoTiming_min_trajectory_time(self, min_trajectory_time)
+        _ServoTiming_goal_timeout(self, goal_timeout)
+        _ServoTiming_speed_timeout(self, speed_timeout)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
@@ -942,9 +1098,11 @@ class ServoTiming:
         codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
 
 
+_ServoTiming_min_trajectory_time, _ServoTiming_goal_timeout, _ServoTiming_speed_timeout = codec.setters(ServoTiming)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class PositionMode:
     """Position control."""
 
@@ -959,11 +1117,10 @@ class PositionMode:
     def _check(self, path: str) -> None:
         pass
 
-
 _JointImpedance_0 = Struct(">7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointImpedance:
     """Spring and damper in every joint."""
 
@@ -971,6 +1128,10 @@ class JointImpedance:
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
+
+    def __init__(self, *, stiffness: tuple[float, ...], damping: tuple[float, ...]) -> None:
+        _JointImpedance_stiffness(self, stiffness)
+        _JointImpedance_damping(self, damping)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointImpedance_0.pack(*self.stiffness, *self.damping))
@@ -988,10 +1149,12 @@ class JointImpedance:
         codec.check_array(self.damping, path + "damping", 0.0, 1.0, False, False)
 
 
+_JointImpedance_stiffness, _JointImpedance_damping = codec.setters(JointImpedance)
+
 _CartesianImpedance_0 = Struct(">6d6ddd6d6dB6d6d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CartesianImpedance:
     """Spring and damper at the motion frame; order x y z, then about x y z."""
 
@@ -1007,6 +1170,18 @@ class CartesianImpedance:
     max_velocity: tuple[float, ...] = (nan,) * 6
     max_deviation: tuple[float, ...] = (nan,) * 6
     frame: str = ""
+
+    def __init__(self, *, stiffness: tuple[float, ...], damping: tuple[float, ...], nullspace_stiffness: float, nullspace_damping: float, additional_force: tuple[float, ...], max_force: tuple[float, ...] = (nan,) * 6, max_force_stops: bool = False, max_velocity: tuple[float, ...] = (nan,) * 6, max_deviation: tuple[float, ...] = (nan,) * 6, frame: str = "") -> None:
+        _CartesianImpedance_stiffness(self, stiffness)
+        _CartesianImpedance_damping(self, damping)
+        _CartesianImpedance_nullspace_stiffness(self, nullspace_stiffness)
+        _CartesianImpedance_nullspace_damping(self, nullspace_damping)
+        _CartesianImpedance_additional_force(self, additional_force)
+        _CartesianImpedance_max_force(self, max_force)
+        _CartesianImpedance_max_force_stops(self, max_force_stops)
+        _CartesianImpedance_max_velocity(self, max_velocity)
+        _CartesianImpedance_max_deviation(self, max_deviation)
+        _CartesianImpedance_frame(self, frame)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_CartesianImpedance_0.pack(*self.stiffness, *self.damping, self.nullspace_stiffness, self.nullspace_damping, *self.additional_force, *self.max_force, self.max_force_stops, *self.max_velocity, *self.max_deviation))
@@ -1040,10 +1215,12 @@ class CartesianImpedance:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
 
 
+_CartesianImpedance_stiffness, _CartesianImpedance_damping, _CartesianImpedance_nullspace_stiffness, _CartesianImpedance_nullspace_damping, _CartesianImpedance_additional_force, _CartesianImpedance_max_force, _CartesianImpedance_max_force_stops, _CartesianImpedance_max_velocity, _CartesianImpedance_max_deviation, _CartesianImpedance_frame = codec.setters(CartesianImpedance)
+
 _SineImpedance_0 = Struct(">6d6d6d6d6d6dddddB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SineImpedance:
     """Cartesian impedance with an overlaid force pattern per direction."""
 
@@ -1061,6 +1238,20 @@ class SineImpedance:
     hold_time: float = nan
     fall_time: float = 0.0
     stay_active: bool = False
+
+    def __init__(self, *, base: CartesianImpedance, amplitude: tuple[float, ...], frequency: tuple[float, ...], phase: tuple[float, ...], bias: tuple[float, ...], force_limit: tuple[float, ...] = (nan,) * 6, position_limit: tuple[float, ...] = (nan,) * 6, total_time: float = nan, rise_time: float = 0.0, hold_time: float = nan, fall_time: float = 0.0, stay_active: bool = False) -> None:
+        _SineImpedance_base(self, base)
+        _SineImpedance_amplitude(self, amplitude)
+        _SineImpedance_frequency(self, frequency)
+        _SineImpedance_phase(self, phase)
+        _SineImpedance_bias(self, bias)
+        _SineImpedance_force_limit(self, force_limit)
+        _SineImpedance_position_limit(self, position_limit)
+        _SineImpedance_total_time(self, total_time)
+        _SineImpedance_rise_time(self, rise_time)
+        _SineImpedance_hold_time(self, hold_time)
+        _SineImpedance_fall_time(self, fall_time)
+        _SineImpedance_stay_active(self, stay_active)
 
     def _write(self, out: list[bytes]) -> None:
         self.base._write(out)
@@ -1098,10 +1289,12 @@ class SineImpedance:
         codec.check(self.fall_time, path + "fall_time", 0.0, 1000000.0, False, False)
 
 
+_SineImpedance_base, _SineImpedance_amplitude, _SineImpedance_frequency, _SineImpedance_phase, _SineImpedance_bias, _SineImpedance_force_limit, _SineImpedance_position_limit, _SineImpedance_total_time, _SineImpedance_rise_time, _SineImpedance_hold_time, _SineImpedance_fall_time, _SineImpedance_stay_active = codec.setters(SineImpedance)
+
 _SpiralPattern_0 = Struct(">Bdddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SpiralPattern:
     """Spiral force pattern in a plane."""
 
@@ -1112,6 +1305,13 @@ class SpiralPattern:
     amplitude: float
     stiffness: float
     total_time: float
+
+    def __init__(self, *, plane: Plane, frequency: float, amplitude: float, stiffness: float, total_time: float) -> None:
+        _SpiralPattern_plane(self, plane)
+        _SpiralPattern_frequency(self, frequency)
+        _SpiralPattern_amplitude(self, amplitude)
+        _SpiralPattern_stiffness(self, stiffness)
+        _SpiralPattern_total_time(self, total_time)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SpiralPattern_0.pack(self.plane, self.frequency, self.amplitude, self.stiffness, self.total_time))
@@ -1134,9 +1334,11 @@ class SpiralPattern:
         codec.check(self.total_time, path + "total_time", 0.0, 1000000.0, True, False)
 
 
+_SpiralPattern_plane, _SpiralPattern_frequency, _SpiralPattern_amplitude, _SpiralPattern_stiffness, _SpiralPattern_total_time = codec.setters(SpiralPattern)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class HandGuidingMode:
     """Hand guiding, as a state reports it; no request may ask for it."""
 
@@ -1151,11 +1353,10 @@ class HandGuidingMode:
     def _check(self, path: str) -> None:
         pass
 
-
 _ForceAbove_0 = Struct(">dd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ForceAbove:
     """Magnitude of the external force above a threshold."""
 
@@ -1164,6 +1365,11 @@ class ForceAbove:
     frame: str = ""
     threshold: float
     tolerance: float = nan
+
+    def __init__(self, *, frame: str = "", threshold: float, tolerance: float = nan) -> None:
+        _ForceAbove_frame(self, frame)
+        _ForceAbove_threshold(self, threshold)
+        _ForceAbove_tolerance(self, tolerance)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
@@ -1184,10 +1390,12 @@ class ForceAbove:
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
 
 
+_ForceAbove_frame, _ForceAbove_threshold, _ForceAbove_tolerance = codec.setters(ForceAbove)
+
 _NormalForceAbove_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class NormalForceAbove:
     """Force along an axis above a threshold."""
 
@@ -1197,6 +1405,12 @@ class NormalForceAbove:
     axis: Axis
     threshold: float
     tolerance: float = nan
+
+    def __init__(self, *, frame: str = "", axis: Axis, threshold: float, tolerance: float = nan) -> None:
+        _NormalForceAbove_frame(self, frame)
+        _NormalForceAbove_axis(self, axis)
+        _NormalForceAbove_threshold(self, threshold)
+        _NormalForceAbove_tolerance(self, tolerance)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
@@ -1218,10 +1432,12 @@ class NormalForceAbove:
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
 
 
+_NormalForceAbove_frame, _NormalForceAbove_axis, _NormalForceAbove_threshold, _NormalForceAbove_tolerance = codec.setters(NormalForceAbove)
+
 _ShearForceAbove_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ShearForceAbove:
     """Force across an axis above a threshold."""
 
@@ -1231,6 +1447,12 @@ class ShearForceAbove:
     axis: Axis
     threshold: float
     tolerance: float = nan
+
+    def __init__(self, *, frame: str = "", axis: Axis, threshold: float, tolerance: float = nan) -> None:
+        _ShearForceAbove_frame(self, frame)
+        _ShearForceAbove_axis(self, axis)
+        _ShearForceAbove_threshold(self, threshold)
+        _ShearForceAbove_tolerance(self, tolerance)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
@@ -1252,10 +1474,12 @@ class ShearForceAbove:
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
 
 
+_ShearForceAbove_frame, _ShearForceAbove_axis, _ShearForceAbove_threshold, _ShearForceAbove_tolerance = codec.setters(ShearForceAbove)
+
 _ForceOutside_0 = Struct(">Bddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ForceOutside:
     """Component of the force outside a band."""
 
@@ -1266,6 +1490,13 @@ class ForceOutside:
     low: float
     high: float
     tolerance: float = nan
+
+    def __init__(self, *, frame: str = "", axis: Axis, low: float, high: float, tolerance: float = nan) -> None:
+        _ForceOutside_frame(self, frame)
+        _ForceOutside_axis(self, axis)
+        _ForceOutside_low(self, low)
+        _ForceOutside_high(self, high)
+        _ForceOutside_tolerance(self, tolerance)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
@@ -1289,10 +1520,12 @@ class ForceOutside:
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
 
 
+_ForceOutside_frame, _ForceOutside_axis, _ForceOutside_low, _ForceOutside_high, _ForceOutside_tolerance = codec.setters(ForceOutside)
+
 _TorqueOutside_0 = Struct(">Bddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class TorqueOutside:
     """Component of the Cartesian torque outside a band."""
 
@@ -1303,6 +1536,13 @@ class TorqueOutside:
     low: float
     high: float
     tolerance: float = nan
+
+    def __init__(self, *, frame: str = "", axis: Axis, low: float, high: float, tolerance: float = nan) -> None:
+        _TorqueOutside_frame(self, frame)
+        _TorqueOutside_axis(self, axis)
+        _TorqueOutside_low(self, low)
+        _TorqueOutside_high(self, high)
+        _TorqueOutside_tolerance(self, tolerance)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
@@ -1326,10 +1566,12 @@ class TorqueOutside:
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
 
 
+_TorqueOutside_frame, _TorqueOutside_axis, _TorqueOutside_low, _TorqueOutside_high, _TorqueOutside_tolerance = codec.setters(TorqueOutside)
+
 _JointTorqueOutside_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointTorqueOutside:
     """External torque of a joint outside a band."""
 
@@ -1338,6 +1580,11 @@ class JointTorqueOutside:
     joint: int
     low: float
     high: float
+
+    def __init__(self, *, joint: int, low: float, high: float) -> None:
+        _JointTorqueOutside_joint(self, joint)
+        _JointTorqueOutside_low(self, low)
+        _JointTorqueOutside_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointTorqueOutside_0.pack(self.joint, self.low, self.high))
@@ -1357,15 +1604,21 @@ class JointTorqueOutside:
         codec.check(self.high, path + "high", -500.0, 500.0, False, False)
 
 
+_JointTorqueOutside_joint, _JointTorqueOutside_low, _JointTorqueOutside_high = codec.setters(JointTorqueOutside)
+
 _SignalIs_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SignalIs:
     """A boolean signal has a value."""
 
     signal: str
     value: bool
+
+    def __init__(self, *, signal: str, value: bool) -> None:
+        _SignalIs_signal(self, signal)
+        _SignalIs_value(self, value)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.signal))
@@ -1383,16 +1636,23 @@ class SignalIs:
         codec.check_length(len(self.signal.encode()), path + "signal", 1, 128)
 
 
+_SignalIs_signal, _SignalIs_value = codec.setters(SignalIs)
+
 _SignalOutside_0 = Struct(">dd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SignalOutside:
     """A number signal is outside a band."""
 
     signal: str
     low: float
     high: float
+
+    def __init__(self, *, signal: str, low: float, high: float) -> None:
+        _SignalOutside_signal(self, signal)
+        _SignalOutside_low(self, low)
+        _SignalOutside_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.signal))
@@ -1413,10 +1673,12 @@ class SignalOutside:
         codec.check(self.high, path + "high", -inf, inf, False, False)
 
 
+_SignalOutside_signal, _SignalOutside_low, _SignalOutside_high = codec.setters(SignalOutside)
+
 _PathReached_0 = Struct(">Bdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class PathReached:
     """A point on the path, by distance and by time."""
 
@@ -1425,6 +1687,11 @@ class PathReached:
     reference: PathReference
     distance: float
     delay: float
+
+    def __init__(self, *, reference: PathReference, distance: float, delay: float) -> None:
+        _PathReached_reference(self, reference)
+        _PathReached_distance(self, distance)
+        _PathReached_delay(self, delay)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PathReached_0.pack(self.reference, self.distance, self.delay))
@@ -1443,14 +1710,19 @@ class PathReached:
         codec.check(self.delay, path + "delay", -1000.0, 1000.0, False, False)
 
 
+_PathReached_reference, _PathReached_distance, _PathReached_delay = codec.setters(PathReached)
+
 _AllOf_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AllOf:
     """And of the last n results."""
 
     n: int
+
+    def __init__(self, *, n: int) -> None:
+        _AllOf_n(self, n)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_AllOf_0.pack(self.n))
@@ -1466,14 +1738,19 @@ class AllOf:
         codec.check(self.n, path + "n", 2.0, inf, False, False)
 
 
+(_AllOf_n,) = codec.setters(AllOf)
+
 _AnyOf_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AnyOf:
     """Or of the last n results."""
 
     n: int
+
+    def __init__(self, *, n: int) -> None:
+        _AnyOf_n(self, n)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_AnyOf_0.pack(self.n))
@@ -1489,9 +1766,11 @@ class AnyOf:
         codec.check(self.n, path + "n", 2.0, inf, False, False)
 
 
+(_AnyOf_n,) = codec.setters(AnyOf)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Inverted:
     """Not of the last result."""
 
@@ -1505,7 +1784,6 @@ class Inverted:
 
     def _check(self, path: str) -> None:
         pass
-
 
 ConditionNode: TypeAlias = ForceAbove | NormalForceAbove | ShearForceAbove | ForceOutside | TorqueOutside | JointTorqueOutside | SignalIs | SignalOutside | PathReached | AllOf | AnyOf | Inverted
 _ConditionNode_TAGS = {
@@ -1560,11 +1838,14 @@ def _read_ConditionNode(data: bytes, pos: int) -> tuple[ConditionNode, int]:
 
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Condition:
     """A condition; an empty list never fires."""
 
     nodes: tuple[ConditionNode, ...] = ()
+
+    def __init__(self, *, nodes: tuple[ConditionNode, ...] = ()) -> None:
+        _Condition_nodes(self, nodes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.nodes)))
@@ -1587,9 +1868,11 @@ class Condition:
             its_nodes._check(f"{path}nodes[{index}].")
 
 
+(_Condition_nodes,) = codec.setters(Condition)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Relax:
     """Is compliant for a moment, then holds the position that it has reached."""
 
@@ -1604,11 +1887,10 @@ class Relax:
     def _check(self, path: str) -> None:
         pass
 
-
 _Retreat_0 = Struct(">dd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Retreat:
     """Moves back along the joint positions that it has passed, then holds the position."""
 
@@ -1616,6 +1898,10 @@ class Retreat:
 
     distance: float
     speed: float = 0.1
+
+    def __init__(self, *, distance: float, speed: float = 0.1) -> None:
+        _Retreat_distance(self, distance)
+        _Retreat_speed(self, speed)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Retreat_0.pack(self.distance, self.speed))
@@ -1633,15 +1919,21 @@ class Retreat:
         codec.check(self.speed, path + "speed", 0.0, 1.0, True, False)
 
 
+_Retreat_distance, _Retreat_speed = codec.setters(Retreat)
+
 _SetSignal_0 = Struct(">d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SetSignal:
     """Sets an output."""
 
     signal: str
     value: float
+
+    def __init__(self, *, signal: str, value: float) -> None:
+        _SetSignal_signal(self, signal)
+        _SetSignal_value(self, value)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.signal))
@@ -1660,13 +1952,18 @@ class SetSignal:
         codec.check(self.value, path + "value", -inf, inf, False, False)
 
 
+_SetSignal_signal, _SetSignal_value = codec.setters(SetSignal)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Notify:
     """Sends a trigger event."""
 
     label: str = ""
+
+    def __init__(self, *, label: str = "") -> None:
+        _Notify_label(self, label)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.label))
@@ -1679,6 +1976,8 @@ class Notify:
     def _check(self, path: str) -> None:
         codec.check_length(len(self.label.encode()), path + "label", 0, 128)
 
+
+(_Notify_label,) = codec.setters(Notify)
 
 Action: TypeAlias = SetSignal | Notify
 _Action_TAGS = {
@@ -1703,12 +2002,16 @@ def _read_Action(data: bytes, pos: int) -> tuple[Action, int]:
 
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Trigger:
     """Executes an action when a condition fires; the motion continues."""
 
     condition: Condition = Condition()
     action: Action
+
+    def __init__(self, *, condition: Condition = Condition(), action: Action) -> None:
+        _Trigger_condition(self, condition)
+        _Trigger_action(self, action)
 
     def _write(self, out: list[bytes]) -> None:
         self.condition._write(out)
@@ -1724,6 +2027,8 @@ class Trigger:
         self.condition._check(path + "condition.")
         self.action._check(path + "action.")
 
+
+_Trigger_condition, _Trigger_action = codec.setters(Trigger)
 
 Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold | HandGuide | PtpHome
 _Motion_TAGS = {
@@ -1826,7 +2131,7 @@ def _read_Reaction(data: bytes, pos: int) -> tuple[Reaction, int]:
 
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Item:
     """A motion of a program with its control mode, break condition and reaction to it, and triggers."""
 
@@ -1836,6 +2141,14 @@ class Item:
     until: Condition = Condition()
     triggers: tuple[Trigger, ...] = ()
     reaction: Reaction | None = None
+
+    def __init__(self, *, motion: Motion, frame: str = "", mode: Mode | None = None, until: Condition = Condition(), triggers: tuple[Trigger, ...] = (), reaction: Reaction | None = None) -> None:
+        _Item_motion(self, motion)
+        _Item_frame(self, frame)
+        _Item_mode(self, mode)
+        _Item_until(self, until)
+        _Item_triggers(self, triggers)
+        _Item_reaction(self, reaction)
 
     def _write(self, out: list[bytes]) -> None:
         _write_Motion(self.motion, out)
@@ -1889,10 +2202,12 @@ class Item:
             self.reaction._check(path + "reaction.")
 
 
+_Item_motion, _Item_frame, _Item_mode, _Item_until, _Item_triggers, _Item_reaction = codec.setters(Item)
+
 _RobotInfo_0 = Struct(">7d7d7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class RobotInfo:
     """The robot and its limits."""
 
@@ -1902,6 +2217,14 @@ class RobotInfo:
     q_max: tuple[float, ...]
     dq_max: tuple[float, ...]
     tau_max: tuple[float, ...]
+
+    def __init__(self, *, model: str = "", title: str = "", q_min: tuple[float, ...], q_max: tuple[float, ...], dq_max: tuple[float, ...], tau_max: tuple[float, ...]) -> None:
+        _RobotInfo_model(self, model)
+        _RobotInfo_title(self, title)
+        _RobotInfo_q_min(self, q_min)
+        _RobotInfo_q_max(self, q_max)
+        _RobotInfo_dq_max(self, dq_max)
+        _RobotInfo_tau_max(self, tau_max)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.model))
@@ -1927,14 +2250,20 @@ class RobotInfo:
         codec.check_array(self.tau_max, path + "tau_max", -inf, inf, False, False)
 
 
+_RobotInfo_model, _RobotInfo_title, _RobotInfo_q_min, _RobotInfo_q_max, _RobotInfo_dq_max, _RobotInfo_tau_max = codec.setters(RobotInfo)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FrameInfo:
     """A named frame."""
 
     name: str
     pose: Pose
+
+    def __init__(self, *, name: str, pose: Pose) -> None:
+        _FrameInfo_name(self, name)
+        _FrameInfo_pose(self, pose)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -1951,10 +2280,12 @@ class FrameInfo:
         self.pose._check(path + "pose.")
 
 
+_FrameInfo_name, _FrameInfo_pose = codec.setters(FrameInfo)
+
 _Shape_0 = Struct(">B3d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Shape:
     """A solid shape of a tool or a workpiece."""
 
@@ -1963,6 +2294,11 @@ class Shape:
     kind: ShapeKind
     size: tuple[float, ...]
     pose: Pose
+
+    def __init__(self, *, kind: ShapeKind, size: tuple[float, ...], pose: Pose) -> None:
+        _Shape_kind(self, kind)
+        _Shape_size(self, size)
+        _Shape_pose(self, pose)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Shape_0.pack(self.kind, *self.size))
@@ -1982,10 +2318,12 @@ class Shape:
         self.pose._check(path + "pose.")
 
 
+_Shape_kind, _Shape_size, _Shape_pose = codec.setters(Shape)
+
 _ToolInfo_0 = Struct(">d3d6d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ToolInfo:
     """A tool or a workpiece."""
 
@@ -1997,6 +2335,14 @@ class ToolInfo:
     inertia: tuple[float, ...]
     frames: tuple[FrameInfo, ...] = ()
     shapes: tuple[Shape, ...] = ()
+
+    def __init__(self, *, name: str, mass: float, com: tuple[float, ...], inertia: tuple[float, ...], frames: tuple[FrameInfo, ...] = (), shapes: tuple[Shape, ...] = ()) -> None:
+        _ToolInfo_name(self, name)
+        _ToolInfo_mass(self, mass)
+        _ToolInfo_com(self, com)
+        _ToolInfo_inertia(self, inertia)
+        _ToolInfo_frames(self, frames)
+        _ToolInfo_shapes(self, shapes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -2043,10 +2389,12 @@ class ToolInfo:
             its_shapes._check(f"{path}shapes[{index}].")
 
 
+_ToolInfo_name, _ToolInfo_mass, _ToolInfo_com, _ToolInfo_inertia, _ToolInfo_frames, _ToolInfo_shapes = codec.setters(ToolInfo)
+
 _SignalInfo_0 = Struct(">BBdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SignalInfo:
     """A signal of an IO group."""
 
@@ -2055,6 +2403,13 @@ class SignalInfo:
     type: IoType
     low: float
     high: float
+
+    def __init__(self, *, name: str, direction: IoDirection, type: IoType, low: float, high: float) -> None:
+        _SignalInfo_name(self, name)
+        _SignalInfo_direction(self, direction)
+        _SignalInfo_type(self, type)
+        _SignalInfo_low(self, low)
+        _SignalInfo_high(self, high)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -2077,10 +2432,12 @@ class SignalInfo:
         codec.check(self.high, path + "high", -inf, inf, False, False)
 
 
+_SignalInfo_name, _SignalInfo_direction, _SignalInfo_type, _SignalInfo_low, _SignalInfo_high = codec.setters(SignalInfo)
+
 _JointState_0 = Struct(">q7d7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointState:
     """Joint positions."""
 
@@ -2088,6 +2445,12 @@ class JointState:
     q: tuple[float, ...]
     q_cmd: tuple[float, ...]
     dq: tuple[float, ...]
+
+    def __init__(self, *, stamp: int, q: tuple[float, ...], q_cmd: tuple[float, ...], dq: tuple[float, ...]) -> None:
+        _JointState_stamp(self, stamp)
+        _JointState_q(self, q)
+        _JointState_q_cmd(self, q_cmd)
+        _JointState_dq(self, dq)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_JointState_0.pack(self.stamp, *self.q, *self.q_cmd, *self.dq))
@@ -2108,10 +2471,12 @@ class JointState:
         codec.check_array(self.dq, path + "dq", -inf, inf, False, True)
 
 
+_JointState_stamp, _JointState_q, _JointState_q_cmd, _JointState_dq = codec.setters(JointState)
+
 _TorqueState_0 = Struct(">q7d7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class TorqueState:
     """Joint torques."""
 
@@ -2119,6 +2484,12 @@ class TorqueState:
     tau: tuple[float, ...]
     tau_ext: tuple[float, ...]
     tau_cmd: tuple[float, ...]
+
+    def __init__(self, *, stamp: int, tau: tuple[float, ...], tau_ext: tuple[float, ...], tau_cmd: tuple[float, ...]) -> None:
+        _TorqueState_stamp(self, stamp)
+        _TorqueState_tau(self, tau)
+        _TorqueState_tau_ext(self, tau_ext)
+        _TorqueState_tau_cmd(self, tau_cmd)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_TorqueState_0.pack(self.stamp, *self.tau, *self.tau_ext, *self.tau_cmd))
@@ -2139,10 +2510,12 @@ class TorqueState:
         codec.check_array(self.tau_cmd, path + "tau_cmd", -inf, inf, False, True)
 
 
+_TorqueState_stamp, _TorqueState_tau, _TorqueState_tau_ext, _TorqueState_tau_cmd = codec.setters(TorqueState)
+
 _PoseState_0 = Struct(">q3d4d3d4d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class PoseState:
     """Pose of the motion frame in the base frame."""
 
@@ -2152,6 +2525,14 @@ class PoseState:
     xyz_cmd: tuple[float, ...]
     quat_cmd: tuple[float, ...]
     redundancy: Redundancy = Redundancy()
+
+    def __init__(self, *, stamp: int, xyz: tuple[float, ...], quat: tuple[float, ...], xyz_cmd: tuple[float, ...], quat_cmd: tuple[float, ...], redundancy: Redundancy = Redundancy()) -> None:
+        _PoseState_stamp(self, stamp)
+        _PoseState_xyz(self, xyz)
+        _PoseState_quat(self, quat)
+        _PoseState_xyz_cmd(self, xyz_cmd)
+        _PoseState_quat_cmd(self, quat_cmd)
+        _PoseState_redundancy(self, redundancy)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PoseState_0.pack(self.stamp, *self.xyz, *self.quat, *self.xyz_cmd, *self.quat_cmd))
@@ -2179,10 +2560,12 @@ class PoseState:
         self.redundancy._check(path + "redundancy.")
 
 
+_PoseState_stamp, _PoseState_xyz, _PoseState_quat, _PoseState_xyz_cmd, _PoseState_quat_cmd, _PoseState_redundancy = codec.setters(PoseState)
+
 _WrenchState_0 = Struct(">q3d3d3d3d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class WrenchState:
     """External force and torque acting on the robot at the motion frame, in base axes."""
 
@@ -2191,6 +2574,13 @@ class WrenchState:
     torque: tuple[float, ...]
     force_inaccuracy: tuple[float, ...]
     torque_inaccuracy: tuple[float, ...]
+
+    def __init__(self, *, stamp: int, force: tuple[float, ...], torque: tuple[float, ...], force_inaccuracy: tuple[float, ...], torque_inaccuracy: tuple[float, ...]) -> None:
+        _WrenchState_stamp(self, stamp)
+        _WrenchState_force(self, force)
+        _WrenchState_torque(self, torque)
+        _WrenchState_force_inaccuracy(self, force_inaccuracy)
+        _WrenchState_torque_inaccuracy(self, torque_inaccuracy)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_WrenchState_0.pack(self.stamp, *self.force, *self.torque, *self.force_inaccuracy, *self.torque_inaccuracy))
@@ -2213,10 +2603,12 @@ class WrenchState:
         codec.check_array(self.torque_inaccuracy, path + "torque_inaccuracy", -inf, inf, False, True)
 
 
+_WrenchState_stamp, _WrenchState_force, _WrenchState_torque, _WrenchState_force_inaccuracy, _WrenchState_torque_inaccuracy = codec.setters(WrenchState)
+
 _MotionState_0 = Struct(">qIHHddd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class MotionState:
     """Running motion."""
 
@@ -2229,6 +2621,15 @@ class MotionState:
     progress: float
     remaining: float
     override: float
+
+    def __init__(self, *, stamp: int, motion: int, item: int, queued: int, progress: float, remaining: float, override: float) -> None:
+        _MotionState_stamp(self, stamp)
+        _MotionState_motion(self, motion)
+        _MotionState_item(self, item)
+        _MotionState_queued(self, queued)
+        _MotionState_progress(self, progress)
+        _MotionState_remaining(self, remaining)
+        _MotionState_override(self, override)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_MotionState_0.pack(self.stamp, self.motion, self.item, self.queued, self.progress, self.remaining, self.override))
@@ -2252,16 +2653,23 @@ class MotionState:
         codec.check(self.override, path + "override", 0.0, 1.0, False, False)
 
 
+_MotionState_stamp, _MotionState_motion, _MotionState_item, _MotionState_queued, _MotionState_progress, _MotionState_remaining, _MotionState_override = codec.setters(MotionState)
+
 _SafetyState_0 = Struct(">qHB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SafetyState:
     """Readiness and safety."""
 
     stamp: int
     bits: SafetyBits
     mode: OperationMode
+
+    def __init__(self, *, stamp: int, bits: SafetyBits, mode: OperationMode) -> None:
+        _SafetyState_stamp(self, stamp)
+        _SafetyState_bits(self, bits)
+        _SafetyState_mode(self, mode)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SafetyState_0.pack(self.stamp, self.bits, self.mode))
@@ -2279,15 +2687,21 @@ class SafetyState:
         pass
 
 
+_SafetyState_stamp, _SafetyState_bits, _SafetyState_mode = codec.setters(SafetyState)
+
 _SignalValue_0 = Struct(">Hd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SignalValue:
     """Value of a signal."""
 
     index: int
     value: float
+
+    def __init__(self, *, index: int, value: float) -> None:
+        _SignalValue_index(self, index)
+        _SignalValue_value(self, value)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SignalValue_0.pack(self.index, self.value))
@@ -2304,15 +2718,21 @@ class SignalValue:
         codec.check(self.value, path + "value", -inf, inf, False, False)
 
 
+_SignalValue_index, _SignalValue_value = codec.setters(SignalValue)
+
 _IoState_0 = Struct(">q")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class IoState:
     """Signals."""
 
     stamp: int
     values: tuple[SignalValue, ...] = ()
+
+    def __init__(self, *, stamp: int, values: tuple[SignalValue, ...] = ()) -> None:
+        _IoState_stamp(self, stamp)
+        _IoState_values(self, values)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_IoState_0.pack(self.stamp))
@@ -2338,10 +2758,12 @@ class IoState:
             its_values._check(f"{path}values[{index}].")
 
 
+_IoState_stamp, _IoState_values = codec.setters(IoState)
+
 _ModeState_0 = Struct(">q")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ModeState:
     """Control mode and tool in force."""
 
@@ -2351,6 +2773,14 @@ class ModeState:
     workpiece: str = ""
     frame: str = ""
     safety_workpiece: str = ""
+
+    def __init__(self, *, stamp: int, mode: Mode, tool: str = "", workpiece: str = "", frame: str = "", safety_workpiece: str = "") -> None:
+        _ModeState_stamp(self, stamp)
+        _ModeState_mode(self, mode)
+        _ModeState_tool(self, tool)
+        _ModeState_workpiece(self, workpiece)
+        _ModeState_frame(self, frame)
+        _ModeState_safety_workpiece(self, safety_workpiece)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ModeState_0.pack(self.stamp))
@@ -2376,10 +2806,12 @@ class ModeState:
         self.mode._check(path + "mode.")
 
 
+_ModeState_stamp, _ModeState_mode, _ModeState_tool, _ModeState_workpiece, _ModeState_frame, _ModeState_safety_workpiece = codec.setters(ModeState)
+
 _Hello_0 = Struct(">HH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Hello:
     """First frame of a client."""
 
@@ -2393,6 +2825,13 @@ class Hello:
     name: str = ""
     version: str = ""
     nonce: bytes
+
+    def __init__(self, *, major: int, minor: int, name: str = "", version: str = "", nonce: bytes) -> None:
+        _Hello_major(self, major)
+        _Hello_minor(self, minor)
+        _Hello_name(self, name)
+        _Hello_version(self, version)
+        _Hello_nonce(self, nonce)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Hello_0.pack(self.major, self.minor))
@@ -2434,9 +2873,11 @@ class Hello:
         self._check("")
 
 
+_Hello_major, _Hello_minor, _Hello_name, _Hello_version, _Hello_nonce = codec.setters(Hello)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Challenge:
     """The cabinet has a key: prove that you know it."""
 
@@ -2446,6 +2887,9 @@ class Challenge:
     ROLE: ClassVar[str] = "any"
 
     nonce: bytes
+
+    def __init__(self, *, nonce: bytes) -> None:
+        _Challenge_nonce(self, nonce)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.nonce))
@@ -2476,9 +2920,11 @@ class Challenge:
         self._check("")
 
 
+(_Challenge_nonce,) = codec.setters(Challenge)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Proof:
     """The client proves that it knows the key; see [the key](#the-key)."""
 
@@ -2488,6 +2934,9 @@ class Proof:
     ROLE: ClassVar[str] = "any"
 
     mac: bytes
+
+    def __init__(self, *, mac: bytes) -> None:
+        _Proof_mac(self, mac)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.mac))
@@ -2518,12 +2967,14 @@ class Proof:
         self._check("")
 
 
+(_Proof_mac,) = codec.setters(Proof)
+
 _Welcome_0 = Struct(">HHI")
 _Welcome_1 = Struct(">B")
 _Welcome_2 = Struct(">Hdd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Welcome:
     """The session is open. With a key set, its mac proves the cabinet to the client; see [the key](#the-key)."""
 
@@ -2548,6 +2999,24 @@ class Welcome:
     heartbeat: float
     controller: str = ""
     mac: bytes = b""
+
+    def __init__(self, *, major: int, minor: int, session: int, software: str = "", cabinet: str = "", virtual: bool, robot: RobotInfo, capabilities: tuple[str, ...] = (), tools: tuple[ToolInfo, ...] = (), frames: tuple[FrameInfo, ...] = (), signals: tuple[SignalInfo, ...] = (), groups: Groups, max_rate: float, heartbeat: float, controller: str = "", mac: bytes = b"") -> None:
+        _Welcome_major(self, major)
+        _Welcome_minor(self, minor)
+        _Welcome_session(self, session)
+        _Welcome_software(self, software)
+        _Welcome_cabinet(self, cabinet)
+        _Welcome_virtual(self, virtual)
+        _Welcome_robot(self, robot)
+        _Welcome_capabilities(self, capabilities)
+        _Welcome_tools(self, tools)
+        _Welcome_frames(self, frames)
+        _Welcome_signals(self, signals)
+        _Welcome_groups(self, groups)
+        _Welcome_max_rate(self, max_rate)
+        _Welcome_heartbeat(self, heartbeat)
+        _Welcome_controller(self, controller)
+        _Welcome_mac(self, mac)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Welcome_0.pack(self.major, self.minor, self.session))
@@ -2647,11 +3116,13 @@ class Welcome:
         self._check("")
 
 
+_Welcome_major, _Welcome_minor, _Welcome_session, _Welcome_software, _Welcome_cabinet, _Welcome_virtual, _Welcome_robot, _Welcome_capabilities, _Welcome_tools, _Welcome_frames, _Welcome_signals, _Welcome_groups, _Welcome_max_rate, _Welcome_heartbeat, _Welcome_controller, _Welcome_mac = codec.setters(Welcome)
+
 _Refusal_0 = Struct(">H")
 _Refusal_1 = Struct(">HH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Refusal:
     """No session; the connection closes."""
 
@@ -2664,6 +3135,12 @@ class Refusal:
     text: str = ""
     major: int
     minor: int
+
+    def __init__(self, *, code: int, text: str = "", major: int, minor: int) -> None:
+        _Refusal_code(self, code)
+        _Refusal_text(self, text)
+        _Refusal_major(self, major)
+        _Refusal_minor(self, minor)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Refusal_0.pack(self.code))
@@ -2703,10 +3180,12 @@ class Refusal:
         self._check("")
 
 
+_Refusal_code, _Refusal_text, _Refusal_major, _Refusal_minor = codec.setters(Refusal)
+
 _Ping_0 = Struct(">q")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Ping:
     """Heartbeat and clock probe."""
 
@@ -2716,6 +3195,9 @@ class Ping:
     ROLE: ClassVar[str] = "any"
 
     sent: int
+
+    def __init__(self, *, sent: int) -> None:
+        _Ping_sent(self, sent)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2738,10 +3220,12 @@ class Ping:
         self._check("")
 
 
+(_Ping_sent,) = codec.setters(Ping)
+
 _Pong_0 = Struct(">qq")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Pong:
     """Answer to a Ping, at once."""
 
@@ -2752,6 +3236,10 @@ class Pong:
 
     sent: int
     received: int
+
+    def __init__(self, *, sent: int, received: int) -> None:
+        _Pong_sent(self, sent)
+        _Pong_received(self, received)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2775,10 +3263,12 @@ class Pong:
         self._check("")
 
 
+_Pong_sent, _Pong_received = codec.setters(Pong)
+
 _Goodbye_0 = Struct(">H")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Goodbye:
     """The session ends, and why."""
 
@@ -2789,6 +3279,10 @@ class Goodbye:
 
     code: int
     text: str = ""
+
+    def __init__(self, *, code: int, text: str = "") -> None:
+        _Goodbye_code(self, code)
+        _Goodbye_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Goodbye_0.pack(self.code))
@@ -2823,10 +3317,12 @@ class Goodbye:
         self._check("")
 
 
+_Goodbye_code, _Goodbye_text = codec.setters(Goodbye)
+
 _Halt_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Halt:
     """Stops all motions, as the first and only frame of a connection: it needs no session, no place among the clients and no key."""
 
@@ -2836,6 +3332,9 @@ class Halt:
     ROLE: ClassVar[str] = "any"
 
     kind: StopKind = StopKind.PATH
+
+    def __init__(self, *, kind: StopKind = StopKind.PATH) -> None:
+        _Halt_kind(self, kind)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2858,9 +3357,11 @@ class Halt:
         self._check("")
 
 
+(_Halt_kind,) = codec.setters(Halt)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Halted:
     """The stop was commanded; the connection closes."""
 
@@ -2897,11 +3398,10 @@ class Halted:
         """Raise Violation for a field outside its range."""
         self._check("")
 
-
 _Accepted_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Accepted:
     """The request is accepted."""
 
@@ -2911,6 +3411,9 @@ class Accepted:
     ROLE: ClassVar[str] = "any"
 
     id: int
+
+    def __init__(self, *, id: int) -> None:
+        _Accepted_id(self, id)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2933,10 +3436,12 @@ class Accepted:
         self._check("")
 
 
+(_Accepted_id,) = codec.setters(Accepted)
+
 _Rejected_0 = Struct(">H")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Rejected:
     """The request is refused; nothing has changed."""
 
@@ -2950,6 +3455,13 @@ class Rejected:
     value: str = ""
     allowed: str = ""
     text: str = ""
+
+    def __init__(self, *, code: int, parameter: str = "", value: str = "", allowed: str = "", text: str = "") -> None:
+        _Rejected_code(self, code)
+        _Rejected_parameter(self, parameter)
+        _Rejected_value(self, value)
+        _Rejected_allowed(self, allowed)
+        _Rejected_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Rejected_0.pack(self.code))
@@ -2990,9 +3502,11 @@ class Rejected:
         self._check("")
 
 
+_Rejected_code, _Rejected_parameter, _Rejected_value, _Rejected_allowed, _Rejected_text = codec.setters(Rejected)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class DatagramToken:
     """Answer to OpenDatagrams."""
 
@@ -3002,6 +3516,9 @@ class DatagramToken:
     ROLE: ClassVar[str] = "any"
 
     token: bytes
+
+    def __init__(self, *, token: bytes) -> None:
+        _DatagramToken_token(self, token)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.token))
@@ -3032,10 +3549,12 @@ class DatagramToken:
         self._check("")
 
 
+(_DatagramToken_token,) = codec.setters(DatagramToken)
+
 _TakeControl_0 = Struct(">dB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class TakeControl:
     """Requests control. A controller that is silent for the watchdog time loses control and the arm stops."""
 
@@ -3047,6 +3566,10 @@ class TakeControl:
 
     watchdog: float = 0.5
     on_lost: OnLost = OnLost.STOP
+
+    def __init__(self, *, watchdog: float = 0.5, on_lost: OnLost = OnLost.STOP) -> None:
+        _TakeControl_watchdog(self, watchdog)
+        _TakeControl_on_lost(self, on_lost)
 
     def encode(self) -> bytes:
         """The body."""
@@ -3070,9 +3593,11 @@ class TakeControl:
         self._check("")
 
 
+_TakeControl_watchdog, _TakeControl_on_lost = codec.setters(TakeControl)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ReleaseControl:
     """Releases control; running motions are stopped."""
 
@@ -3109,11 +3634,10 @@ class ReleaseControl:
         """Raise Violation for a field outside its range."""
         self._check("")
 
-
 _Subscribe_0 = Struct(">Hd")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Subscribe:
     """Subscribes to the pushed state; a new subscription replaces the old; rate 0 ends it."""
 
@@ -3125,6 +3649,10 @@ class Subscribe:
 
     groups: Groups
     rate: float
+
+    def __init__(self, *, groups: Groups, rate: float) -> None:
+        _Subscribe_groups(self, groups)
+        _Subscribe_rate(self, rate)
 
     def encode(self) -> bytes:
         """The body."""
@@ -3148,10 +3676,12 @@ class Subscribe:
         self._check("")
 
 
+_Subscribe_groups, _Subscribe_rate = codec.setters(Subscribe)
+
 _Run_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Run:
     """Runs a program: motions as one batch, blended on the cabinet if they ask for it."""
 
@@ -3162,6 +3692,10 @@ class Run:
 
     items: tuple[Item, ...]
     when: When = When.QUEUE
+
+    def __init__(self, *, items: tuple[Item, ...], when: When = When.QUEUE) -> None:
+        _Run_items(self, items)
+        _Run_when(self, when)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.items)))
@@ -3205,10 +3739,12 @@ class Run:
         self._check("")
 
 
+_Run_items, _Run_when = codec.setters(Run)
+
 _Cancel_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Cancel:
     """Cancels a program; it brakes on the path or leaves the queue."""
 
@@ -3218,6 +3754,9 @@ class Cancel:
     ROLE: ClassVar[str] = "controller"
 
     id: int
+
+    def __init__(self, *, id: int) -> None:
+        _Cancel_id(self, id)
 
     def encode(self) -> bytes:
         """The body."""
@@ -3240,10 +3779,12 @@ class Cancel:
         self._check("")
 
 
+(_Cancel_id,) = codec.setters(Cancel)
+
 _Stop_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Stop:
     """Stops all motions. Every client may stop, at any time."""
 
@@ -3253,6 +3794,9 @@ class Stop:
     ROLE: ClassVar[str] = "any"
 
     kind: StopKind = StopKind.PATH
+
+    def __init__(self, *, kind: StopKind = StopKind.PATH) -> None:
+        _Stop_kind(self, kind)
 
     def encode(self) -> bytes:
         """The body."""
@@ -3275,9 +3819,11 @@ class Stop:
         self._check("")
 
 
+(_Stop_kind,) = codec.setters(Stop)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Pause:
     """Pauses on the path."""
 
@@ -3316,8 +3862,7 @@ class Pause:
 
 
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Resume:
     """Continues after a pause."""
 
@@ -3354,11 +3899,10 @@ class Resume:
         """Raise Violation for a field outside its range."""
         self._check("")
 
-
 _SetOverride_0 = Struct(">d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SetOverride:
     """Application override: a factor on every programmed speed, at once."""
 
@@ -3369,6 +3913,9 @@ class SetOverride:
     RANGES: ClassVar[dict[str, tuple[float, float]]] = {"value": (0.0, 1.0)}
 
     value: float
+
+    def __init__(self, *, value: float) -> None:
+        _SetOverride_value(self, value)
 
     def encode(self) -> bytes:
         """The body."""
@@ -3391,9 +3938,11 @@ class SetOverride:
         self._check("")
 
 
+(_SetOverride_value,) = codec.setters(SetOverride)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class OpenDatagrams:
     """Opens datagrams beside the session, see [datagrams](#datagrams); answered by DatagramToken. A second request replaces the token."""
 
@@ -3432,8 +3981,7 @@ class OpenDatagrams:
 
 
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Recover:
     """Makes the robot ready again as far as software may; otherwise rejected with the steps for the operator."""
 
@@ -3472,8 +4020,7 @@ class Recover:
 
 
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class DefineTool:
     """Defines or redefines a tool; an attached tool stays attached. Refused while any motion runs or is queued."""
 
@@ -3483,6 +4030,9 @@ class DefineTool:
     ROLE: ClassVar[str] = "controller"
 
     tool: ToolInfo
+
+    def __init__(self, *, tool: ToolInfo) -> None:
+        _DefineTool_tool(self, tool)
 
     def _write(self, out: list[bytes]) -> None:
         self.tool._write(out)
@@ -3513,9 +4063,11 @@ class DefineTool:
         self._check("")
 
 
+(_DefineTool_tool,) = codec.setters(DefineTool)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AttachTool:
     """Attaches a tool to the flange instead of the current one; an empty name only detaches. A workpiece is detached with its tool. Refused while any motion runs or is queued."""
 
@@ -3526,6 +4078,10 @@ class AttachTool:
 
     name: str = ""
     frame: str = ""
+
+    def __init__(self, *, name: str = "", frame: str = "") -> None:
+        _AttachTool_name(self, name)
+        _AttachTool_frame(self, frame)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -3559,10 +4115,12 @@ class AttachTool:
         self._check("")
 
 
+_AttachTool_name, _AttachTool_frame = codec.setters(AttachTool)
+
 _AttachLoad_0 = Struct(">BBB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AttachLoad:
     """Attaches a workpiece to the motion frame of the tool, or detaches it. Refused while any motion runs or is queued."""
 
@@ -3575,6 +4133,12 @@ class AttachLoad:
     attached: bool
     template: bool = False
     safety: bool = False
+
+    def __init__(self, *, load: ToolInfo, attached: bool, template: bool = False, safety: bool = False) -> None:
+        _AttachLoad_load(self, load)
+        _AttachLoad_attached(self, attached)
+        _AttachLoad_template(self, template)
+        _AttachLoad_safety(self, safety)
 
     def _write(self, out: list[bytes]) -> None:
         self.load._write(out)
@@ -3611,9 +4175,11 @@ class AttachLoad:
         self._check("")
 
 
+_AttachLoad_load, _AttachLoad_attached, _AttachLoad_template, _AttachLoad_safety = codec.setters(AttachLoad)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SetSignals:
     """Writes outputs, all or none."""
 
@@ -3623,6 +4189,9 @@ class SetSignals:
     ROLE: ClassVar[str] = "controller"
 
     values: tuple[SetSignal, ...]
+
+    def __init__(self, *, values: tuple[SetSignal, ...]) -> None:
+        _SetSignals_values(self, values)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.values)))
@@ -3662,10 +4231,12 @@ class SetSignals:
         self._check("")
 
 
+(_SetSignals_values,) = codec.setters(SetSignals)
+
 _ShowMessage_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ShowMessage:
     """Shows a text on the smartPAD."""
 
@@ -3676,6 +4247,10 @@ class ShowMessage:
 
     severity: Severity
     text: str = ""
+
+    def __init__(self, *, severity: Severity, text: str = "") -> None:
+        _ShowMessage_severity(self, severity)
+        _ShowMessage_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ShowMessage_0.pack(self.severity))
@@ -3710,11 +4285,13 @@ class ShowMessage:
         self._check("")
 
 
+_ShowMessage_severity, _ShowMessage_text = codec.setters(ShowMessage)
+
 _SetKey_0 = Struct(">B")
 _SetKey_1 = Struct(">BB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SetKey:
     """Text and LED of a user key."""
 
@@ -3727,6 +4304,12 @@ class SetKey:
     text: str = ""
     led: KeyLed
     enabled: bool = True
+
+    def __init__(self, *, slot: int, text: str = "", led: KeyLed, enabled: bool = True) -> None:
+        _SetKey_slot(self, slot)
+        _SetKey_text(self, text)
+        _SetKey_led(self, led)
+        _SetKey_enabled(self, enabled)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SetKey_0.pack(self.slot))
@@ -3767,9 +4350,11 @@ class SetKey:
         self._check("")
 
 
+_SetKey_slot, _SetKey_text, _SetKey_led, _SetKey_enabled = codec.setters(SetKey)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class GetProcessData:
     """Reads a process data value; answered by ProcessData."""
 
@@ -3779,6 +4364,9 @@ class GetProcessData:
     ROLE: ClassVar[str] = "any"
 
     name: str
+
+    def __init__(self, *, name: str) -> None:
+        _GetProcessData_name(self, name)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -3809,9 +4397,11 @@ class GetProcessData:
         self._check("")
 
 
+(_GetProcessData_name,) = codec.setters(GetProcessData)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SetProcessData:
     """Writes a process data value."""
 
@@ -3822,6 +4412,10 @@ class SetProcessData:
 
     name: str
     value: str = ""
+
+    def __init__(self, *, name: str, value: str = "") -> None:
+        _SetProcessData_name(self, name)
+        _SetProcessData_value(self, value)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -3855,9 +4449,11 @@ class SetProcessData:
         self._check("")
 
 
+_SetProcessData_name, _SetProcessData_value = codec.setters(SetProcessData)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ProcessData:
     """A process data value."""
 
@@ -3868,6 +4464,10 @@ class ProcessData:
 
     name: str = ""
     value: str = ""
+
+    def __init__(self, *, name: str = "", value: str = "") -> None:
+        _ProcessData_name(self, name)
+        _ProcessData_value(self, value)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.name))
@@ -3900,9 +4500,11 @@ class ProcessData:
         self._check("")
 
 
+_ProcessData_name, _ProcessData_value = codec.setters(ProcessData)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class GetDatagramStatistics:
     """Reads what the cabinet has counted of this session's datagrams; answered by DatagramStatistics."""
 
@@ -3939,11 +4541,10 @@ class GetDatagramStatistics:
         """Raise Violation for a field outside its range."""
         self._check("")
 
-
 _DatagramStatistics_0 = Struct(">IIIIIII")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class DatagramStatistics:
     """The datagrams of this session since its last OpenDatagrams."""
 
@@ -3959,6 +4560,15 @@ class DatagramStatistics:
     damaged: int
     strange: int
     sent: int
+
+    def __init__(self, *, accepted: int, old: int, late: int, forged: int, damaged: int, strange: int, sent: int) -> None:
+        _DatagramStatistics_accepted(self, accepted)
+        _DatagramStatistics_old(self, old)
+        _DatagramStatistics_late(self, late)
+        _DatagramStatistics_forged(self, forged)
+        _DatagramStatistics_damaged(self, damaged)
+        _DatagramStatistics_strange(self, strange)
+        _DatagramStatistics_sent(self, sent)
 
     def encode(self) -> bytes:
         """The body."""
@@ -3987,10 +4597,12 @@ class DatagramStatistics:
         self._check("")
 
 
+_DatagramStatistics_accepted, _DatagramStatistics_old, _DatagramStatistics_late, _DatagramStatistics_forged, _DatagramStatistics_damaged, _DatagramStatistics_strange, _DatagramStatistics_sent = codec.setters(DatagramStatistics)
+
 _AskOperator_0 = Struct(">B")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class AskOperator:
     """Shows a dialog on the smartPAD; the accepted id is its number, and DialogClosed has the answer. Refused while a dialog is shown: nobody but the operator can close one."""
 
@@ -4002,6 +4614,11 @@ class AskOperator:
     kind: DialogKind
     text: str
     buttons: tuple[str, ...]
+
+    def __init__(self, *, kind: DialogKind, text: str, buttons: tuple[str, ...]) -> None:
+        _AskOperator_kind(self, kind)
+        _AskOperator_text(self, text)
+        _AskOperator_buttons(self, buttons)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_AskOperator_0.pack(self.kind))
@@ -4046,12 +4663,14 @@ class AskOperator:
         self._check("")
 
 
+_AskOperator_kind, _AskOperator_text, _AskOperator_buttons = codec.setters(AskOperator)
+
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
 _ServoOpen_2 = Struct(">d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoOpen:
     """Starts a servo motion at the current position; Accepted carries its id."""
 
@@ -4070,6 +4689,17 @@ class ServoOpen:
     timing: ServoTiming = ServoTiming()
     watchdog: float = 0.2
     until: Condition = Condition()
+
+    def __init__(self, *, engine: ServoEngine = ServoEngine.SMART, frame: str = "", mode: Mode | None = None, velocity: float = 0.2, acceleration: float = 0.2, linear: CartesianDynamics = CartesianDynamics(), timing: ServoTiming = ServoTiming(), watchdog: float = 0.2, until: Condition = Condition()) -> None:
+        _ServoOpen_engine(self, engine)
+        _ServoOpen_frame(self, frame)
+        _ServoOpen_mode(self, mode)
+        _ServoOpen_velocity(self, velocity)
+        _ServoOpen_acceleration(self, acceleration)
+        _ServoOpen_linear(self, linear)
+        _ServoOpen_timing(self, timing)
+        _ServoOpen_watchdog(self, watchdog)
+        _ServoOpen_until(self, until)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ServoOpen_0.pack(self.engine))
@@ -4136,10 +4766,12 @@ class ServoOpen:
         self._check("")
 
 
+_ServoOpen_engine, _ServoOpen_frame, _ServoOpen_mode, _ServoOpen_velocity, _ServoOpen_acceleration, _ServoOpen_linear, _ServoOpen_timing, _ServoOpen_watchdog, _ServoOpen_until = codec.setters(ServoOpen)
+
 _ServoJoints_0 = Struct(">Id7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoJoints:
     """Joint target; the newest one counts."""
 
@@ -4153,6 +4785,11 @@ class ServoJoints:
     servo: int
     watchdog: float
     q: tuple[float, ...]
+
+    def __init__(self, *, servo: int, watchdog: float, q: tuple[float, ...]) -> None:
+        _ServoJoints_servo(self, servo)
+        _ServoJoints_watchdog(self, watchdog)
+        _ServoJoints_q(self, q)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4178,10 +4815,12 @@ class ServoJoints:
         self._check("")
 
 
+_ServoJoints_servo, _ServoJoints_watchdog, _ServoJoints_q = codec.setters(ServoJoints)
+
 _ServoJointsVelocity_0 = Struct(">Id7d7d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoJointsVelocity:
     """Target with the velocity to pass it at."""
 
@@ -4196,6 +4835,12 @@ class ServoJointsVelocity:
     watchdog: float
     q: tuple[float, ...]
     dq: tuple[float, ...]
+
+    def __init__(self, *, servo: int, watchdog: float, q: tuple[float, ...], dq: tuple[float, ...]) -> None:
+        _ServoJointsVelocity_servo(self, servo)
+        _ServoJointsVelocity_watchdog(self, watchdog)
+        _ServoJointsVelocity_q(self, q)
+        _ServoJointsVelocity_dq(self, dq)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4223,10 +4868,12 @@ class ServoJointsVelocity:
         self._check("")
 
 
+_ServoJointsVelocity_servo, _ServoJointsVelocity_watchdog, _ServoJointsVelocity_q, _ServoJointsVelocity_dq = codec.setters(ServoJointsVelocity)
+
 _ServoPose_0 = Struct(">Id3d4d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoPose:
     """Pose target of the motion frame."""
 
@@ -4241,6 +4888,12 @@ class ServoPose:
     watchdog: float
     xyz: tuple[float, ...]
     quat: tuple[float, ...]
+
+    def __init__(self, *, servo: int, watchdog: float, xyz: tuple[float, ...], quat: tuple[float, ...]) -> None:
+        _ServoPose_servo(self, servo)
+        _ServoPose_watchdog(self, watchdog)
+        _ServoPose_xyz(self, xyz)
+        _ServoPose_quat(self, quat)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4269,10 +4922,12 @@ class ServoPose:
         self._check("")
 
 
+_ServoPose_servo, _ServoPose_watchdog, _ServoPose_xyz, _ServoPose_quat = codec.setters(ServoPose)
+
 _ServoSettings_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoSettings:
     """Changes the parameters (not the type) of the running servo's control mode."""
 
@@ -4283,6 +4938,10 @@ class ServoSettings:
 
     servo: int
     mode: Mode
+
+    def __init__(self, *, servo: int, mode: Mode) -> None:
+        _ServoSettings_servo(self, servo)
+        _ServoSettings_mode(self, mode)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ServoSettings_0.pack(self.servo))
@@ -4317,10 +4976,12 @@ class ServoSettings:
         self._check("")
 
 
+_ServoSettings_servo, _ServoSettings_mode = codec.setters(ServoSettings)
+
 _ServoClose_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoClose:
     """Ends the servo motion at rest."""
 
@@ -4330,6 +4991,9 @@ class ServoClose:
     ROLE: ClassVar[str] = "controller"
 
     servo: int
+
+    def __init__(self, *, servo: int) -> None:
+        _ServoClose_servo(self, servo)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4352,10 +5016,12 @@ class ServoClose:
         self._check("")
 
 
+(_ServoClose_servo,) = codec.setters(ServoClose)
+
 _ServoStatus_0 = Struct(">IIIIIddH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ServoStatus:
     """Statistics of the target stream, once a second and at the end."""
 
@@ -4373,6 +5039,17 @@ class ServoStatus:
     age_p99: float
     code: int
     text: str = ""
+
+    def __init__(self, *, servo: int, targets: int, applied: int, refused: int, late: int, age_median: float, age_p99: float, code: int, text: str = "") -> None:
+        _ServoStatus_servo(self, servo)
+        _ServoStatus_targets(self, targets)
+        _ServoStatus_applied(self, applied)
+        _ServoStatus_refused(self, refused)
+        _ServoStatus_late(self, late)
+        _ServoStatus_age_median(self, age_median)
+        _ServoStatus_age_p99(self, age_p99)
+        _ServoStatus_code(self, code)
+        _ServoStatus_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ServoStatus_0.pack(self.servo, self.targets, self.applied, self.refused, self.late, self.age_median, self.age_p99, self.code))
@@ -4415,11 +5092,13 @@ class ServoStatus:
         self._check("")
 
 
+_ServoStatus_servo, _ServoStatus_targets, _ServoStatus_applied, _ServoStatus_refused, _ServoStatus_late, _ServoStatus_age_median, _ServoStatus_age_p99, _ServoStatus_code, _ServoStatus_text = codec.setters(ServoStatus)
+
 _FriOpen_0 = Struct(">HdBB")
 _FriOpen_1 = Struct(">d")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FriOpen:
     """Opens an FRI session to a client, with an overlay on a position hold unless it only monitors."""
 
@@ -4437,6 +5116,16 @@ class FriOpen:
     mode: Mode | None = None
     timeout: float = 10.0
     io: tuple[str, ...] = ()
+
+    def __init__(self, *, host: str, port: int = 30200, period: float, receive_multiplier: int = 1, command: FriCommandMode, mode: Mode | None = None, timeout: float = 10.0, io: tuple[str, ...] = ()) -> None:
+        _FriOpen_host(self, host)
+        _FriOpen_port(self, port)
+        _FriOpen_period(self, period)
+        _FriOpen_receive_multiplier(self, receive_multiplier)
+        _FriOpen_command(self, command)
+        _FriOpen_mode(self, mode)
+        _FriOpen_timeout(self, timeout)
+        _FriOpen_io(self, io)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.host))
@@ -4503,10 +5192,12 @@ class FriOpen:
         self._check("")
 
 
+_FriOpen_host, _FriOpen_port, _FriOpen_period, _FriOpen_receive_multiplier, _FriOpen_command, _FriOpen_mode, _FriOpen_timeout, _FriOpen_io = codec.setters(FriOpen)
+
 _FriClose_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FriClose:
     """Ends the overlay and the session."""
 
@@ -4516,6 +5207,9 @@ class FriClose:
     ROLE: ClassVar[str] = "controller"
 
     session: int
+
+    def __init__(self, *, session: int) -> None:
+        _FriClose_session(self, session)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4538,10 +5232,12 @@ class FriClose:
         self._check("")
 
 
+(_FriClose_session,) = codec.setters(FriClose)
+
 _FriChanged_0 = Struct(">IBBH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class FriChanged:
     """State or quality of an FRI session changed."""
 
@@ -4555,6 +5251,13 @@ class FriChanged:
     quality: FriQuality
     code: int
     text: str = ""
+
+    def __init__(self, *, session: int, state: FriSessionState, quality: FriQuality, code: int, text: str = "") -> None:
+        _FriChanged_session(self, session)
+        _FriChanged_state(self, state)
+        _FriChanged_quality(self, quality)
+        _FriChanged_code(self, code)
+        _FriChanged_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_FriChanged_0.pack(self.session, self.state, self.quality, self.code))
@@ -4592,10 +5295,12 @@ class FriChanged:
         self._check("")
 
 
+_FriChanged_session, _FriChanged_state, _FriChanged_quality, _FriChanged_code, _FriChanged_text = codec.setters(FriChanged)
+
 _MotionStarted_0 = Struct(">IH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class MotionStarted:
     """An item of a program has started."""
 
@@ -4606,6 +5311,10 @@ class MotionStarted:
 
     id: int
     item: int
+
+    def __init__(self, *, id: int, item: int) -> None:
+        _MotionStarted_id(self, id)
+        _MotionStarted_item(self, item)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4629,10 +5338,12 @@ class MotionStarted:
         self._check("")
 
 
+_MotionStarted_id, _MotionStarted_item = codec.setters(MotionStarted)
+
 _ItemReached_0 = Struct(">IH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ItemReached:
     """An item of a program is done; the next one follows."""
 
@@ -4643,6 +5354,10 @@ class ItemReached:
 
     id: int
     item: int
+
+    def __init__(self, *, id: int, item: int) -> None:
+        _ItemReached_id(self, id)
+        _ItemReached_item(self, item)
 
     def encode(self) -> bytes:
         """The body."""
@@ -4666,12 +5381,14 @@ class ItemReached:
         self._check("")
 
 
+_ItemReached_id, _ItemReached_item = codec.setters(ItemReached)
+
 _TriggerFired_0 = Struct(">IHH")
 _TriggerFired_1 = Struct(">d")
 _TriggerFired_2 = Struct(">H")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class TriggerFired:
     """A trigger of an item has fired, and its action is done; code and text are set if the cabinet did not write an output."""
 
@@ -4688,6 +5405,16 @@ class TriggerFired:
     joints: JointState | None = None
     code: int
     text: str = ""
+
+    def __init__(self, *, id: int, item: int, trigger: int, label: str = "", time: float, joints: JointState | None = None, code: int, text: str = "") -> None:
+        _TriggerFired_id(self, id)
+        _TriggerFired_item(self, item)
+        _TriggerFired_trigger(self, trigger)
+        _TriggerFired_label(self, label)
+        _TriggerFired_time(self, time)
+        _TriggerFired_joints(self, joints)
+        _TriggerFired_code(self, code)
+        _TriggerFired_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_TriggerFired_0.pack(self.id, self.item, self.trigger))
@@ -4745,10 +5472,12 @@ class TriggerFired:
         self._check("")
 
 
+_TriggerFired_id, _TriggerFired_item, _TriggerFired_trigger, _TriggerFired_label, _TriggerFired_time, _TriggerFired_joints, _TriggerFired_code, _TriggerFired_text = codec.setters(TriggerFired)
+
 _MotionFinished_0 = Struct(">IHBidd7dddH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class MotionFinished:
     """A program has ended."""
 
@@ -4768,6 +5497,19 @@ class MotionFinished:
     rest_force: float = nan
     code: int
     text: str = ""
+
+    def __init__(self, *, id: int, item: int, cause: Cause, fired: int = -1, residual: float, duration: float, q: tuple[float, ...], peak_force: float = nan, rest_force: float = nan, code: int, text: str = "") -> None:
+        _MotionFinished_id(self, id)
+        _MotionFinished_item(self, item)
+        _MotionFinished_cause(self, cause)
+        _MotionFinished_fired(self, fired)
+        _MotionFinished_residual(self, residual)
+        _MotionFinished_duration(self, duration)
+        _MotionFinished_q(self, q)
+        _MotionFinished_peak_force(self, peak_force)
+        _MotionFinished_rest_force(self, rest_force)
+        _MotionFinished_code(self, code)
+        _MotionFinished_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_MotionFinished_0.pack(self.id, self.item, self.cause, self.fired, self.residual, self.duration, *self.q, self.peak_force, self.rest_force, self.code))
@@ -4815,10 +5557,12 @@ class MotionFinished:
         self._check("")
 
 
+_MotionFinished_id, _MotionFinished_item, _MotionFinished_cause, _MotionFinished_fired, _MotionFinished_residual, _MotionFinished_duration, _MotionFinished_q, _MotionFinished_peak_force, _MotionFinished_rest_force, _MotionFinished_code, _MotionFinished_text = codec.setters(MotionFinished)
+
 _ControlChanged_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ControlChanged:
     """The controlling client has changed."""
 
@@ -4830,6 +5574,11 @@ class ControlChanged:
     controller: str = ""
     session: int
     text: str = ""
+
+    def __init__(self, *, controller: str = "", session: int, text: str = "") -> None:
+        _ControlChanged_controller(self, controller)
+        _ControlChanged_session(self, session)
+        _ControlChanged_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.controller))
@@ -4866,9 +5615,11 @@ class ControlChanged:
         self._check("")
 
 
+_ControlChanged_controller, _ControlChanged_session, _ControlChanged_text = codec.setters(ControlChanged)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ToolChanged:
     """The attached tool or workpiece has changed, or was defined again."""
 
@@ -4879,6 +5630,10 @@ class ToolChanged:
 
     tool: ToolInfo | None = None
     workpiece: ToolInfo | None = None
+
+    def __init__(self, *, tool: ToolInfo | None = None, workpiece: ToolInfo | None = None) -> None:
+        _ToolChanged_tool(self, tool)
+        _ToolChanged_workpiece(self, workpiece)
 
     def _write(self, out: list[bytes]) -> None:
         if self.tool is None:
@@ -4928,10 +5683,12 @@ class ToolChanged:
         self._check("")
 
 
+_ToolChanged_tool, _ToolChanged_workpiece = codec.setters(ToolChanged)
+
 _SafetyChanged_0 = Struct(">HB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SafetyChanged:
     """Safety or readiness has changed."""
 
@@ -4943,6 +5700,11 @@ class SafetyChanged:
     bits: SafetyBits
     mode: OperationMode
     text: str = ""
+
+    def __init__(self, *, bits: SafetyBits, mode: OperationMode, text: str = "") -> None:
+        _SafetyChanged_bits(self, bits)
+        _SafetyChanged_mode(self, mode)
+        _SafetyChanged_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_SafetyChanged_0.pack(self.bits, self.mode))
@@ -4978,10 +5740,12 @@ class SafetyChanged:
         self._check("")
 
 
+_SafetyChanged_bits, _SafetyChanged_mode, _SafetyChanged_text = codec.setters(SafetyChanged)
+
 _KeyPressed_0 = Struct(">BB")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class KeyPressed:
     """A user key was pressed or released."""
 
@@ -4992,6 +5756,10 @@ class KeyPressed:
 
     slot: int
     down: bool
+
+    def __init__(self, *, slot: int, down: bool) -> None:
+        _KeyPressed_slot(self, slot)
+        _KeyPressed_down(self, down)
 
     def encode(self) -> bytes:
         """The body."""
@@ -5015,10 +5783,12 @@ class KeyPressed:
         self._check("")
 
 
+_KeyPressed_slot, _KeyPressed_down = codec.setters(KeyPressed)
+
 _Notice_0 = Struct(">BH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Notice:
     """Message for the user."""
 
@@ -5030,6 +5800,11 @@ class Notice:
     severity: Severity
     code: int
     text: str = ""
+
+    def __init__(self, *, severity: Severity, code: int, text: str = "") -> None:
+        _Notice_severity(self, severity)
+        _Notice_code(self, code)
+        _Notice_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Notice_0.pack(self.severity, self.code))
@@ -5065,10 +5840,12 @@ class Notice:
         self._check("")
 
 
+_Notice_severity, _Notice_code, _Notice_text = codec.setters(Notice)
+
 _ConditionFired_0 = Struct(">IHH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class ConditionFired:
     """A break condition has fired, with the robot's state when the application received the event; MotionFinished follows."""
 
@@ -5084,6 +5861,15 @@ class ConditionFired:
     torques: TorqueState
     pose: PoseState
     wrench: WrenchState
+
+    def __init__(self, *, id: int, item: int, node: int, joints: JointState, torques: TorqueState, pose: PoseState, wrench: WrenchState) -> None:
+        _ConditionFired_id(self, id)
+        _ConditionFired_item(self, item)
+        _ConditionFired_node(self, node)
+        _ConditionFired_joints(self, joints)
+        _ConditionFired_torques(self, torques)
+        _ConditionFired_pose(self, pose)
+        _ConditionFired_wrench(self, wrench)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_ConditionFired_0.pack(self.id, self.item, self.node))
@@ -5129,10 +5915,12 @@ class ConditionFired:
         self._check("")
 
 
+_ConditionFired_id, _ConditionFired_item, _ConditionFired_node, _ConditionFired_joints, _ConditionFired_torques, _ConditionFired_pose, _ConditionFired_wrench = codec.setters(ConditionFired)
+
 _SegmentReached_0 = Struct(">IHH")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class SegmentReached:
     """A segment of a spline has begun, as the robot reports it; the previous one is done."""
 
@@ -5144,6 +5932,11 @@ class SegmentReached:
     id: int
     item: int
     segment: int
+
+    def __init__(self, *, id: int, item: int, segment: int) -> None:
+        _SegmentReached_id(self, id)
+        _SegmentReached_item(self, item)
+        _SegmentReached_segment(self, segment)
 
     def encode(self) -> bytes:
         """The body."""
@@ -5168,10 +5961,12 @@ class SegmentReached:
         self._check("")
 
 
+_SegmentReached_id, _SegmentReached_item, _SegmentReached_segment = codec.setters(SegmentReached)
+
 _StatesMissed_0 = Struct(">I")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class StatesMissed:
     """States that were due and are not sent: the cabinet sampled late, or the client reads too slowly. They were due before the states that follow."""
 
@@ -5181,6 +5976,9 @@ class StatesMissed:
     ROLE: ClassVar[str] = "any"
 
     count: int
+
+    def __init__(self, *, count: int) -> None:
+        _StatesMissed_count(self, count)
 
     def encode(self) -> bytes:
         """The body."""
@@ -5203,10 +6001,12 @@ class StatesMissed:
         self._check("")
 
 
+(_StatesMissed_count,) = codec.setters(StatesMissed)
+
 _DialogClosed_0 = Struct(">Ii")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class DialogClosed:
     """The operator has answered a dialog."""
 
@@ -5218,6 +6018,11 @@ class DialogClosed:
     dialog: int
     button: int
     text: str = ""
+
+    def __init__(self, *, dialog: int, button: int, text: str = "") -> None:
+        _DialogClosed_dialog(self, dialog)
+        _DialogClosed_button(self, button)
+        _DialogClosed_text(self, text)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_DialogClosed_0.pack(self.dialog, self.button))
@@ -5253,9 +6058,11 @@ class DialogClosed:
         self._check("")
 
 
+_DialogClosed_dialog, _DialogClosed_button, _DialogClosed_text = codec.setters(DialogClosed)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class State:
     """Pushed state: the newest sample of each subscribed group."""
 
@@ -5272,6 +6079,16 @@ class State:
     safety: SafetyState | None = None
     io: IoState | None = None
     mode: ModeState | None = None
+
+    def __init__(self, *, joints: JointState | None = None, torques: TorqueState | None = None, pose: PoseState | None = None, wrench: WrenchState | None = None, motion: MotionState | None = None, safety: SafetyState | None = None, io: IoState | None = None, mode: ModeState | None = None) -> None:
+        _State_joints(self, joints)
+        _State_torques(self, torques)
+        _State_pose(self, pose)
+        _State_wrench(self, wrench)
+        _State_motion(self, motion)
+        _State_safety(self, safety)
+        _State_io(self, io)
+        _State_mode(self, mode)
 
     def _write(self, out: list[bytes]) -> None:
         mask = 0
@@ -5376,6 +6193,8 @@ class State:
         """Raise Violation for a field outside its range."""
         self._check("")
 
+
+_State_joints, _State_torques, _State_pose, _State_wrench, _State_motion, _State_safety, _State_io, _State_mode = codec.setters(State)
 
 Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | AskOperator | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | ToolChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | StatesMissed | DialogClosed | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose

@@ -504,8 +504,11 @@ class Connection:
 
     def request(self, message: Message) -> None:
         """Send a request that is only accepted or refused; raises as `Link.request` does."""
+        link = self._link
+        if link is None:
+            raise _not_connected()
         try:
-            self.link.request(message, wire.Accepted, timeout=self.options.timeout)
+            link.request(message, wire.Accepted, timeout=self.options.timeout)
         except (SafetyStop, ConnectionLost) as error:
             error.with_black_box(self.black_box.last)  # of the incident that caused it
             raise
