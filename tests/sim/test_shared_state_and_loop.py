@@ -147,11 +147,12 @@ def test_beside_an_fri_session_no_ticks_follow_each_other_without_a_pause(room: 
 
 
 _EARLY = """
-import time
+import sys, time
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
 from heptarm.sim.seam import TICK_NS, HeaderWords
 shared, begun, shown, woken = SharedState(), [], [], []
+shared.header[HeaderWords.WAKE] = int(sys.argv[1])
 def tick():
     number = int(shared.header[HeaderWords.NEWEST]) + 1
     due = int(shared.header[HeaderWords.ANCHOR]) + number * TICK_NS
@@ -169,13 +170,22 @@ print(min(begun[300:]), min(shown), len(woken), woken.count(500))
 """
 
 
+def _early(wake: int) -> list[int]:
+    """What _EARLY prints, where somebody waits for each tick from a plant time on [ns]."""
+    command = [sys.executable, "-c", _EARLY, str(wake)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    return [int(word) for word in done.stdout.split()]
+
+
 def test_a_tick_begins_early_and_its_state_is_shown_when_it_is_due() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", _EARLY], capture_output=True, text=True, check=True, timeout=60
-    )
-    earliest, shown, woken, woken_late = map(int, done.stdout.split())
+    earliest, shown, woken, woken_late = _early(0)
     assert -200_000 <= earliest < 0 <= shown  # [ns]
     assert woken > 0 and not woken_late  # tick 500 is late: its readers are woken when it is published
+
+
+def test_a_tick_that_nobody_waits_for_begins_when_it_is_due() -> None:
+    earliest, _, woken, _ = _early(NEVER)
+    assert earliest >= 0 and not woken
 
 
 def test_a_plant_needs_no_jvm() -> None:

@@ -4,9 +4,9 @@ The loop sleeps until a tick is due. After a late wake-up it catches up, since a
 after more than 20 missed ticks it re-bases its schedule and counts that. With an FRI session open it leaves
 `answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
 that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
-A sensor's reading is there at once, a simulated one has to be computed: so a tick begins early, by about as long as it
-takes, and its state is published when it is due, see `RealtimeLoop.wait_until_due`. With an FRI session open it begins
-when it is due, since the answer to the state before is one of its inputs.
+A sensor's reading is there at once, a simulated one has to be computed: so a tick whose state somebody waits for begins
+early, by about as long as it takes, and its state is published when it is due, see `RealtimeLoop.wait_until_due`. With an
+FRI session open it begins when it is due, since the answer to the state before is one of its inputs.
 While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
 every few seconds, in the pause between two ticks.
@@ -50,7 +50,7 @@ SPIN_FRACTION = 0.1
 EARLIEST = 0.2
 #: After a tick that is late the next one begins so much earlier [ns]; after one in time, by this fraction of what was
 #: left later.
-EARLIER_NS, LATER = 10_000, 1 / 32
+EARLIER_NS, LATER = 20_000, 1 / 256
 #: No real-time priority above this speed: Linux throttles a loop that never sleeps for 50 ms in each second.
 REAL_TIME_SPEED = 5.0
 #: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that other threads run.
@@ -177,7 +177,7 @@ class RealtimeLoop:
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._due = self._waited = 0
-        self._early, self._earliest = 0.0, EARLIEST * self._period
+        self._early, self._earliest, self._is_early = 0.0, EARLIEST * self._period, False
         self._speed = speed
         self.answer_gap = 0.0
         self._stop = False
@@ -220,7 +220,7 @@ class RealtimeLoop:
             wake()
         begin = now = time.monotonic_ns()
         spare = self._due - begin
-        if self.answer_gap == 0.0:
+        if self._is_early:
             self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
         while now < self._due:
             now = time.monotonic_ns()
@@ -266,6 +266,7 @@ class RealtimeLoop:
         header[HeaderWords.ANCHOR] = due - (done + 1) * period
         end, is_second = now_ns(), False
         collected = end
+        moment, is_awaited = (done + 1) * TICK_NS, False  # of the next tick; whether the last one was awaited
         while not self._stop:
             now, gap = now_ns(), int(self.answer_gap * period)
             if self.is_real_time is not (always or (gap > 0 and not never)):
@@ -278,7 +279,8 @@ class RealtimeLoop:
                 time.sleep(YIELD_TIME)
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
-            early = 0 if gap else int(self._early)
+            self._is_early = gap == 0 and (is_awaited or bool(header[HeaderWords.WAKE] <= moment))
+            early = int(self._early) if self._is_early else 0
             start = max(due - early, end + gap)
             if now < start:
                 if start - now > spin:
@@ -292,8 +294,10 @@ class RealtimeLoop:
                     continue
             begin, is_second = now_ns(), False
             self._due, self._waited = due, 0
+            is_awaited = bool(header[HeaderWords.WAKE] <= moment)
             self._tick()
             end = now_ns()
+            moment += TICK_NS
             at = self._count % _HISTORY
             self._late[at] = begin - due + early
             self._cost[at] = end - begin - self._waited
@@ -302,7 +306,9 @@ class RealtimeLoop:
             if rest is not None and rest.begins():
                 self._pass_rest(rest)
                 end = now_ns()
-                due = int(header[HeaderWords.ANCHOR]) + (int(header[HeaderWords.NEWEST]) + 1) * period
+                done = int(header[HeaderWords.NEWEST])
+                due = int(header[HeaderWords.ANCHOR]) + (done + 1) * period
+                moment = (done + 1) * TICK_NS
             waited = end - collected
             if waited > COLLECT_EVERY and (due - end >= COLLECT_PAUSE * period or waited > COLLECT_LATEST):
                 gc.collect()
