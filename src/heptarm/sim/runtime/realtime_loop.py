@@ -5,8 +5,8 @@ after more than 20 missed ticks it re-bases its schedule and counts that. With a
 `answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
 that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
 A sensor's reading is there at once, a simulated one has to be computed: so a tick whose state somebody waits for begins
-early, by about as long as it takes, and its state is published when it is due, see `RealtimeLoop.wait_until_due`. With an
-FRI session open it begins when it is due, since the answer to the state before is one of its inputs.
+early, by about as long as it takes, and its state is published when it is due, see `RealtimeLoop.wait_until_due`. With
+an FRI session open it begins when it is due, since the answer to the state before is one of its inputs.
 While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
 every few seconds, in the pause between two ticks.
