@@ -28,15 +28,13 @@ class Noise:
 
     def __enter__(self) -> Noise:
         self._began = time.monotonic()
-        self._busy, self._stolen = _busy()
-        self._own = _own(self.measured)
+        self._others, self._stolen = _others(self.measured), _stolen()
         return self
 
     def __exit__(self, *_: object) -> None:
-        busy, stolen = _busy()
         ticks = max(1.0, (time.monotonic() - self._began) * os.sysconf("SC_CLK_TCK"))
-        self.others = max(0.0, (busy - self._busy - (_own(self.measured) - self._own)) / ticks)
-        self.stolen = (stolen - self._stolen) / ticks
+        self.others = max(0.0, (_others(self.measured) - self._others) / ticks)
+        self.stolen = (_stolen() - self._stolen) / ticks
 
     @property
     def is_noisy(self) -> bool:
@@ -44,14 +42,17 @@ class Noise:
         return self.others + self.stolen > OTHERS
 
 
-def _busy() -> tuple[int, int]:
-    """Time that processes have run, and time that the host has kept [clock ticks]."""
-    fields = [int(word) for word in Path("/proc/stat").read_text().splitlines()[0].split()[1:]]
-    return sum(fields[:3]), fields[7]
+def _stolen() -> int:
+    """Time that the host has kept [clock ticks]."""
+    return int(Path("/proc/stat").read_text().splitlines()[0].split()[8])
 
 
-def _own(measured: tuple[int, ...]) -> int:
-    """Time that this process, those given, and the descendants of all of them have run [clock ticks]."""
+def _others(measured: tuple[int, ...]) -> int:
+    """Time that all processes have run but this one, those given, and the descendants of all of them [clock ticks].
+
+    Not the machine's busy time in /proc/stat: Linux samples that 250 times a second, and a load of 1 kHz is then always
+    seen at the same phase.
+    """
     times, parents = {}, {}
     for entry in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
@@ -64,5 +65,5 @@ def _own(measured: tuple[int, ...]) -> int:
         above = number
         while above and above not in roots:
             above = parents.get(above, 0)
-        total += times[number] if above else 0
+        total += 0 if above else times[number]
     return total
