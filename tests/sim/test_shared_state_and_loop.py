@@ -165,14 +165,15 @@ def tick():
     if len(begun) == 600:
         loop.stop()
 loop = RealtimeLoop(shared, tick)
+exec(sys.argv[2])
 loop.run()
 print(min(begun[300:]), min(shown), len(woken), woken.count(500))
 """
 
 
-def _early(wake: int) -> list[int]:
+def _early(wake: int, prepare: str = "") -> list[int]:
     """What _EARLY prints, where somebody waits for each tick from a plant time on [ns]."""
-    command = [sys.executable, "-c", _EARLY, str(wake)]
+    command = [sys.executable, "-c", _EARLY, str(wake), prepare]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     return [int(word) for word in done.stdout.split()]
 
@@ -181,6 +182,11 @@ def test_a_tick_begins_early_and_its_state_is_shown_when_it_is_due() -> None:
     earliest, shown, woken, woken_late = _early(0)
     assert -200_000 <= earliest < 0 <= shown  # [ns]
     assert woken > 0 and not woken_late  # tick 500 is late: its readers are woken when it is published
+
+
+def test_a_tick_that_takes_longer_begins_earlier_yet() -> None:
+    (earliest, *_), (latest, *_) = _early(0, "loop.head_start = 0.5"), _early(0)
+    assert -500_000 <= earliest < -300_000 < latest  # [ns]
 
 
 def test_a_tick_that_nobody_waits_for_begins_when_it_is_due() -> None:

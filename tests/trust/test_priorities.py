@@ -24,7 +24,7 @@ def policies(cabinet: Cabinet) -> set[int]:
     found = set()
     for task in Path(f"/proc/{cabinet.process.pid}/task").iterdir():
         with contextlib.suppress(OSError):  # it has ended
-            if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
+            if (task / "comm").read_text().startswith(tuple(REAL_TIME_THREADS)):
                 found.add(os.sched_getscheduler(int(task.name)))
     return found
 

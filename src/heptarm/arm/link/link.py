@@ -284,6 +284,7 @@ class Link:
         self._closing = False
         self._requested = clock.nanos()
         self._heartbeat = Heartbeat(self._requested)
+        self._ping_due = self._requested
         self._polling = _POLLING
         self._may_loop = self._loop_reads = False
         self._looped = self._requested - _LOOPING
@@ -550,11 +551,14 @@ class Link:
         if not self._may_read():
             return
         clock = self._clock
-        deadline = clock.nanos() + round(seconds * 1e9)
+        now = clock.nanos()
+        deadline = now + round(seconds * 1e9)
         shield = InterruptShield()
         try:
             self._caller_reads = self._loop_reads = True
             self._reader = get_ident()
+            if now >= self._ping_due:  # between two states, where it delays none
+                self._ping(now)
             while waits() and self._error is None and not shield.pending and clock.nanos() < deadline:
                 self._read(wait=True)
         finally:
@@ -602,6 +606,14 @@ class Link:
         if line is not None:
             return line.pack(kind, numbers, number=0, now=now)
         return self._session.pack_numbers(kind, numbers, time=self.offset.to_cabinet(now))
+
+    def _ping(self, now: int) -> None:
+        """The ping that is due."""
+        self._ping_due = now + self._heartbeat.interval
+        try:
+            self.ping()
+        except HeptarmError as error:
+            self._fail(error)
 
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer updates `offset`."""
@@ -736,16 +748,15 @@ class Link:
 
     def _run(self) -> None:
         clock, transport = self._clock, self._transport
-        due = clock.nanos()
         while self._error is None:
             try:
                 now = clock.nanos()
                 self._heartbeat.look(now)
-                if now >= due:
-                    self.ping()
-                    due = now + self._heartbeat.interval
-                rest = max(0.0, (due - now) * 1e-9)
-                if self._loop_reads or now - self._looped < _LOOPING:
+                is_looped = self._loop_reads or now - self._looped < _LOOPING
+                if now >= self._ping_due + (_LOOPING if is_looped else 0):
+                    self._ping(now)
+                rest = max(0.0, (self._ping_due - now) * 1e-9)
+                if is_looped:
                     # a loop over states reads, or is back within a moment
                     clock.sleep(_LOOP_STEP)
                     # after a standstill of this process bytes wait to be read

@@ -239,6 +239,12 @@ class Interpolator:
         return self.command.rests
 
     @property
+    def computes_many_next(self) -> bool:
+        """Whether the next tick computes many set-points at once, see `SetPointsAhead`."""
+        ahead = None if self.run is None else self.run.ahead
+        return ahead is not None and ahead.used_up and not ahead.ends
+
+    @property
     def is_quiet(self) -> bool:
         """Whether nothing runs, nothing waits for the next tick, and no condition is observed."""
         return (

@@ -37,23 +37,29 @@ from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import LONGEST_WAIT, SimulatedOperator, timed
-from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled, share_memory_pools
+from heptarm.sim.runtime.realtime_loop import (
+    ANSWER_GAP,
+    HEAD_START,
+    RealtimeLoop,
+    batch_scheduled,
+    share_memory_pools,
+)
 from heptarm.sim.runtime.rest import Rest
 from heptarm.values.robot import robot
 from heptarm.values.simulator_options import RealTime, SimulatorOptions, flag
 
 log = logging.getLogger("heptarm.sim")
 
-#: Java threads that get a real-time priority below the loop's where that is allowed, by prefix of their names.
-REAL_TIME_THREADS = ("ha-sampler", "ha-writer", "ha-watchdog")
-REAL_TIME_PRIORITY = 10
+#: Java threads that get a real-time priority below the loop's where that is allowed: beginnings of their names, and the
+#: priorities. The watchdog wakes with the sampler every few states, and would delay each of these.
+REAL_TIME_THREADS = {"ha-sampler": 11, "ha-writer": 10, "ha-watchdog": 10}
 
 _PORT_PROPERTY = "heptarm.port.bound"
 _START_TIMEOUT = 20.0
 _EXITED = (
     "the application called System.exit, which would end the whole JVM of a cabinet: let run() return instead"
 )
-_HOUSEKEEPING = 0.1
+_HOUSEKEEPING = 0.5
 #: Held while an action of the operator is executed and reported.
 _OPERATING = threading.Lock()
 #: So often a thread's name is read: it may have none yet at first.
@@ -198,6 +204,7 @@ class VirtualCabinet:
         self.plant.compute()
         self.loop.wait_until_due(self.plant.wake)
         self.plant.publish()
+        self.loop.head_start = HEAD_START if self.plant.interpolator.computes_many_next else 0.0
         if self._trace is not None:
             self._trace.append()
         if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:
@@ -278,8 +285,10 @@ class _Priorities:
             looks = {task: self._looks.get(task, 0) + 1 for task in os.listdir("/proc/self/task")}
             for task in [task for task, count in looks.items() if count <= _LOOKS]:
                 with contextlib.suppress(OSError):  # it has ended, or is refused, which the statistics report
-                    if Path(f"/proc/self/task/{task}/comm").read_text().startswith(REAL_TIME_THREADS):
-                        self._promote(int(task))
+                    name = Path(f"/proc/self/task/{task}/comm").read_text()
+                    for begin, priority in REAL_TIME_THREADS.items():
+                        if name.startswith(begin):
+                            self._promote(int(task), priority)
             self._looks = looks
         elif self._promoted:
             self._looks = {}
@@ -288,10 +297,10 @@ class _Priorities:
                     os.sched_setscheduler(number, policy, os.sched_param(0))
             self._promoted = {}
 
-    def _promote(self, number: int) -> None:
+    def _promote(self, number: int, priority: int) -> None:
         policy = os.sched_getscheduler(number)
         if policy != os.SCHED_FIFO:
-            os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(REAL_TIME_PRIORITY))
+            os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(priority))
             self._promoted[number] = policy
 
 

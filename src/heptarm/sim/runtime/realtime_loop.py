@@ -48,6 +48,8 @@ SPIN_NS = 60_000
 SPIN_FRACTION = 0.1
 #: A tick begins at most this long before it is due, as a fraction of a period.
 EARLIEST = 0.2
+#: A tick that computes many set-points at once begins so much earlier, as a fraction of a period.
+HEAD_START = 0.5
 #: After a tick that is late the next one begins so much earlier [ns]; after one in time, by this fraction of what was
 #: left later.
 EARLIER_NS, LATER = 20_000, 1 / 256
@@ -159,6 +161,8 @@ class RealtimeLoop:
     Attributes:
         answer_gap: least time between two ticks, as a fraction of a period: `ANSWER_GAP` while an FRI client has to
             answer each of them, else 0; may be set at any time.
+        head_start: so much earlier begins a tick that somebody waits for, as a fraction of a period: `HEAD_START` if it
+            takes longer than others; set by the tick before.
         is_real_time: whether real-time priority is wanted now.
     """
 
@@ -179,7 +183,7 @@ class RealtimeLoop:
         self._due = self._waited = 0
         self._early, self._earliest, self._is_early = 0.0, EARLIEST * self._period, False
         self._speed = speed
-        self.answer_gap = 0.0
+        self.answer_gap = self.head_start = 0.0
         self._stop = False
         # no arrays of numpy: between two ticks the caches get cold, and writing into these needs less code
         self._cost = array("q", bytes(8 * _HISTORY))
@@ -220,7 +224,7 @@ class RealtimeLoop:
             wake()
         begin = now = time.monotonic_ns()
         spare = self._due - begin
-        if self._is_early:
+        if self._is_early and self.head_start == 0.0:
             self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
         while now < self._due:
             now = time.monotonic_ns()
@@ -280,7 +284,7 @@ class RealtimeLoop:
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
             self._is_early = gap == 0 and (is_awaited or bool(header[HeaderWords.WAKE] <= moment))
-            early = int(self._early) if self._is_early else 0
+            early = int(self._early + self.head_start * period) if self._is_early else 0
             start = max(due - early, end + gap)
             if now < start:
                 if start - now > spin:
