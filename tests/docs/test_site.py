@@ -28,7 +28,7 @@ return {wide: wide, culprits: culprits, images: images, title: document.title};
 pytestmark = [pytest.mark.slow, pytest.mark.computing]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # tests with a browser come last
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built site; a warning is an error."""
     out = tmp_path_factory.mktemp("site")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import select
 import socket
 import struct
@@ -326,3 +327,24 @@ def test_without_a_compiler_there_is_none(monkeypatch: pytest.MonkeyPatch) -> No
         assert _library() is None
     finally:
         _library.cache_clear()
+
+
+def test_without_libcrypto_there_is_none_for_a_session_with_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> ctypes.CDLL:
+        raise OSError(f"no {name}")
+
+    line = Line()  # loads the library
+    monkeypatch.setattr(ctypes, "CDLL", missing)
+    for key, found in zip(KEYS, (True, False), strict=True):
+        session, _ = open_pair(key)
+        made = compiled_link(
+            session,
+            line.near.fileno,
+            left=line.left,
+            pending=line.pending,
+            spare=line.spare,
+            reading=line.reading,
+            sending=line.sending,
+        )
+        assert (made is not None) is found
+    line.close()
