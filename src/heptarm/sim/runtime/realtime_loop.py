@@ -283,7 +283,7 @@ class RealtimeLoop:
                 time.sleep(YIELD_TIME)
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
-            self._is_early = gap == 0 and (is_awaited or bool(header[HeaderWords.WAKE] <= moment))
+            self._is_early = gap == 0 < period and (is_awaited or bool(header[HeaderWords.WAKE] <= moment))
             early = int(self._early + self.head_start * period) if self._is_early else 0
             start = max(due - early, end + gap)
             if now < start:
@@ -298,7 +298,7 @@ class RealtimeLoop:
                     continue
             begin, is_second = now_ns(), False
             self._due, self._waited = due, 0
-            is_awaited = bool(header[HeaderWords.WAKE] <= moment)
+            is_awaited = period > 0 and bool(header[HeaderWords.WAKE] <= moment)
             self._tick()
             end = now_ns()
             moment += TICK_NS
