@@ -270,7 +270,7 @@ class RealtimeLoop:
         header[HeaderWords.ANCHOR] = due - (done + 1) * period
         end, is_second = now_ns(), False
         collected = end
-        moment, is_awaited = (done + 1) * TICK_NS, False  # of the next tick; whether the last one was awaited
+        moment, awaited = (done + 1) * TICK_NS, 0  # of the next tick; ticks in a row that somebody waited for
         while not self._stop:
             now, gap = now_ns(), int(self.answer_gap * period)
             if self.is_real_time is not (always or (gap > 0 and not never)):
@@ -283,7 +283,8 @@ class RealtimeLoop:
                 time.sleep(YIELD_TIME)
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
-            self._is_early = gap == 0 < period and (is_awaited or bool(header[HeaderWords.WAKE] <= moment))
+            # who waits for every tick does so only after the last one's state
+            self._is_early = gap == 0 < period and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
             early = int(self._early + self.head_start * period) if self._is_early else 0
             start = max(due - early, end + gap)
             if now < start:
@@ -298,7 +299,7 @@ class RealtimeLoop:
                     continue
             begin, is_second = now_ns(), False
             self._due, self._waited = due, 0
-            is_awaited = period > 0 and bool(header[HeaderWords.WAKE] <= moment)
+            awaited = awaited + 1 if period > 0 and header[HeaderWords.WAKE] <= moment else 0
             self._tick()
             end = now_ns()
             moment += TICK_NS
