@@ -165,6 +165,27 @@ def test_a_loop_over_fast_states_reads_the_link_itself_until_it_ends(peer: Peer)
             time.sleep(0.01)
 
 
+def test_such_a_loop_pings_between_two_states_and_the_link_does_while_it_is_elsewhere(peer: Peer) -> None:
+    with peer.arm(rate=400.0) as arm:
+        link, here, pings = arm.connection.link, threading.get_ident(), []
+        ping = link.ping
+
+        def noted() -> None:
+            pings.append(threading.get_ident())
+            ping()
+
+        link.ping = noted  # type: ignore[method-assign]
+        states, deadline = arm.states(), time.monotonic() + 20.0
+        while pings.count(here) < 2:
+            next(states)
+            assert time.monotonic() < deadline
+        count = len(pings)
+        while len(pings) < count + 2:  # the loop does something else
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        assert set(pings[count:]) == {link._thread.ident}
+
+
 def test_a_loop_that_was_held_up_keeps_its_connection(peer: Peer) -> None:
     """After a standstill of the process the link's own thread may be the first to look: bytes wait to be read."""
     with peer.arm(rate=200.0) as arm:

@@ -59,6 +59,7 @@ _START_TIMEOUT = 20.0
 _EXITED = (
     "the application called System.exit, which would end the whole JVM of a cabinet: let run() return instead"
 )
+#: Time between two looks for new threads [s]: each may delay a state by 0.2 ms.
 _HOUSEKEEPING = 0.5
 #: Held while an action of the operator is executed and reported.
 _OPERATING = threading.Lock()
