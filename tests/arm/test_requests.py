@@ -106,6 +106,8 @@ class CtrlC:
             raise KeyboardInterrupt
 
 
+# Python ignores what is raised while it calls back because an object has died, and says so.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
     chance, main = random.Random(1), threading.main_thread().ident
     asked, interrupted, over = 0, 0, threading.Event()
