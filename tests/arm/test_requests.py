@@ -106,7 +106,7 @@ class CtrlC:
             raise KeyboardInterrupt
 
 
-# Python ignores what is raised while it calls back because an object has died, and says so.
+# Python ignores what is raised while it calls back because an object has died, and reports it.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
     chance, main = random.Random(1), threading.main_thread().ident
