@@ -215,8 +215,8 @@ def _doc(text: str) -> str:
     return text.replace('"', "'")
 
 
+#: Names of fields, and their annotations with defaults.
 Typed: TypeAlias = list[tuple[str, str]]
-"""Names of fields, and their annotations with defaults."""
 
 
 def typed(spec: Spec, chosen: list[Field]) -> Typed:

@@ -504,7 +504,7 @@ class Connection:
 
     def request(self, message: Message) -> None:
         """Send a request that is only accepted or refused; raises as `Link.request` does."""
-        link = self._link
+        link = self._link  # a property would cost every request a call
         if link is None:
             raise _not_connected()
         try:
