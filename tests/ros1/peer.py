@@ -10,6 +10,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -238,6 +239,27 @@ def _sample(point: JointTrajectoryPoint) -> KinematicState:
     return KinematicState(
         np.array(point.positions), np.array(point.velocities), np.array(point.accelerations or [0.0] * 7)
     )
+
+
+class SimpleClient(actionlib.SimpleActionClient):
+    """actionlib's simple client, which also hears an answer that comes before its own `send_goal` returns.
+
+    actionlib drops such an answer, and waits for ever (https://github.com/ros/actionlib/issues/206).
+    """
+
+    def __init__(self, name: str, action: type) -> None:
+        self._sending = threading.RLock()
+        super().__init__(name, action)
+        assert self.wait_for_server(rospy.Duration.from_sec(PATIENCE))
+
+    def send_goal(self, *args: Any, **kwargs: Any) -> None:
+        """Send a goal; its answers are handled afterwards."""
+        with self._sending:
+            super().send_goal(*args, **kwargs)
+
+    def _handle_transition(self, handle: Any) -> None:
+        with self._sending:
+            super()._handle_transition(handle)
 
 
 def stamp(message: Any) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import actionlib
 import numpy as np
 import pytest
 import rospy
@@ -11,24 +10,20 @@ from geometry_msgs.msg import PoseStamped
 from heptarm_msgs.msg import MoveJointsAction, MoveJointsGoal, MovePoseAction, MovePoseGoal
 
 from tests.conformance.case import rests
-from tests.ros1.peer import Client, collect, fresh, until
+from tests.ros1.peer import Client, SimpleClient, collect, fresh, until
 
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
 LONG = rospy.Duration(60)
 
 
 @pytest.fixture
-def joints(client: Client):
-    one = actionlib.SimpleActionClient("/heptarm/move_joints", MoveJointsAction)
-    assert one.wait_for_server(LONG)
-    return one
+def joints(client: Client) -> SimpleClient:
+    return SimpleClient("/heptarm/move_joints", MoveJointsAction)
 
 
 @pytest.fixture
-def poses(client: Client):
-    one = actionlib.SimpleActionClient("/heptarm/move_pose", MovePoseAction)
-    assert one.wait_for_server(LONG)
-    return one
+def poses(client: Client) -> SimpleClient:
+    return SimpleClient("/heptarm/move_pose", MovePoseAction)
 
 
 def test_a_motion_of_joints_reports_how_far_it_is(client: Client, joints) -> None:
@@ -76,8 +71,7 @@ def test_cancelling_brakes_on_the_path(client: Client, joints) -> None:
 
 def test_another_motion_takes_the_place_and_a_trajectory_too(client: Client, joints) -> None:
     here = rests(client)
-    other = actionlib.SimpleActionClient("/heptarm/move_joints", MoveJointsAction)
-    assert other.wait_for_server(LONG)
+    other = SimpleClient("/heptarm/move_joints", MoveJointsAction)
     joints.send_goal(MoveJointsGoal(joint_names=["A1"], position=[here[0] - 2.0], speed=0.3))
     until(lambda: client.place().dq[0] < -0.1, "the arm does not set out")
     state = other.send_goal_and_wait(MoveJointsGoal(joint_names=["A1"], position=[here[0]]), LONG)

@@ -6,7 +6,6 @@ import re
 import sys
 from collections.abc import Iterator
 
-import actionlib
 import numpy as np
 import pytest
 import rospy
@@ -18,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from heptarm.ros.interface.names import PRESETS
 from tests.conformance import iiwa_stack, names
 from tests.conformance.stage import ROOT, Stage
-from tests.ros1.peer import NodeProcess, active, collect, publisher, until
+from tests.ros1.peer import NodeProcess, SimpleClient, active, collect, publisher, until
 from tests.ros1.test_examples import run
 from tests.ros1.test_surface import Client
 
@@ -93,8 +92,7 @@ def test_a_program_for_iiwa_stack(ros: None, spare: Stage) -> None:
 
 
 def follow(name: str, states: list[JointState]) -> None:
-    client = actionlib.SimpleActionClient(name, FollowJointTrajectoryAction)
-    assert client.wait_for_server(rospy.Duration(60))
+    client = SimpleClient(name, FollowJointTrajectoryAction)
     goal = FollowJointTrajectoryGoal()
     goal.trajectory.joint_names = JOINTS
     there = np.array(states[-1].position) + 0.05
