@@ -14,6 +14,7 @@ from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values import result
 from heptarm.values.condition import collision
+from heptarm.values.io import SignalValue
 from heptarm.values.state import State
 
 
@@ -28,17 +29,19 @@ class EventPublisher:
         self._fri = node.create_publisher(FriStatus, "~/fri/status", latched)
         self._motions = node.create_publisher(MotionEvent, "~/events", 100)
         self._collisions = node.create_publisher(Collision, "~/collisions", 10)
-        self._last_signals: dict[str, float] = {}
+        self._last_signals: dict[str, SignalValue] = {}
         self._last_fri: Mapping[str, Any] = {"text": ""}
 
     def state(self, state: State) -> None:
         """Publish the signals of a state if one has changed."""
         if state.groups.io is None:
             return
-        values = {name: float(value) for name, value in state.groups.io.items()}
+        values = dict(state.groups.io.items())
         if values != self._last_signals:
             self._last_signals = values
-            self._publish(self._signals, Signals(names=list(values), values=list(values.values())))
+            self._publish(
+                self._signals, Signals(names=list(values), values=list(map(float, values.values())))
+            )
 
     def key(self, slot: int, down: bool) -> None:
         """Publish that a key was pressed or released."""

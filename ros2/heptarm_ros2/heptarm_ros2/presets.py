@@ -33,6 +33,8 @@ class PresetPublisher:
     def state(self, state: State) -> None:
         """Publish a state."""
         for entry, publisher in self._publishers:
+            if publisher.get_subscription_count() == 0:
+                continue
             message = preset_message(self._ros, entry, publisher.msg_type, state, self._names)
             if message is not None:
                 publisher.publish(message)

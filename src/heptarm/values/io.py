@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import ItemsView, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -110,6 +110,10 @@ class SignalValues(Mapping[str, SignalValue]):
     def __iter__(self) -> Iterator[str]:
         """Full names."""
         return iter(self._values)
+
+    def items(self) -> ItemsView[str, SignalValue]:
+        """Full names with values."""
+        return self._values.items()
 
     def __len__(self) -> int:
         """Number of signals."""

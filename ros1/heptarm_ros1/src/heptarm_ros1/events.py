@@ -12,6 +12,7 @@ from heptarm.ros.interface.events import collision_message, event_message
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values import result
 from heptarm.values.condition import collision
+from heptarm.values.io import SignalValue
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
 from heptarm_ros1.publishers import publisher
@@ -27,17 +28,17 @@ class EventPublisher:
         self._fri = publisher(FriStatus, "~fri/status", latch=True)
         self._motions = publisher(MotionEvent, "~events")
         self._collisions = publisher(Collision, "~collisions")
-        self._last_signals: dict[str, float] = {}
+        self._last_signals: dict[str, SignalValue] = {}
         self._last_fri: Mapping[str, Any] = {"text": ""}
 
     def state(self, state: State) -> None:
         """Publish the signals of a state if one has changed."""
         if state.groups.io is None:
             return
-        values = {name: float(value) for name, value in state.groups.io.items()}
+        values = dict(state.groups.io.items())
         if values != self._last_signals:
             self._last_signals = values
-            _publish(self._signals, Signals(names=list(values), values=list(values.values())))
+            _publish(self._signals, Signals(names=list(values), values=list(map(float, values.values()))))
 
     def key(self, slot: int, down: bool) -> None:
         """Publish that a key was pressed or released."""

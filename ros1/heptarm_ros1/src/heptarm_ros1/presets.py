@@ -28,6 +28,8 @@ class PresetPublisher:
     def state(self, state: State) -> None:
         """Publish a state."""
         for entry, one in self._publishers:
+            if one.get_num_connections() == 0:
+                continue
             message = preset_message(ROS, entry, one.data_class, state, self._names)
             if message is not None:
                 one.publish(message)

@@ -50,15 +50,15 @@ class StatePublisher:
 
     def state(self, state: State) -> None:
         """Publish a state, and the fraction of its speed at which a trajectory is executed if that has changed."""
-        for name, message in self._messages.states(state, full=self._is_full_wanted):
+        for name, message in self._messages.states(state, self._is_wanted):
             self._states[name].publish(message)
         scaling = speed_scaling(state)
         if scaling != self._last_scaling:
             self._last_scaling = scaling
             self._scaling.publish(Float64(data=scaling))
 
-    def _is_full_wanted(self) -> bool:
-        return self._states["state"].get_num_connections() > 0
+    def _is_wanted(self, topic: str) -> bool:
+        return self._states[topic].get_num_connections() > 0
 
     def controller_state(self, state: State, driver: Driver) -> None:
         """Publish where the trajectory is at the time of the state that was published last, and what the arm does."""
@@ -101,7 +101,8 @@ class TransformPublisher:
 
     def state(self, state: State) -> None:
         """Publish the transforms of a state."""
-        self._tf.publish(self._messages.of(state))
+        if self._tf.get_num_connections() > 0:
+            self._tf.publish(self._messages.of(state))
 
     def destroy(self) -> None:
         """Destroy the publisher."""

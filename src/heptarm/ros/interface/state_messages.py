@@ -105,12 +105,13 @@ class StateMessages:
         self._last: Any = None
         self._stamp = 0
 
-    def states(self, state: State, *, full: Callable[[], bool]) -> Iterator[tuple[str, Any]]:
+    def states(self, state: State, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
         """Make the messages of a state by topic, each stamped with the ROS time at which its group was measured.
 
         Args:
             state: the state.
-            full: whether the topic with the full state is wanted, too; asked when the others are published.
+            wanted: whether anybody subscribes to a topic; asked when those before it are published. The others cost
+                nothing: on a busy processor, a message reaches its subscribers when all messages have been made.
         """
         ros, groups = self._ros, state.groups
         measured = _measured(ros, state, groups.joints)
@@ -118,17 +119,18 @@ class StateMessages:
             measured = max(self._stamp + _STAMP_STEP, measured)
         self._stamp = measured
         stamp = ros.time(self._stamp)
-        yield "joint_states", _stamped(messages.joint_state(ros, state, self._joints), stamp)
-        if state.torques is not None:
+        if wanted("joint_states"):
+            yield "joint_states", _stamped(messages.joint_state(ros, state, self._joints), stamp)
+        if wanted("external_torques") and state.torques is not None:
             external = ros.joint_state(name=list(self._joints), effort=state.tau_ext.tolist())
             yield "external_torques", _stamped(external, self._time_of(groups.torques, state))
-        if groups.pose is not None:
+        if wanted("pose") and groups.pose is not None:
             pose = self._pose_stamped(pose=messages.pose_message(ros, state.pose))
             yield "pose", _stamped(pose, self._time_of(groups.pose, state), self._base)
-        if groups.wrench is not None:
+        if wanted("wrench") and groups.wrench is not None:
             wrench = self._wrench_stamped(wrench=messages.wrench_message(ros, state))
             yield "wrench", _stamped(wrench, self._time_of(groups.wrench, state), self._base)
-        if full():
+        if wanted("state"):
             yield "state", _stamped(self._robot_state(state), stamp, self._base)
 
     def controller_state(self, kind: Any, state: State, sample: TrajectorySample | None) -> Any:

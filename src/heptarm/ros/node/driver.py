@@ -226,10 +226,11 @@ class Driver:
         )
 
     def _on_state(self, state: State) -> None:
-        safety = state.groups.safety
-        if safety is not None and (safety.emergency_stop or safety.protective_stop) and self._execution.goal:
-            # the time of the goal would stand still, and the arm would continue unexpectedly after the stop
-            self._execution.drop(diagnose(state).text)
+        if self._execution.goal:
+            safety = state.groups.safety
+            if safety is not None and (safety.emergency_stop or safety.protective_stop):
+                # the time of the goal would stand still, and the arm would continue unexpectedly after the stop
+                self._execution.drop(diagnose(state).text)
         self._listener.on_state(state)
 
     # ------------------------------------------------------------------------------------ goals
