@@ -17,9 +17,10 @@ anything else, `validate` raises Violation for a field outside its range.
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from dataclasses import dataclass
 from struct import Struct
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from heptarm.wire import codec
 from heptarm.wire.codec import DecodeError
@@ -457,7 +458,14 @@ def _state_layout(spec: Spec) -> list[str]:
         lines += [f'    ("{name}", {1 << number}, (']
         lines += [f'        ("{field}", "{code}", {size}),' for field, code, size in entries]
         lines += ["    )),"]
-    return [*lines, ")", ""]
+    lines += [
+        ")",
+        "",
+        "#: Reads a group of a state at a place in its body; returns it, and the place behind it.",
+        "READ_GROUP: dict[str, Callable[[bytes, int], tuple[Any, int]]] = {",
+    ]
+    lines += [f'    "{name}": {kind}._read,' for name, _, kind in message.groups]
+    return [*lines, "}", ""]
 
 
 def _flat(spec: Spec, chosen: list[Field]) -> list[tuple[str, str, int]] | None:

@@ -16,7 +16,7 @@ from typing import Any
 import rospy
 from sensor_msgs.msg import JointState
 
-from bench.ros.peer import RATE, RATES, Watch, compare, follow, stream
+from bench.ros.peer import DRIFT, RATE, RATES, Watch, compare, follow, stream
 from tests.ros1.peer import Client, Core, NodeProcess, until
 
 
@@ -60,7 +60,9 @@ def states(target: str, cabinet: int) -> dict[str, Any]:
     for rate in RATES:
         node = NodeProcess(target, state_rate=rate)
         until(lambda: rospy.get_published_topics("/heptarm"), "the node is not there")
-        with subprocess.Popen([sys.executable, "-m", "bench.ros.ros1_peer", "publish", str(rate)]) as process:
+        with subprocess.Popen(
+            [sys.executable, "-m", "bench.ros.ros1_peer", "publish", str(rate + DRIFT)]
+        ) as process:
             for one in both:
                 one.restart()
             until(lambda: min(map(len, both)) > rate, "messages come")  # noqa: B023  called at once

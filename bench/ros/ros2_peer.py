@@ -17,7 +17,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-from bench.ros.peer import RATE, RATES, Watch, compare, follow, stream
+from bench.ros.peer import DRIFT, RATE, RATES, Watch, compare, follow, stream
 from tests.ros2.peer import Client, NodeProcess, Ros, stamp, until
 
 
@@ -62,7 +62,9 @@ def states(target: str, cabinet: int) -> dict[str, Any]:
         node = NodeProcess(target, state_rate=rate)
         client.ready()
         ros.forget(0)
-        with subprocess.Popen([sys.executable, "-m", "bench.ros.ros2_peer", "publish", str(rate)]) as process:
+        with subprocess.Popen(
+            [sys.executable, "-m", "bench.ros.ros2_peer", "publish", str(rate + DRIFT)]
+        ) as process:
             for one in both:
                 one.restart()
             until(lambda: min(map(len, both)) > rate, "messages come")  # noqa: B023  called at once

@@ -55,7 +55,7 @@ def _key(value: object) -> object:
 def frozen(values: npt.ArrayLike) -> Array:
     """The values as a read-only array, unchecked; an array of doubles is not copied."""
     result = np.asarray(values, dtype=np.float64)
-    result.flags.writeable = False
+    result.setflags(write=False)
     return result
 
 

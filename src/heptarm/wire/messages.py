@@ -7,9 +7,10 @@ anything else, `validate` raises Violation for a field outside its range.
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from dataclasses import dataclass
 from struct import Struct
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from heptarm.wire import codec
 from heptarm.wire.codec import DecodeError
@@ -6313,3 +6314,15 @@ STATE_LAYOUT: tuple[tuple[str, int, tuple[tuple[str, str, int], ...]], ...] = (
         ("mode", ">u1", 1),
     )),
 )
+
+#: Reads a group of a state at a place in its body; returns it, and the place behind it.
+READ_GROUP: dict[str, Callable[[bytes, int], tuple[Any, int]]] = {
+    "joints": JointState._read,
+    "torques": TorqueState._read,
+    "pose": PoseState._read,
+    "wrench": WrenchState._read,
+    "motion": MotionState._read,
+    "safety": SafetyState._read,
+    "io": IoState._read,
+    "mode": ModeState._read,
+}

@@ -10,7 +10,7 @@ from struct import Struct
 from typing import Any, NamedTuple
 
 from heptarm.wire.codec import DecodeError
-from heptarm.wire.messages import STATE_LAYOUT, Groups, State
+from heptarm.wire.messages import READ_GROUP, STATE_LAYOUT, Groups, State
 
 _MASK = Struct(">H")
 _FIXED = sum(bit for _, bit, _ in STATE_LAYOUT)
@@ -21,35 +21,38 @@ class _Layout(NamedTuple):
     """Where the groups of a mask are in a body.
 
     Attributes:
-        parts: by name of a group with a fixed size: a mask of it alone, its begin and its end.
+        places: of the groups with a fixed size, by their names.
         stamps: time stamps of the groups that have a known place.
         size: of the groups that have a fixed size, with the mask [bytes].
         least: of a body with these groups [bytes].
         rest: mask of the groups behind them; 0: there are none.
+        others: names of these groups.
     """
 
-    parts: dict[str, tuple[bytes, int, int]]
+    places: dict[str, int]
     stamps: Struct
     size: int
     least: int
     rest: int
+    others: frozenset[str]
 
 
 @lru_cache(maxsize=256)
 def _layout(mask: int) -> _Layout:
     if mask & ~_KNOWN:
         raise DecodeError(f"unknown state groups {mask:#x}")
-    parts, stamps, end = {}, ">2x", 2
+    places, stamps, end = {}, ">2x", 2
     for name, bit, fields in STATE_LAYOUT:
         if mask & bit:
             begin = end
             end += sum(int(code[2:]) * count for _, code, count in fields)
-            parts[name] = (_MASK.pack(bit), begin, end)
+            places[name] = begin
             stamps += f"q{end - begin - 8}x"
     rest = mask & ~_FIXED
     is_one = rest > 0 and rest & (rest - 1) == 0
-    places = Struct(stamps + "q" if is_one else stamps)
-    return _Layout(parts, places, end, max(end, places.size), rest)
+    known = Struct(stamps + "q" if is_one else stamps)
+    others = frozenset(name for name in READ_GROUP if rest & Groups[name.upper()])
+    return _Layout(places, known, end, max(end, known.size), rest, others)
 
 
 class StateGroups:
@@ -87,12 +90,11 @@ class StateGroups:
             DecodeError: its bytes are no such message.
         """
         layout = self._layout
-        part = layout.parts.get(name)
-        if part is not None:
-            mask, begin, end = part
-            return getattr(State.decode(mask + self._body[begin:end]), name)
-        if not layout.rest:
+        place = layout.places.get(name)
+        if place is not None:
+            return READ_GROUP[name](self._body, place)[0]
+        if name not in layout.others:
             return None
         if self._rest is None:
             self._rest = State.decode(_MASK.pack(layout.rest) + self._body[layout.size :])
-        return getattr(self._rest, name, None)
+        return getattr(self._rest, name)
