@@ -17,10 +17,11 @@ from bench.measure.blocks import Comparison, placements
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
+from bench.ros.peer import RATE
 
 ROOT = Path(__file__).parents[2]
 #: Required accuracy in time [ms] and position [mrad] at the points of a trajectory, by execution.
-EXECUTIONS = {"servo": (20.0, 2.0), "fri": (5.0, 0.5)}
+EXECUTIONS = {"servo": (20.0, 2.0), "fri": (2.0, 0.5)}
 #: Largest fraction of joint states that are late by more than a period [%].
 LATE = 0.5
 #: Largest latency of a joint state beyond that of a bare topic [ms].
@@ -64,17 +65,19 @@ def _trajectory(ros: str) -> Iterator[Figure]:
             with Noise() as noise:
                 found = _peer(ros, f"trajectory_{execution}", cabinet.target)
             detail = {name: round(value, 6) for name, value in found.items()}
+            # a virtual cabinet that the machine holds up loses time, which no real one does
+            disturbed = noise.is_noisy or found["longest_gap"] > 2.0 / RATE
             name = f"{ros}_{execution}_point"
             yield Figure(
                 f"{name}_moment",
                 found["moment"] * 1e3,
                 "ms",
                 limit=moment,
-                disturbed=noise.is_noisy,
+                disturbed=disturbed,
                 detail=detail,
             )
             yield Figure(
-                f"{name}_distance", found["distance"] * 1e3, "mrad", limit=distance, disturbed=noise.is_noisy
+                f"{name}_distance", found["distance"] * 1e3, "mrad", limit=distance, disturbed=disturbed
             )
             yield Figure(f"{name}_at_its_time", found["at_its_time"] * 1e3, "mrad")
 

@@ -226,6 +226,30 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
     assert np.abs(speeds[-1]).max() < 1e-9
 
 
+def test_over_fri_clocks_that_part_before_a_goal_moves_do_not_delay_it(session: Session, monkeypatch) -> None:
+    """The controller loses 20 ms while the arm waits for the start: that is corrected at once."""
+    runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
+    start = 101.0
+    runner.accept(goal(start=start), now=100.0, state=MeasuredJoints(100.0, HOME, np.zeros(7)))
+    overlay = _FriStream(session, PERIOD)  # type: ignore[arg-type]
+    reference = Stage()
+    reference.accept(goal())
+    begin = reference.now
+    wanted = reference.step().preview
+    lost = 0.02
+    monkeypatch.setattr(overlay, "_between", lambda state: 100.0 + (lost if state.t >= 0.1 else 0.0))
+    done, times = [], []
+    for k in range(300):
+        session.t = k * PERIOD
+        now = overlay.tick()
+        assert now is not None
+        overlay.command(runner.advance(now, MeasuredJoints(now, HOME, np.zeros(7))))
+        done.append(session.commanded())
+        times.append(100.0 + lost + session.t + PERIOD - start)
+    reported = wanted.positions(begin + np.maximum(times, 0.0))
+    assert np.abs(np.array(done) - reported)[100:].max() < 1e-9
+
+
 def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(session: Session, monkeypatch) -> None:
     """The controller loses 20 ms at once: the commands catch up gradually, without a step."""
     runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())

@@ -31,8 +31,8 @@ _log = logging.getLogger("heptarm.ros")
 _AHEAD = 0.5
 #: Least delay of a change [s]: it has to reach the process of the FRI loop first.
 _AHEAD_OF_CONTROLLER = 0.015
-#: Messages used to compare the clocks, and how fast their difference may be corrected [s/s].
-_RECENT, _DRIFT = 400, 5e-4
+#: Messages used to compare the clocks, and how fast their difference may be corrected while the arm moves [s/s].
+_RECENT, _DRIFT = 100, 5e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +101,7 @@ class _FriStream:
         self._ahead = max(_AHEAD_OF_CONTROLLER, 3.0 * period)
         self._newest = 0.0  # controller time of the newest message
         self._until = -1.0  # controller time of the last set-point
+        self._rest: Array | None = None  # the position of all set-points sent last, if they are the same
         self._now = 0.0
         # clock of the execution minus controller time: the offset, the controller time it holds at, and its rate
         self._offset, self._at, self._drift = self._between(session.start), 0.0, 0.0
@@ -127,7 +128,7 @@ class _FriStream:
             self._previous, self._since = last, self._now
         self._preview = preview
         params = self._session.params
-        self._synchronise()
+        self._synchronise(rest=None if is_new else self._rest)
         times: Array = self._newest + self._period * np.arange(float(len(params.q)))
         # the arm reaches a command one period after it was sent
         local = self._local(times) + self._period
@@ -136,20 +137,33 @@ class _FriStream:
             early = local < self._since
             q[early] = self._previous.positions(local[early])
         params.set(begin=self._newest, q=q)
+        self._rest = q[0] if (q == q[0]).all() else None
         self._until = float(times[-1])
 
     def _local(self, t: Any) -> Any:
         """Convert controller time, one or many, to the clock of the execution [s]."""
         return t + self._offset + self._drift * (t - self._at)
 
-    def _synchronise(self) -> None:
-        """Correct the clock offset gradually, so slowly that it violates no limit of an axis."""
+    def _synchronise(self, *, rest: Array | None) -> None:
+        """Correct the clock offset: at once while the arm rests, otherwise so slowly that no axis exceeds its limits.
+
+        Args:
+            rest: where the arm rests, shape (7,) [rad]; None: it moves, or is about to.
+        """
         self._offset, self._at = self._local(self._newest) - self._newest, self._newest
         away = self._between(self._session.state) - self._offset
         self._drift = min(max(away / _AHEAD, -_DRIFT), _DRIFT)
+        if rest is not None and self._preview is not None:
+            corrected = np.array([self._newest + self._offset + away + self._period])
+            if (self._preview.positions(corrected) == rest).all():  # before the correction and after it
+                self._offset, self._drift = self._offset + away, 0.0
 
     def _between(self, state: State) -> float:
-        """Estimate the clock of the execution minus controller time from the least delayed messages [s]."""
-        recent = (one for one in self._session.history(_RECENT) if one.sequence <= state.sequence)
+        """Estimate the clock of the execution minus controller time from the least delayed messages [s].
+
+        Those of before the motion do not count: a virtual cabinet may have lost time when it began.
+        """
+        first = self._session.start.sequence
+        recent = (one for one in self._session.history(_RECENT) if first <= one.sequence <= state.sequence)
         fastest = min(one.received * 1e-9 - (one.sequence - state.sequence) * one.period for one in recent)
         return fastest - state.t
