@@ -67,7 +67,7 @@ _WORD = 0xFFFFFFFF
 
 @dataclass(slots=True)
 class _SentMessage:
-    """A sent message: its time, session state, measured position and interpolator data."""
+    """A sent message: its time and session state; what the client has to mirror, while the session waits for that."""
 
     at: int
     state: m.SessionState
@@ -448,7 +448,10 @@ class Controller:
             signals=tuple(self.exchange.signals.values()),
             requested=self.exchange.requested(stamp),
         )
-        self._asked[number % KEPT] = _SentMessage(now, self.state, message.monitor, message.ipo)
+        waits = self.state is m.SessionState.COMMANDING_WAIT
+        self._asked[number % KEPT] = _SentMessage(  # what is kept without a need is searched for garbage, too
+            now, self.state, message.monitor if waits else None, message.ipo if waits else None
+        )
         if self.state is not m.SessionState.IDLE and number % configuration.multiplier == 0:
             self.meter.asked(number // configuration.multiplier, now)
             self._ready += self.state is m.SessionState.MONITORING_READY

@@ -25,6 +25,7 @@ _OPTIONS = (
     "-Xmx96m",
     "-Xss512k",
     "-XX:+UseSerialGC",
+    "-XX:+DisableExplicitGC",  # JPype asks for full collections when Python has collected: 10 ms without a tick
     "-XX:ReservedCodeCacheSize=32m",
     "-XX:MaxMetaspaceSize=64m",
     "-Xshare:auto",
