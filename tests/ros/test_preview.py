@@ -226,6 +226,16 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
     assert np.abs(speeds[-1]).max() < 1e-9
 
 
+def test_over_fri_a_process_that_was_held_up_compares_the_clocks_by_its_own_message(
+    session: Session, monkeypatch
+) -> None:
+    monkeypatch.setattr(
+        session, "history", lambda size: [Message(session.t + k * PERIOD) for k in range(5, size)]
+    )
+    overlay = _FriStream(session, PERIOD)  # type: ignore[arg-type]
+    assert overlay._between(session.state) == pytest.approx(100.0)  # type: ignore[arg-type]
+
+
 def test_over_fri_clocks_that_part_before_a_goal_moves_do_not_delay_it(session: Session, monkeypatch) -> None:
     """The controller loses 20 ms while the arm waits for the start: that is corrected at once."""
     runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())

@@ -31,8 +31,8 @@ _log = logging.getLogger("heptarm.ros")
 _AHEAD = 0.5
 #: Least delay of a change [s]: it has to reach the process of the FRI loop first.
 _AHEAD_OF_CONTROLLER = 0.015
-#: Messages used to compare the clocks, and how fast their difference may be corrected while the arm moves [s/s].
-_RECENT, _DRIFT = 100, 5e-4
+#: The clocks are compared over this time [s], and their difference is corrected so fast while the arm moves [s/s].
+_RECENT, _DRIFT = 0.5, 5e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +163,8 @@ class _FriStream:
 
         Those of before the motion do not count: a virtual cabinet may have lost time when it began.
         """
-        first = self._session.start.sequence
-        recent = (one for one in self._session.history(_RECENT) if first <= one.sequence <= state.sequence)
-        fastest = min(one.received * 1e-9 - (one.sequence - state.sequence) * one.period for one in recent)
+        first, recent = self._session.start.sequence, self._session.history(round(_RECENT / self._period))
+        # the message itself may be older than those if this process was held up
+        used = (state, *(one for one in recent if first <= one.sequence <= state.sequence))
+        fastest = min(one.received * 1e-9 - (one.sequence - state.sequence) * one.period for one in used)
         return fastest - state.t
