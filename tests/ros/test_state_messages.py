@@ -1,4 +1,4 @@
-"""Messages of a state: only those that somebody wants are made, of groups that are decoded for them alone."""
+"""Messages of a state: only those of topics with a subscriber are made, of groups that are decoded for them alone."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def message(**fields: Any) -> SimpleNamespace:
         (("wrench",), {"joints", "wrench"}),
     ],
 )
-def test_what_nobody_wants_is_not_made(wanted: tuple[str, ...], made: set[str]) -> None:
+def test_what_has_no_subscriber_is_not_made(wanted: tuple[str, ...], made: set[str]) -> None:
     ros: Any = SimpleNamespace(joint_state=message, now=lambda: 10**9, time=lambda stamp: stamp)
     messages = StateMessages(
         ros, NodeConfiguration.of({}), stamped=(message, message), state=message, status=message
