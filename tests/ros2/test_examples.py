@@ -22,10 +22,15 @@ SNIPPETS = [body for kind, body in BLOCK.findall(GUIDE) if kind == "python"]
 
 
 def run(command: list[str]) -> str:
-    """What a program prints. A busy node may send targets too late for the cabinet, which then stops the arm."""
+    """What a program prints. On a busy machine targets or states may come so late that the arm stops."""
+
+    def late(done: object) -> str:
+        if "no target arrived" in str(done):
+            return "servo targets came late"
+        return "states came late" if "the newest state is" in str(done) else ""
+
     done = retry(
-        lambda: subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=ROOT),
-        lambda done: "servo targets came late" if "no target arrived" in str(done) else "",
+        lambda: subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=ROOT), late
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
