@@ -30,7 +30,8 @@ def run(command: list[str]) -> str:
         return "states came late" if "the newest state is" in str(done) else ""
 
     done = retry(
-        lambda: subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=ROOT), late
+        lambda: subprocess.run(command, capture_output=True, text=True, timeout=200, check=False, cwd=ROOT),
+        late,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
