@@ -5,13 +5,14 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from heptarm.ros.interface.state_messages import StateMessages
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.state import Groups, Joints, State, Torques
 
-ZEROS = (0.0,) * 7
+ZEROS = np.zeros(7)
 TOPICS = ("joint_states", "external_torques", "pose", "wrench", "state")
 
 
@@ -25,9 +26,8 @@ class Source:
 
     def make(self, name: str) -> Any:
         self.made.append(name)
-        return {"joints": Joints(1, ZEROS, ZEROS, ZEROS), "torques": Torques(1, ZEROS, ZEROS, ZEROS)}.get(
-            name
-        )  # type: ignore[arg-type]
+        kind = {"joints": Joints, "torques": Torques}.get(name)
+        return None if kind is None else kind(1, ZEROS, ZEROS, ZEROS)
 
 
 def message(**fields: Any) -> SimpleNamespace:

@@ -128,35 +128,40 @@ class _FriStream:
             self._previous, self._since = last, self._now
         self._preview = preview
         params = self._session.params
-        self._synchronise(rest=None if is_new else self._rest)
+        self._synchronise(preview, rest=None if is_new else self._rest)
         times: Array = self._newest + self._period * np.arange(float(len(params.q)))
         # the arm reaches a command one period after it was sent
-        local = self._local(times) + self._period
+        q = self._positions(preview, self._local(times) + self._period)
+        params.set(begin=self._newest, q=q)
+        self._rest = q[0] if (q == q[0]).all() else None
+        self._until = float(times[-1])
+
+    def _positions(self, preview: Preview, local: Array) -> Array:
+        """Evaluate a preview at times on the clock of the execution; before it began, the one that it replaced."""
         q = preview.positions(local)
         if self._previous is not None:
             early = local < self._since
             q[early] = self._previous.positions(local[early])
-        params.set(begin=self._newest, q=q)
-        self._rest = q[0] if (q == q[0]).all() else None
-        self._until = float(times[-1])
+        return q
 
     def _local(self, t: Any) -> Any:
         """Convert controller time, one or many, to the clock of the execution [s]."""
         return t + self._offset + self._drift * (t - self._at)
 
-    def _synchronise(self, *, rest: Array | None) -> None:
+    def _synchronise(self, preview: Preview, *, rest: Array | None) -> None:
         """Correct the clock offset: at once while the arm rests, otherwise so slowly that no axis exceeds its limits.
 
         Args:
+            preview: what the arm follows.
             rest: where the arm rests, shape (7,) [rad]; None: it moves, or is about to.
         """
         self._offset, self._at = self._local(self._newest) - self._newest, self._newest
         away = self._between(self._session.state) - self._offset
         self._drift = min(max(away / _AHEAD, -_DRIFT), _DRIFT)
-        if rest is not None and self._preview is not None:
-            corrected = np.array([self._newest + self._offset + away + self._period])
-            if (self._preview.positions(corrected) == rest).all():  # before the correction and after it
-                self._offset, self._drift = self._offset + away, 0.0
+        corrected = np.array([self._newest + self._offset + away + self._period])
+        # it has to rest before the correction and after it
+        if rest is not None and (self._positions(preview, corrected) == rest).all():
+            self._offset, self._drift = self._offset + away, 0.0
 
     def _between(self, state: State) -> float:
         """Estimate the clock of the execution minus controller time from the least delayed messages [s].
