@@ -112,6 +112,15 @@ def test_who_wakes_late_is_not_shown_the_present_for_the_past(tmp_path: Path) ->
     assert held == 0.0 < released  # longer than states are kept in the shared memory
 
 
+def test_a_state_that_is_computed_ahead_is_read_when_it_is_due(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Foreseeing.java", tmp_path)
+    said = tmp_path / "said.txt"
+    done = _run("sample.Foreseeing", tmp_path, f"sample.file={said}", speed=1.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    ahead, early, woken_early = map(int, said.read_text().split())
+    assert ahead > 0 and early == woken_early == 0
+
+
 def test_queue_listeners_pause_and_an_error_of_the_application(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Queueing.java", tmp_path)
     said, project = tmp_path / "said.txt", tmp_path / "data.xml"

@@ -152,7 +152,7 @@ class SafetyFlags(enum.IntFlag):
 class HeaderWords:
     """Bookkeeping of the shared memory."""
 
-    #: Number of the newest tick
+    #: Number of the newest tick; the plant may write it before the tick is due, readers see it from then on
     NEWEST = 0
     #: Monotonic time at which simulation time was zero [ns]
     ANCHOR = 1

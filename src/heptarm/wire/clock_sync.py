@@ -131,9 +131,11 @@ class ClockOffset:
 
     def to_ours(self, theirs: int) -> int:
         """Convert a time of the cabinet's clock [ns] to ours [ns]; 0 before the first ping."""
-        anchor = self._anchor
         if not self._samples:
             return 0
+        if self._rate == 1.0:
+            return theirs - self._shift
+        anchor = self._anchor
         return round(anchor.ours + (theirs - anchor.theirs) / (self._rate or 1.0))
 
     def age(self, stamp: int, ours: int) -> float:

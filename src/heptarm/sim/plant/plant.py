@@ -203,7 +203,7 @@ class Plant:
         self._take_loads()
         self.tick_count = -1
         self._write(0.0, nan)
-        self.publish()
+        self._publish()
 
     def _views(self) -> None:
         d = self.data
@@ -386,11 +386,11 @@ class Plant:
 
     def tick(self) -> None:
         """Advance by one millisecond: set-point, control law, dynamics, state."""
-        self.compute()
-        self.publish()
+        self._compute()
+        self._publish()
 
-    def compute(self) -> None:
-        """Compute the next tick: set-point, control law, dynamics; `publish` has to follow."""
+    def _compute(self) -> None:
+        """Compute the next tick: set-point, control law, dynamics."""
         if self._changes:
             self._take_loads()
         progress, remaining = self._advance()
@@ -438,14 +438,8 @@ class Plant:
         if watched is not None:
             self._watch(watched)
 
-    def wake(self) -> None:
-        """Wake those that wait for the tick that was computed; they wait until it is published, which follows soon."""
-        time = (self.tick_count + 1) * TICK_NS
-        if self.on_wake is not None and time >= self.shared.header[HeaderWords.WAKE]:
-            self.on_wake(time)
-
-    def publish(self) -> None:
-        """Let readers see the state of the tick that was computed, and wake those that still sleep until it."""
+    def _publish(self) -> None:
+        """Give readers the state of the tick that was computed, and wake those that wait for it; they see it when it is due."""
         self.tick_count = k = self.tick_count + 1
         if self._native is not None:
             is_awaited = self._native.publish(k)
@@ -566,7 +560,7 @@ class Plant:
         return posture(self.robot, self._measured.tolist())[0]
 
     def _write(self, progress: float, remaining: float) -> None:
-        """Write the state after the next tick into its slot; readers see it after `publish`."""
+        """Write the state after the next tick into its slot; readers see it after `_publish`."""
         k, shared, after = self.tick_count + 1, self.shared, self.interpolator.command.after
         given = self._words()
         if self._native is not None:

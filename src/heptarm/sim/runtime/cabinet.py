@@ -202,9 +202,7 @@ class VirtualCabinet:
         self.operator.tick()
         self.sessions.tick()
         self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
-        self.plant.compute()
-        self.loop.wait_until_due(self.plant.wake)
-        self.plant.publish()
+        self.plant.tick()
         self.loop.head_start = HEAD_START if self.plant.interpolator.computes_many_next else 0.0
         if self._trace is not None:
             self._trace.append()

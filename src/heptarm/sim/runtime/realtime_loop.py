@@ -5,8 +5,8 @@ after more than 20 missed ticks it re-bases its schedule and counts that. With a
 `answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
 that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
 A sensor's reading is there at once, a simulated one has to be computed: so a tick whose state somebody waits for begins
-early, by about as long as it takes, and its state is published when it is due, see `RealtimeLoop.wait_until_due`. With
-an FRI session open it begins when it is due, since the answer to the state before is one of its inputs.
+early, by about as long as it takes and as its readers take to wake; they see its state when it is due. With an FRI
+session open it begins when it is due, since the answer to the state before is one of its inputs.
 While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
 every few seconds, in the pause between two ticks.
@@ -47,12 +47,14 @@ SPIN_NS = 60_000
 #: At most this fraction of a period is spun.
 SPIN_FRACTION = 0.1
 #: A tick begins at most this long before it is due, as a fraction of a period.
-EARLIEST = 0.2
+EARLIEST = 0.35
 #: A tick that computes many set-points at once begins so much earlier, as a fraction of a period.
 HEAD_START = 0.5
+#: A tick ends in time if its readers have so long to wake until it is due [ns].
+WAKING_NS = 80_000
 #: After a tick that is late the next one begins so much earlier [ns]; after one in time, by this fraction of what was
 #: left later.
-EARLIER_NS, LATER = 20_000, 1 / 256
+EARLIER_NS, LATER = 20_000, 1 / 1024
 #: No real-time priority above this speed: Linux throttles a loop that never sleeps for 50 ms in each second.
 REAL_TIME_SPEED = 5.0
 #: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that other threads run.
@@ -180,8 +182,7 @@ class RealtimeLoop:
         self._rested = 0
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
-        self._due = self._waited = 0
-        self._early, self._earliest, self._is_early = 0.0, EARLIEST * self._period, False
+        self._early, self._earliest = 0.0, EARLIEST * self._period
         self._speed = speed
         self.answer_gap = self.head_start = 0.0
         self._stop = False
@@ -213,22 +214,6 @@ class RealtimeLoop:
             # otherwise the plant outlives its modules, and the bindings of its libraries report leaks
             gc.enable()
             gc.unfreeze()
-
-    def wait_until_due(self, wake: Callable[[], None]) -> None:
-        """Wait for the moment at which the present tick is due; called between computing a state and publishing it.
-
-        Args:
-            wake: wakes the readers of the state; called if time is left. That takes a while: later ticks begin earlier.
-        """
-        if time.monotonic_ns() < self._due:
-            wake()
-        begin = now = time.monotonic_ns()
-        spare = self._due - begin
-        if self._is_early and self.head_start == 0.0:
-            self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
-        while now < self._due:
-            now = time.monotonic_ns()
-        self._waited = now - begin
 
     def _refuse(self, text: str) -> None:
         if text and text not in self._refused:
@@ -284,12 +269,14 @@ class RealtimeLoop:
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
             # who waits for every tick does so only after the last one's state
-            self._is_early = gap == 0 < period and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
-            early = int(self._early + self.head_start * period) if self._is_early else 0
+            is_early = gap == 0 < period and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
+            head_start = self.head_start
+            early = int(self._early + head_start * period) if is_early else 0
             start = max(due - early, end + gap)
             if now < start:
-                if start - now > spin:
-                    time.sleep((start - now - spin) * 1e-9)
+                exact = 0 if is_early else spin
+                if start - now > exact:
+                    time.sleep((start - now - exact) * 1e-9)
                 while (now := now_ns()) < start:
                     pass
                 if (
@@ -298,14 +285,16 @@ class RealtimeLoop:
                     end, is_second = now, True
                     continue
             begin, is_second = now_ns(), False
-            self._due, self._waited = due, 0
             awaited = awaited + 1 if period > 0 and header[HeaderWords.WAKE] <= moment else 0
             self._tick()
             end = now_ns()
+            if is_early and head_start == 0.0:
+                spare = due - WAKING_NS - end
+                self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
             moment += TICK_NS
             at = self._count % _HISTORY
             self._late[at] = begin - due + early
-            self._cost[at] = end - begin - self._waited
+            self._cost[at] = end - begin
             self._count += 1
             due += period
             if rest is not None and rest.begins():

@@ -2,6 +2,7 @@ package heptarm.core.safety;
 
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
+import java.util.concurrent.locks.LockSupport;
 
 import heptarm.core.Clock;
 import heptarm.core.Log;
@@ -11,6 +12,9 @@ import heptarm.core.Threads;
 public final class Watchdog {
     /** Period of the thread [s]. */
     public static final double PERIOD = 0.01;
+
+    /** Pause after waking [ns]: the states of this moment are sampled and sent first. */
+    private static final long PAUSE_NS = 400000L;
 
     private final Clock clock;
     private final Log log;
@@ -63,6 +67,7 @@ public final class Watchdog {
         try {
             for (int round = 1; !closed; round++) {
                 clock.sleepUntil(clock.nanos() + (long) (PERIOD * 1e9)); // a full period, also after a delay
+                LockSupport.parkNanos(PAUSE_NS);
                 for (Entry one : entries) {
                     if (round % one.rounds == 0) {
                         run(one);

@@ -58,8 +58,14 @@ public final class SharedState {
         LONGS.setRelease(memory, WORD * index, value);
     }
 
-    /** Number of the newest tick. */
+    /** Number of the newest tick that is due: one that is computed ahead counts from that moment on. */
     public long newest() {
+        long tick = computed();
+        return tick > 0 && System.nanoTime() < wallTime(tick) ? tick - 1 : tick;
+    }
+
+    /** Number of the newest tick that is computed; it is the newest one or the next. */
+    public long computed() {
         return word(HeaderWords.START + HeaderWords.NEWEST);
     }
 
@@ -67,13 +73,14 @@ public final class SharedState {
         return word(HeaderWords.START + HeaderWords.ANCHOR);
     }
 
-    /** Length of a tick by the machine's clock [ns]. */
+    /** Length of a tick by the machine's clock [ns]; 0 while ticks follow each other as fast as possible. */
     private long period() {
-        return (long) (Seam.TICK_NS / rate());
+        double rate = rate();
+        return rate > 0.0 ? (long) (Seam.TICK_NS / rate) : 0;
     }
 
     /** The machine's time, see {@link System#nanoTime}, at which a tick is due. */
-    long wallTime(long tick) {
+    public long wallTime(long tick) {
         return anchor() + tick * period();
     }
 
@@ -84,7 +91,7 @@ public final class SharedState {
      * @param late a tick that cannot be due, unless the machine was suspended: then that time is given up
      */
     void repeat(long last, long late) {
-        long tick = newest();
+        long tick = computed();
         long now = System.nanoTime();
         long due = (now - anchor()) / period();
         if (due > late) {

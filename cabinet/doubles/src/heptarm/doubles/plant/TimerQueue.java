@@ -27,9 +27,8 @@ public final class TimerQueue {
 
     /** A state is at most so many ticks old at rest: the clocks of the threads run ahead of it no further than that. */
     private static final int STRIDE = 20;
-    /** How long a thread spins for a tick that is about to be published, and how long it sleeps at a time after that. */
-    private static final long SPIN_NS = 100000L;
-    private static final long PAUSE_NS = 50000L;
+    /** A thread that is awake before its tick is due spins for so long at most [ns]; before that it sleeps. */
+    private static final long SPIN_NS = 300000L;
 
     private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
@@ -54,9 +53,9 @@ public final class TimerQueue {
         long last = latest / Seam.TICK_NS;
         resting = Thread.currentThread();
         try {
-            while (sharedState.newest() < last) {
+            while (sharedState.computed() < last) {
                 boolean changed = roused.get();
-                long next = Math.min(sharedState.newest() + STRIDE, Math.min(last, ticks(earliest)));
+                long next = Math.min(sharedState.computed() + STRIDE, Math.min(last, ticks(earliest)));
                 long left = sharedState.wallTime(next) - System.nanoTime();
                 if (left > 0 && !changed) {
                     LockSupport.parkNanos(this, left);
@@ -66,7 +65,7 @@ public final class TimerQueue {
                 if (changed) {
                     break; // sleepers wait for the next tick, which shows the change
                 }
-                tick(sharedState.newest() * Seam.TICK_NS);
+                tick(sharedState.computed() * Seam.TICK_NS);
             }
         } finally {
             resting = null;
@@ -85,7 +84,7 @@ public final class TimerQueue {
         LockSupport.unpark(resting);
     }
 
-    /** Called by the realtime thread of the plant after a tick, or shortly before that: see {@link #awaitTick}. */
+    /** Called by the realtime thread of the plant when a tick is computed, which may be before it is due: see {@link #awaitDue}. */
     public synchronized void tick(long nanos) {
         Iterator<Sleeper> all = sleepers.iterator();
         while (all.hasNext()) {
@@ -120,7 +119,7 @@ public final class TimerQueue {
             publishNextWakeUp();
         }
         // the tick may have passed before the timer was registered: then no wake-up follows
-        while (!own.awake && sharedState.newest() * Seam.TICK_NS < nanos) {
+        while (!own.awake && sharedState.computed() * Seam.TICK_NS < nanos) {
             LockSupport.park(this);
             if (Thread.interrupted()) {
                 remove(own);
@@ -130,17 +129,17 @@ public final class TimerQueue {
         if (!own.awake) {
             remove(own);
         }
-        awaitTick(nanos);
+        awaitDue(ticks(nanos));
     }
 
-    /** Waits for a tick that is about to be published: the plant wakes the sleepers before, since waking takes a while, too. */
-    private void awaitTick(long nanos) throws InterruptedException {
-        long began = System.nanoTime();
-        while (sharedState.newest() * Seam.TICK_NS < nanos) {
-            if (System.nanoTime() - began < SPIN_NS) {
-                Thread.onSpinWait();
+    /** Waits until a tick that is computed is due: the plant wakes the sleepers before, since waking takes a while, too. */
+    public void awaitDue(long tick) throws InterruptedException {
+        while (sharedState.newest() < tick) {
+            long left = sharedState.wallTime(tick) - System.nanoTime();
+            if (left > SPIN_NS) {
+                LockSupport.parkNanos(this, left - SPIN_NS);
             } else {
-                LockSupport.parkNanos(this, PAUSE_NS); // the plant's thread was interrupted
+                Thread.onSpinWait();
             }
             if (Thread.interrupted()) {
                 throw new InterruptedException();

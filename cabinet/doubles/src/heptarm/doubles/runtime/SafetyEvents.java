@@ -32,9 +32,16 @@ public final class SafetyEvents {
         return OperationMode.valueOf(heptarm.doubles.seam.OperationMode.of(mode).name());
     }
 
-    /** Flags or operation mode have changed; called on the realtime thread of the plant, must not block. */
-    void changed(long newFlags, long newMode) {
-        station.dispatch.execute(() -> dispatch(newFlags, newMode));
+    /** Flags or operation mode have changed in a tick; called on the realtime thread of the plant, must not block. */
+    void changed(long tick, long newFlags, long newMode) {
+        station.dispatch.execute(() -> {
+            try {
+                station.timers.awaitDue(tick); // a listener that reads the state sees the change in it
+            } catch (InterruptedException e) {
+                Thread.currentThread().interrupt(); // the station ends; what listens to a stop is still told
+            }
+            dispatch(newFlags, newMode);
+        });
     }
 
     private void dispatch(long newFlags, long newMode) {

@@ -135,7 +135,7 @@ public final class Station {
 
     /** The safety state has changed; called on the realtime thread of the plant. */
     public void safetyChanged(long flags, long mode) {
-        safetyEvents.changed(flags, mode);
+        safetyEvents.changed(sharedState.computed(), flags, mode);
     }
 
     public void setProcessData(String name, Object value) {

@@ -3,7 +3,7 @@ package heptarm.doubles.seam;
 
 /** Words of a section of the shared memory: Bookkeeping of the shared memory. */
 public final class HeaderWords {
-    /** Number of the newest tick */
+    /** Number of the newest tick; the plant may write it before the tick is due, readers see it from then on */
     public static final int NEWEST = 0;
     /** Monotonic time at which simulation time was zero [ns] */
     public static final int ANCHOR = 1;
