@@ -1,7 +1,7 @@
 """A thousand states per second while the arm moves, beside the bare path of a state: shared memory and TCP.
 
-The client connects for each block: while the floor is measured the cabinet rests, or its ticks would delay the floor by a
-third of a millisecond wherever the two happen to meet.
+The client connects for each block: while the floor is measured the cabinet rests, or its ticks would delay the floor by
+a third of a millisecond wherever the two happen to meet.
 """
 
 from __future__ import annotations

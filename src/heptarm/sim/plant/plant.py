@@ -439,7 +439,7 @@ class Plant:
             self._watch(watched)
 
     def _publish(self) -> None:
-        """Give readers the state of the tick that was computed, and wake those that wait for it; they see it when it is due."""
+        """Give readers the computed state, and wake those that wait for it: they read it when it is due."""
         self.tick_count = k = self.tick_count + 1
         if self._native is not None:
             is_awaited = self._native.publish(k)

@@ -38,7 +38,7 @@ public final class SafetyEvents {
             try {
                 station.timers.awaitDue(tick); // a listener that reads the state sees the change in it
             } catch (InterruptedException e) {
-                Thread.currentThread().interrupt(); // the station ends; what listens to a stop is still told
+                Thread.currentThread().interrupt(); // the station ends; listeners still receive a stop
             }
             dispatch(newFlags, newMode);
         });
