@@ -7,6 +7,7 @@ a third of a millisecond wherever the two happen to meet.
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import socket
 import subprocess
@@ -69,6 +70,7 @@ class States:
                 ha.ptp(ha.deg(-30, 20, -10, -100, -20, 50, -30)),
             )
             arm.start([there, back] * int(2 * seconds + 10))  # closing stops it
+            gc.collect()  # what other connections have left: in the midst of a block that would take 50 ms
             for _ in arm.states(duration=SETTLING):
                 pass
             yield arm

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterable
+
 import pytest
 
 from heptarm.arm.link.state_stream import HISTORY, SampleQueue, StateFeed, States, StateSample
@@ -32,9 +35,44 @@ def streams(
 ENDED: list[HeptarmError | None] = [None]
 
 
+def push(feed: StateFeed, numbers: Iterable[int]) -> None:
+    """One state a millisecond; its bytes are its number."""
+    for number in numbers:
+        feed.push(b"%d" % number, number * 1_000_000)
+
+
 @pytest.fixture(autouse=True)
 def fresh() -> None:
     ENDED[0] = None
+
+
+def test_the_states_of_the_last_30_seconds_are_kept() -> None:
+    feed = StateFeed(StepClock())
+    assert feed.kept() == feed.history() == []
+    push(feed, range(1, 40_001))
+    kept = feed.kept()
+    assert [one.number for one in kept] == list(range(10_000, 40_001))
+    assert all(one.body == b"%d" % one.number and one.received == one.number * 1_000_000 for one in kept)
+    for after, first in ((39_998, 39_999), (10_500, 10_501), (0, 10_000)):
+        queue = feed.open(50_000, after=after)
+        assert queue.take(1)[0].number == first and len(queue.take(50_000)) == 40_000 - first
+        assert queue.lost == max(0, first - after - 1)
+    assert feed.open(10, after=40_000).is_empty
+
+
+def test_states_do_not_bring_about_a_garbage_collection() -> None:
+    feed, generations = StateFeed(StepClock()), list[int]()
+
+    def note(phase: str, info: dict[str, int]) -> None:
+        generations.append(info["generation"])
+
+    gc.collect()
+    gc.callbacks.append(note)
+    try:
+        push(feed, range(1, 20_001))
+    finally:
+        gc.callbacks.remove(note)
+    assert not generations
 
 
 def test_history_is_bounded() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from itertools import count, islice
 from typing import Any, Protocol
 
 import numpy.typing as npt
@@ -59,6 +60,42 @@ _CHECK_INTERVAL = 0.2
 _CLOSING = 1.0
 
 
+class _KeptStates:
+    """The states of the last 30 s, as bytes and integers.
+
+    Python's garbage collector looks at neither, nor do they bring it about. Were each state kept as a tuple, it would
+    run once per 700 states, every 70,000 through all objects of the program, which takes 50 ms and more.
+    """
+
+    __slots__ = ("_bodies", "_last", "_lock", "_received")
+
+    def __init__(self) -> None:
+        self._bodies: deque[bytes] = deque(maxlen=_KEPT)
+        self._received: deque[int] = deque(maxlen=_KEPT)
+        self._last = 0
+        self._lock = threading.Lock()
+
+    def append(self, sample: StateSample) -> None:
+        """Keep a sample; its number follows that of the last one."""
+        number, body, received = sample
+        bodies, times = self._bodies, self._received
+        with self._lock:
+            self._last = number
+            bodies.append(body)
+            times.append(received)
+            while times[0] < received - _KEPT_TIME:
+                bodies.popleft()
+                times.popleft()
+
+    def samples(self, *, after: int) -> list[StateSample]:
+        """Those with a higher number than `after`, oldest first."""
+        with self._lock:
+            last, bodies, times = self._last, list(self._bodies), list(self._received)
+        before = last - len(bodies)  # number of the newest that is not kept any more
+        kept = zip(count(before + 1), bodies, times, strict=False)  # the numbers have no end
+        return [StateSample(*one) for one in islice(kept, max(0, after - before), None)]
+
+
 class StateFeed:
     """Distributes states from the link to waiting threads and open streams.
 
@@ -72,7 +109,7 @@ class StateFeed:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self.newest: StateSample | None = None
-        self._kept: deque[StateSample] = deque(maxlen=_KEPT)
+        self._kept = _KeptStates()
         self._changed = threading.Condition()
         self._waiting = 0
         self._queues: tuple[SampleQueue, ...] = ()
@@ -87,10 +124,7 @@ class StateFeed:
         newest = self.newest
         sample = StateSample(1 if newest is None else newest.number + 1, body, received)
         self.newest = sample
-        kept = self._kept
-        kept.append(sample)
-        while kept[0].received < received - _KEPT_TIME:
-            kept.popleft()
+        self._kept.append(sample)
         for one in self._queues:
             one.put(sample)
         if self._waiting:
@@ -103,17 +137,16 @@ class StateFeed:
 
     def abandon(self) -> None:
         """Drop all states in a fork of the process, and the lock, which another thread may hold."""
-        self.newest, self._queues = None, ()
-        self._kept.clear()
+        self.newest, self._queues, self._kept = None, (), _KeptStates()
         self._changed, self._waiting = threading.Condition(), 0
 
     def history(self) -> list[StateSample]:
         """The last samples, oldest first."""
-        return self.kept()[-HISTORY:]
+        return self._kept.samples(after=self.count - HISTORY)
 
     def kept(self) -> list[StateSample]:
         """The samples of the last 30 s, oldest first."""
-        return list(self._kept)
+        return self._kept.samples(after=0)
 
     def note_gap(self, count: int) -> None:
         """Count states that never arrived as lost by all open streams."""
@@ -147,9 +180,8 @@ class StateFeed:
         with self._changed:
             self._queues = (*self._queues, queue)
         if after is not None:
-            queue.put_before(
-                self.kept(), after=after
-            )  # after the registration, so that none is missed between
+            # after the registration, so that none is missed between
+            queue.put_before(self._kept.samples(after=after), after=after)
         return queue
 
     def close(self, queue: SampleQueue) -> None:
