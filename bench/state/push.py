@@ -33,8 +33,9 @@ SECONDS = float(os.environ.get("BENCH_SECONDS", "60"))
 MANY = max(15, BLOCKS)
 #: Java's optimising compiler is busy for so long with what is called a thousand times a second [s].
 WARM_UP = 12.0
-#: From a client's connection to its first state that counts [s].
-SETTLING = 1.0
+#: From a client's connection to its first state that counts, and from its end until the cabinet rests: the arm brakes,
+#: and half a second later nothing is simulated [s].
+SETTLING, RESTING = 1.0, 1.5
 #: Largest ratio of a state's age to the bare path's, of the median and of the 99th percentile.
 LIMIT = 1.6
 #: Bytes of a state's frame, header included.
@@ -74,6 +75,7 @@ class States:
             for _ in arm.states(duration=SETTLING):
                 pass
             yield arm
+        time.sleep(RESTING)
 
     def _record(self, arm: ha.Arm) -> list[float]:
         stamps: list[int] = []

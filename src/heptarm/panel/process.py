@@ -121,6 +121,7 @@ class Panel:
         self.server = server
         self._arms = tuple(arms)
         self._ended = threading.Event()
+        self._drawing = threading.RLock()
         self._pages: list[ArmPage] = []
         server.gui.configure_theme(
             dark_mode=not options.light, show_logo=False, show_share_button=False, brand_color=(255, 107, 10)
@@ -247,7 +248,9 @@ class Panel:
         period, count = 1.0 / RATE, 0
         due = time.monotonic()
         while not self._ended.is_set():
-            self.draw(count)
+            with self._drawing:
+                if not self._ended.is_set():
+                    self.draw(count)
             count += 1
             due = max(due + period, time.monotonic())
             self._ended.wait(due - time.monotonic())
@@ -258,7 +261,7 @@ class Panel:
         self._box.close()
         for model in self._arms:
             model.close()
-        with contextlib.redirect_stdout(io.StringIO()):
+        with self._drawing, contextlib.redirect_stdout(io.StringIO()):  # a picture belongs to a server that runs
             self.server.stop()
 
 
