@@ -261,7 +261,10 @@ class Panel:
         self._box.close()
         for model in self._arms:
             model.close()
-        with self._drawing, contextlib.redirect_stdout(io.StringIO()):  # a picture belongs to a server that runs
+        with (
+            self._drawing,
+            contextlib.redirect_stdout(io.StringIO()),
+        ):  # a picture belongs to a server that runs
             self.server.stop()
 
 
