@@ -104,10 +104,7 @@ class States:
 def state_push() -> Iterator[Figure]:
     """States at 1 kHz while the arm moves: delivery, order, consistency, and their age beside the bare path's."""
     seconds = SECONDS / MANY
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        Cabinet() as cabinet,
-    ):
+    with tempfile.TemporaryDirectory() as folder, Cabinet() as cabinet:
         program = compiled(Path(__file__).with_name("path.c"), Path(folder))
         states, current = States(cabinet.target, seconds), [frozenset({0})]
 

@@ -67,7 +67,7 @@ public final class Watchdog {
         try {
             for (int round = 1; !closed; round++) {
                 clock.sleepUntil(clock.nanos() + (long) (PERIOD * 1e9)); // a full period, also after a delay
-                LockSupport.parkNanos(PAUSE_NS);
+                LockSupport.parkNanos((long) (PAUSE_NS / clock.rate()));
                 for (Entry one : entries) {
                     if (round % one.rounds == 0) {
                         run(one);
