@@ -14,6 +14,7 @@ import pytest
 from heptarm.io.compiled import SWITCH, Unavailable
 from heptarm.sim.planning.command import Order
 from heptarm.sim.planning.native_inverse import inverse_library
+from heptarm.sim.planning.table import ahead_library
 from heptarm.sim.plant import native
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
@@ -49,10 +50,12 @@ def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
             patched.setenv(SWITCH, "1")
             tick_library.cache_clear()
             inverse_library.cache_clear()
+            ahead_library.cache_clear()
             yield
     finally:
         tick_library.cache_clear()
         inverse_library.cache_clear()
+        ahead_library.cache_clear()
 
 
 @pytest.mark.parametrize("name", PLANT_SCRIPTS)

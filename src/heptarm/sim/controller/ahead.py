@@ -1,67 +1,43 @@
 """Set-points that are computed ahead of their ticks, many at once.
 
-A path in joint space has its set-points as soon as the speed is constant: with full arrays they cost a fraction of what
-they cost one by one. Whatever changes the motion's time or its set-points in between makes them useless: then the
+A motion in joint space has its set-points as soon as the speed is constant: many at once cost a fraction of what they
+cost one by one. Whatever changes the motion's time or its set-points in between makes them useless: then the
 interpolator goes on tick by tick.
 """
 
 from __future__ import annotations
 
-from math import ceil
-
-import numpy as np
-
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.sim.planning.jerk_profile import TimeLaw
-from heptarm.sim.planning.path import JointPath
+from heptarm.sim.planning.table import MotionTable
 from heptarm.values.arrays import Array
-
-#: Largest number of ticks that are computed at once: with this many, most motions need it once.
-MANY = 1024
 
 
 class SetPointsAhead:
     """The next set-points of a motion.
 
     Args:
-        path: joint positions over s.
-        profile: s over time.
+        table: of the motion.
         time: of the motion now [s].
         step: by which it grows in each tick [s].
         command: the set-points so far.
 
     Attributes:
-        step: as given.
-        times: of the motion, beginning with the one given [s].
-        places: s at each of them but the first.
-        joints: set-points at each of them but the first, shape (7,) each [rad].
         last: the newest set-point that was taken.
-        ends: whether the last of them is the last before the end of the motion, or before one that cannot be followed.
+        place: path parameter s there.
     """
 
-    __slots__ = ("_index", "_size", "ends", "joints", "last", "place", "places", "step", "times")
+    __slots__ = ("_index", "_rows", "_size", "_step", "_time", "last", "place")
 
-    def __init__(
-        self, path: JointPath, profile: TimeLaw, time: float, step: float, command: SetPoints
-    ) -> None:
-        self.step, self.last, self._index, self.place = step, command.after, 0, 0.0
-        many = ceil(min(MANY - 1.0, max(0.0, profile.duration - time) / step)) + 1
-        times = np.full(many + 1, step)
-        times[0] = time
-        times = np.cumsum(times)
-        places = np.clip(profile.places(times[1:]), 0.0, 1.0)
-        joints = path.row(places[places < 1.0])
-        joints = joints[: command.followable(joints)]
-        self.joints: list[Array] = list(joints)
-        self._size = len(self.joints)
-        self.ends = self._size < MANY
-        self.times: list[float] = times.tolist()
-        self.places: list[float] = places.tolist()
+    def __init__(self, table: MotionTable, time: float, step: float, command: SetPoints) -> None:
+        self.last, self.place = command.after, 0.0
+        self._step, self._time, self._index = step, time, 0
+        self._rows = table.ahead(time, step, last=command.after, leap=command.largest_step)
+        self._size = len(self._rows.joints)
 
     @property
-    def used_up(self) -> bool:
-        """Whether every set-point was taken."""
-        return self._index >= self._size
+    def is_over(self) -> bool:
+        """Whether every set-point was taken, and no more follow."""
+        return self._index >= self._size and self._rows.is_last
 
     def take(self, time: float, step: float, here: Array) -> float:
         """Take the next set-point, which `last` and `place` then are.
@@ -75,8 +51,9 @@ class SetPointsAhead:
             The time of the motion after this tick; negative: there is no such set-point.
         """
         index = self._index
-        if index >= self._size or here is not self.last or step != self.step or time != self.times[index]:
+        if index >= self._size or here is not self.last or step != self._step or time != self._time:
             return -1.0
-        self.last, self.place = self.joints[index], self.places[index]
-        self._index = index = index + 1
-        return self.times[index]
+        rows = self._rows
+        self.last, self.place, self._time = rows.joints[index], rows.places[index], rows.times[index]
+        self._index = index + 1
+        return self._time

@@ -31,6 +31,7 @@ from heptarm.sim.planning.command import TICK, Order
 from heptarm.sim.planning.jerk_profile import ProfileLimits, TimeLaw, brake
 from heptarm.sim.planning.path import JointLine, JointPath
 from heptarm.sim.planning.plan import Plan
+from heptarm.sim.planning.table import MotionTable
 from heptarm.sim.seam import OperationMode
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode as ControlMode
@@ -56,7 +57,6 @@ class RunningMotion:
         "failure",
         "follower",
         "guided",
-        "is_direct",
         "part",
         "path",
         "place",
@@ -68,6 +68,7 @@ class RunningMotion:
         "step",
         "still",
         "stop",
+        "table",
         "time",
         "watches",
     )
@@ -78,7 +79,7 @@ class RunningMotion:
         self.watches = watches
         self.path: JointPath | None = planned.path
         self.profile: TimeLaw | None = None if planned.timing is None else planned.timing.profile
-        self.is_direct = planned.path is not None and planned.path.is_direct
+        self.table = planned.table
         self.ahead: SetPointsAhead | None = None
         self.step = self.place = 0.0
         self.failure = ""
@@ -239,12 +240,6 @@ class Interpolator:
         return self.command.rests
 
     @property
-    def computes_many_next(self) -> bool:
-        """Whether the next tick computes many set-points at once, see `SetPointsAhead`."""
-        ahead = None if self.run is None else self.run.ahead
-        return ahead is not None and ahead.used_up and not ahead.ends
-
-    @property
     def is_quiet(self) -> bool:
         """Whether nothing runs, nothing waits for the next tick, and no condition is observed."""
         return (
@@ -374,7 +369,7 @@ class Interpolator:
             self.is_overlaid = False
             self._halt(run)
         step = TICK if run.braking else TICK * self._speed_override.factor
-        if run.is_direct and not run.braking and self._follow_ahead(run, step):
+        if run.table is not None and not run.braking and self._follow_ahead(run, run.table, step):
             s = run.place
             return (nan if run.failure else planned.progress(s, run.part)), planned.duration - run.time
         run.time += step
@@ -395,11 +390,12 @@ class Interpolator:
             self._follow_path(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
 
-    def _follow_ahead(self, run: RunningMotion, step: float) -> bool:
+    def _follow_ahead(self, run: RunningMotion, table: MotionTable, step: float) -> bool:
         """Take the next set-point from those that are computed ahead; False: there is none.
 
         Args:
             run: the motion.
+            table: of the motion.
             step: by which its time grows in this tick [s].
         """
         command, ahead = self.command, run.ahead
@@ -408,14 +404,13 @@ class Interpolator:
             if step != run.step or step <= 0.0:  # the speed changes, or the motion pauses
                 run.step, run.ahead = step, None
                 return False
-            if ahead is not None and ahead.ends and ahead.used_up:  # the last ticks are computed one by one
-                run.is_direct = False
+            if ahead is not None and ahead.is_over:  # the last ticks are computed one by one
+                run.table = None
                 return False
-            assert run.path is not None and run.profile is not None
-            run.ahead = ahead = SetPointsAhead(run.path, run.profile, run.time, step, command)
+            run.ahead = ahead = SetPointsAhead(table, run.time, step, command)
             time = ahead.take(run.time, step, command.after)
             if time < 0.0:
-                run.is_direct = False
+                run.table = None
                 return False
         assert ahead is not None
         run.time, run.place, command.after = time, ahead.place, ahead.last

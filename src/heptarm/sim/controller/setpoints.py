@@ -27,9 +27,10 @@ class SetPoints:
         before: of the last tick, shape (7,) [rad].
         now: of this tick.
         after: of the next tick.
+        largest_step: of an axis from one to the next, shape (7,) [rad].
     """
 
-    __slots__ = ("_fastest", "_highest", "_leap", "_lowest", "_small", "after", "before", "now")
+    __slots__ = ("_fastest", "_highest", "_lowest", "_small", "after", "before", "largest_step", "now")
 
     before: Array
     now: Array
@@ -37,8 +38,8 @@ class SetPoints:
 
     def __init__(self, robot: RobotModel, here: Array) -> None:
         self._fastest = robot.dq_max
-        self._leap = OVERSPEED * robot.dq_max * TICK
-        self._small = float(self._leap.min()) ** 2
+        self.largest_step = OVERSPEED * robot.dq_max * TICK
+        self._small = float(self.largest_step.min()) ** 2
         self._lowest, self._highest = robot.q_min - ON_LIMIT, robot.q_max + ON_LIMIT
         self.stay(here)
 
@@ -77,14 +78,8 @@ class SetPoints:
         step = there - self.after
         if float(step @ step) <= self._small:  # the usual case: all axes together stay below each limit
             return None
-        leap = np.abs(step) > self._leap
+        leap = np.abs(step) > self.largest_step
         return int(leap.argmax()) if leap.any() else None
-
-    def followable(self, row: Array) -> int:
-        """How many of the next set-points, shape (n, 7) [rad], `leap` finds nothing in."""
-        steps = np.diff(row, axis=0, prepend=self.after[None])
-        leaps = (np.abs(steps) > self._leap).any(axis=1)
-        return int(leaps.argmax()) if leaps.any() else len(row)
 
     def beyond(self, there: Array) -> int | None:
         """The first axis that a set-point would move beyond its limits, from 0; None: there is none."""

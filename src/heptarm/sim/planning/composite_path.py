@@ -83,7 +83,10 @@ class CompositePath:
 
     Attributes:
         marks: s at which each segment begins, and 1.
+        line: see `JointPath`; it is not asked for one.
     """
+
+    line = None
 
     def __init__(self, segments: list[Segment]) -> None:
         self.segments = segments
@@ -91,16 +94,20 @@ class CompositePath:
         self.total = float(ends[-1])
         self.marks: list[float] = [0.0, *(ends / self.total).tolist()]
         self.marks[-1] = 1.0
-        self.is_direct = all(segment.path.is_direct for segment in segments)
 
-    def row(self, s: Array) -> Array:
-        """See `JointPath`."""
-        indices = np.minimum(np.searchsorted(self.marks, s, side="right"), len(self.segments)) - 1
-        found = np.empty((len(s), 7))
-        for index in np.unique(indices).tolist():
-            chosen, low, high = indices == index, self.marks[index], self.marks[index + 1]
-            found[chosen] = self.segments[index].path.row(np.minimum(1.0, (s[chosen] - low) / (high - low)))
-        return found
+    @property
+    def lines(self) -> Array | None:
+        """The straight lines in joint space that it consists of, shape (n, 16); None: not only of such lines.
+
+        In a row: s at both ends, joint positions at the first one, and their span.
+        """
+        rows = []
+        for segment, ends in zip(self.segments, pairwise(self.marks), strict=True):
+            line = segment.path.line
+            if line is None:
+                return None
+            rows.append((*ends, *line[0], *line[1]))
+        return np.array(rows)
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad].
@@ -116,15 +123,16 @@ class CompositePath:
 class SubPath:
     """The part of a path between two values of its parameter."""
 
-    __slots__ = ("_first", "_path", "_span", "is_direct")
+    __slots__ = ("_first", "_path", "_span")
 
     def __init__(self, path: JointPath, first: float, last: float) -> None:
         self._path, self._first, self._span = path, first, last - first
-        self.is_direct = path.is_direct
 
-    def row(self, s: Array) -> Array:
+    @property
+    def line(self) -> tuple[Array, Array] | None:
         """See `JointPath`."""
-        return self._path.row(self._first + s * self._span)
+        whole = self._path.line
+        return None if whole is None else (whole[0] + self._first * whole[1], self._span * whole[1])
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad]."""
@@ -155,8 +163,9 @@ def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> P
     result, near = PathSamples([], [], []), start
     for segment, span in zip(path.segments, pairwise(path.marks), strict=True):
         fractions = np.linspace(0.0, 1.0, segment.samples)
-        if segment.path.is_direct:
-            joints = segment.path.row(fractions)
+        line = segment.path.line
+        if line is not None:
+            joints = line[0] + fractions[:, None] * line[1]
         else:
             joints = _followed(segment.path, near, fractions, span)
         near = joints[-1]

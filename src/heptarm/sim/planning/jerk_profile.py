@@ -43,24 +43,20 @@ class TimeLaw(Protocol):
     def at(self, time: float) -> tuple[float, float, float]:
         """s, ds/dt, d²s/dt² at a time [s]; constant after the end."""
 
-    def places(self, times: Array) -> Array:
-        """Values of s at the first of ascending times [s], shape (n,), as `at` has them: as many as it has at once."""
+    @property
+    def pieces(self) -> Array | None:
+        """The cubic polynomials that it consists of, shape (n, 5): when each begins [s], and its coefficients.
+
+        They are of s over the time since then, the constant first. None: it does not consist of any.
+        """
 
 
-class _OneByOne:
-    """A profile that has no places at once."""
-
-    __slots__ = ()
-
-    def places(self, times: Array) -> Array:
-        """None."""
-        return times[:0]
-
-
-class ScaledProfile(_OneByOne):
+class ScaledProfile:
     """The remainder of a profile between two times [s], at a fraction of its speed."""
 
     __slots__ = ("_begin", "_profile", "_scale", "duration")
+
+    pieces = None
 
     def __init__(self, profile: TimeLaw, begin: float, end: float, scale: float) -> None:
         self._profile, self._begin, self._scale = profile, begin, scale
@@ -111,18 +107,16 @@ class JerkProfile:
         unit = self._unit
         return position[0] * unit, velocity[0] * unit, acceleration[0] * unit
 
-    def places(self, times: Array) -> Array:
+    @property
+    def pieces(self) -> Array | None:
         """See `TimeLaw`."""
-        pieces = self._trajectory.profiles[0][0]
-        if pieces.brake.duration > 0.0 or pieces.accel.duration > 0.0:  # pieces before the seven
-            return times[:0]
-        ends = np.cumsum(pieces.t)
-        times = times[times < ends[-1]]
-        index = np.searchsorted(ends, times, side="right")
-        since = times - np.concatenate([[0.0], ends])[index]
-        p, v, a, j = (np.array(one)[index] for one in (pieces.p, pieces.v, pieces.a, pieces.j))
-        found: Array = (p + since * (v + since * (a / 2 + since * j / 6))) * self._unit
-        return found
+        found = self._trajectory.profiles[0][0]
+        if found.brake.duration > 0.0 or found.accel.duration > 0.0:  # pieces before the seven
+            return None
+        begins = np.concatenate([[0.0], np.cumsum(found.t)[:-1]])
+        p, v, a, j = (np.array(one)[:7] * self._unit for one in (found.p, found.v, found.a, found.j))
+        pieces: Array = np.stack([begins, p, v, a / 2, j / 6], axis=1)
+        return pieces
 
 
 def _parameters(state: tuple[float, float, float], limits: ProfileLimits) -> InputParameter:

@@ -22,11 +22,8 @@ class JointPath(Protocol):
     """Joint positions over s."""
 
     @property
-    def is_direct(self) -> bool:
-        """Whether joint positions follow from s alone, so that there is a `row` of them."""
-
-    def row(self, s: Array) -> Array:
-        """Joint positions at values of s, shape (n,), as `at` computes them; shape (n, 7) [rad]."""
+    def line(self) -> tuple[Array, Array] | None:
+        """Joint positions at s = 0 and their span up to s = 1, shape (7,) each [rad]; None: it is no straight line."""
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad].
@@ -39,20 +36,17 @@ class JointPath(Protocol):
 class JointLine:
     """Straight line in joint space."""
 
-    __slots__ = ("_span", "_start")
+    __slots__ = ("line",)
 
-    is_direct = True
+    line: tuple[Array, Array]
 
     def __init__(self, start: Array, end: Array) -> None:
-        self._start, self._span = start, end - start
-
-    def row(self, s: Array) -> Array:
-        """See `JointPath`."""
-        return self._start + s[:, None] * self._span
+        self.line = (start, end - start)
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions, shape (7,) [rad]; `near` is not used."""
-        return self._start + s * self._span
+        start, span = self.line
+        return start + s * span
 
 
 class TcpInverseKinematics:
@@ -112,11 +106,7 @@ class Sequential:
 
     __slots__ = ()
 
-    is_direct = False
-
-    def row(self, s: Array) -> Array:
-        """There is none."""
-        raise NotImplementedError
+    line = None
 
 
 class CartesianPath(Sequential):

@@ -12,6 +12,7 @@ import numpy as np
 from heptarm.sim.planning.command import Order
 from heptarm.sim.planning.composite_path import CompositePath, constraints, sample
 from heptarm.sim.planning.path import JointPath, PathLengths
+from heptarm.sim.planning.table import MotionTable
 from heptarm.sim.planning.targets import check_limits
 from heptarm.sim.planning.time_scaling import PathTiming
 from heptarm.values.arrays import Array
@@ -33,6 +34,7 @@ class Plan:
         timing: s over time, and stops on the path; None: it follows no path.
         lengths: distances of the tool frame along the path; None: it follows no path.
         marks: s at which the parts of a batch or a spline begin, without the first.
+        table: computes many set-points at once; None: they have to be computed one by one.
     """
 
     order: Order
@@ -42,6 +44,7 @@ class Plan:
     timing: PathTiming | None = None
     lengths: PathLengths | None = None
     marks: tuple[float, ...] = ()
+    table: MotionTable | None = None
 
     @property
     def duration(self) -> float:
@@ -98,4 +101,5 @@ def timed(
         np.linspace(low, high, len(q)) for q, (low, high) in zip(samples.q, pairwise(path.marks), strict=True)
     ]
     lengths = PathLengths.through(np.concatenate(fractions), np.concatenate(samples.positions))
-    return Plan(order, start, samples.q[-1][-1], path, timing, lengths, tuple(marks))
+    table = MotionTable.of(path, timing.profile)
+    return Plan(order, start, samples.q[-1][-1], path, timing, lengths, tuple(marks), table)

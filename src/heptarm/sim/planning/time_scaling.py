@@ -135,17 +135,14 @@ class TabulatedProfile:
         place = self._place[index] + self._step * k * (v + 0.5 * k * (w - v))
         return place, v + k * (w - v), a + k * (b - a)
 
-    def places(self, times: Array) -> Array:
+    @property
+    def pieces(self) -> Array | None:
         """See `TimeLaw`."""
-        low, high = int(times[0] / self._step), int(times[-1] / self._step) + 2
-        place, speed = np.array(self._place[low:high]), np.array(self._speed[low:high])
-        steps = times / self._step
-        index = steps.astype(np.int64)
-        index = index[index < len(self._place) - 1] - low
-        k = steps[: len(index)] - (index + low)
-        v, w = speed[index], speed[index + 1]
-        found: Array = place[index] + self._step * k * (v + 0.5 * k * (w - v))
-        return found
+        count = len(self._place) - 1
+        pieces = np.zeros((count, 5))
+        pieces[:, 0], pieces[:, 1] = np.arange(count) * self._step, self._place[:-1]
+        pieces[:, 2], pieces[:, 3] = self._speed[:-1], np.diff(self._speed) / (2 * self._step)
+        return pieces
 
 
 class ProfileSequence:
@@ -165,12 +162,16 @@ class ProfileSequence:
                 return profile.at(time - begin)
         return self._profiles[-1].at(self._profiles[-1].duration)
 
-    def places(self, times: Array) -> Array:
+    @property
+    def pieces(self) -> Array | None:
         """See `TimeLaw`."""
-        for begin, end, profile in zip(self._begins, self._begins[1:], self._profiles, strict=False):
-            if times[0] < end:
-                return profile.places(times[times < end] - begin)
-        return times[:0]
+        found = []
+        for begin, profile in zip(self._begins, self._profiles, strict=False):
+            pieces = profile.pieces
+            if pieces is None:
+                return None
+            found.append(pieces + (begin, 0.0, 0.0, 0.0, 0.0))
+        return np.concatenate(found)
 
     def next_rest(self, time: float) -> float:
         """Time of the first rest after a time [s]."""

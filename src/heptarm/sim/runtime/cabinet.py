@@ -39,7 +39,6 @@ from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import LONGEST_WAIT, SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import (
     ANSWER_GAP,
-    HEAD_START,
     RealtimeLoop,
     batch_scheduled,
     share_memory_pools,
@@ -51,8 +50,9 @@ from heptarm.values.simulator_options import RealTime, SimulatorOptions, flag
 log = logging.getLogger("heptarm.sim")
 
 #: Java threads that get a real-time priority below the loop's where that is allowed: beginnings of their names, and the
-#: priorities. The watchdog wakes with the sampler every few states, and would delay each of these.
-REAL_TIME_THREADS = {"ha-sampler": 11, "ha-writer": 10, "ha-watchdog": 10}
+#: priorities. The watchdog wakes with the sampler every few states, and would delay each of these. While the JVM's own
+#: thread collects garbage, all others wait for it.
+REAL_TIME_THREADS = {"VM Thread": 12, "ha-sampler": 11, "ha-writer": 10, "ha-watchdog": 10}
 
 _PORT_PROPERTY = "heptarm.port.bound"
 _START_TIMEOUT = 20.0
@@ -203,7 +203,6 @@ class VirtualCabinet:
         self.sessions.tick()
         self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
         self.plant.tick()
-        self.loop.head_start = HEAD_START if self.plant.interpolator.computes_many_next else 0.0
         if self._trace is not None:
             self._trace.append()
         if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:
