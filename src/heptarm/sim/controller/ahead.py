@@ -8,17 +8,14 @@ interpolator goes on tick by tick.
 from __future__ import annotations
 
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.sim.planning.table import MotionTable
+from heptarm.sim.planning.table import MotionTable, SetPointRows
 from heptarm.values.arrays import Array
 
 
 class SetPointsAhead:
-    """The next set-points of a motion.
+    """The next set-points of whichever motion runs.
 
     Args:
-        table: of the motion.
-        time: of the motion now [s].
-        step: by which it grows in each tick [s].
         command: the set-points so far.
 
     Attributes:
@@ -26,23 +23,40 @@ class SetPointsAhead:
         place: path parameter s there.
     """
 
-    __slots__ = ("_index", "_rows", "_size", "_step", "_time", "last", "place")
+    __slots__ = ("_index", "_rows", "_size", "_step", "_table", "_time", "last", "place")
 
-    def __init__(self, table: MotionTable, time: float, step: float, command: SetPoints) -> None:
-        self.last, self.place = command.after, 0.0
-        self._step, self._time, self._index = step, time, 0
-        self._rows = table.ahead(time, step, last=command.after, leap=command.largest_step)
-        self._size = len(self._rows.joints)
+    def __init__(self, command: SetPoints) -> None:
+        self._rows = SetPointRows(command.largest_step)
+        self._table: MotionTable | None = None
+        self._index = self._size = 0
+        self._step = self._time = self.place = 0.0
+        self.last = command.after
 
-    @property
-    def is_over(self) -> bool:
-        """Whether every set-point was taken, and no more follow."""
-        return self._index >= self._size and self._rows.is_last
+    def drop(self) -> None:
+        """Forget those that were not taken."""
+        self._table = None
 
-    def take(self, time: float, step: float, here: Array) -> float:
+    def compute(self, table: MotionTable, time: float, step: float, here: Array) -> None:
+        """Compute the next ones.
+
+        Args:
+            table: of the motion.
+            time: of the motion now [s].
+            step: by which it grows in each tick [s].
+            here: the set-point so far, shape (7,) [rad].
+        """
+        self._size, self._index = self._rows.compute(table, time, step, here), 0
+        self._table, self._step, self._time, self.last = table, step, time, here
+
+    def are_over(self, table: MotionTable) -> bool:
+        """Whether every set-point of a motion was taken, and no more follow."""
+        return table is self._table and self._index >= self._size and self._rows.is_last
+
+    def take(self, table: MotionTable, time: float, step: float, here: Array) -> float:
         """Take the next set-point, which `last` and `place` then are.
 
         Args:
+            table: of the motion.
             time: of the motion before this tick [s].
             step: by which it grows in this tick [s].
             here: the set-point so far, shape (7,) [rad].
@@ -51,7 +65,13 @@ class SetPointsAhead:
             The time of the motion after this tick; negative: there is no such set-point.
         """
         index = self._index
-        if index >= self._size or here is not self.last or step != self._step or time != self._time:
+        if (
+            table is not self._table
+            or index >= self._size
+            or here is not self.last
+            or step != self._step
+            or time != self._time
+        ):
             return -1.0
         rows = self._rows
         self.last, self.place, self._time = rows.joints[index], rows.places[index], rows.times[index]

@@ -49,7 +49,6 @@ class RunningMotion:
     """
 
     __slots__ = (
-        "ahead",
         "braking",
         "broken",
         "cancelled",
@@ -80,7 +79,6 @@ class RunningMotion:
         self.path: JointPath | None = planned.path
         self.profile: TimeLaw | None = None if planned.timing is None else planned.timing.profile
         self.table = planned.table
-        self.ahead: SetPointsAhead | None = None
         self.step = self.place = 0.0
         self.failure = ""
         self.part = 0
@@ -213,6 +211,7 @@ class Interpolator:
         self._control, self._safety = control, safety
         self._q, self._dq = sensed.q, sensed.dq
         self.command = SetPoints(robot, self._q)
+        self._ahead = SetPointsAhead(self.command)
         self.queue = MotionQueue(robot, self._rest)
         self.condition_monitor = ConditionMonitor(robot, inputs.signals)
         self._speed_override = SpeedOverride(robot)
@@ -398,21 +397,19 @@ class Interpolator:
             table: of the motion.
             step: by which its time grows in this tick [s].
         """
-        command, ahead = self.command, run.ahead
-        time = -1.0 if ahead is None else ahead.take(run.time, step, command.after)
+        command, ahead = self.command, self._ahead
+        time = ahead.take(table, run.time, step, command.after)
         if time < 0.0:
             if step != run.step or step <= 0.0:  # the speed changes, or the motion pauses
-                run.step, run.ahead = step, None
+                run.step = step
+                ahead.drop()
                 return False
-            if ahead is not None and ahead.is_over:  # the last ticks are computed one by one
+            if not ahead.are_over(table):
+                ahead.compute(table, run.time, step, command.after)
+                time = ahead.take(table, run.time, step, command.after)
+            if time < 0.0:  # the last ticks are computed one by one
                 run.table = None
                 return False
-            run.ahead = ahead = SetPointsAhead(table, run.time, step, command)
-            time = ahead.take(run.time, step, command.after)
-            if time < 0.0:
-                run.table = None
-                return False
-        assert ahead is not None
         run.time, run.place, command.after = time, ahead.place, ahead.last
         self._reach(run, ahead.place)
         return True

@@ -1,14 +1,14 @@
 """Set-points of a motion in joint space, many at once.
 
 Its path consists of straight lines and its profile of cubic polynomials, so that set-points need no more than the
-numbers of both.
+numbers of both. C computes them; without a compiler, numpy does with full arrays.
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
-from dataclasses import dataclass
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from heptarm.values.arrays import Array
 MANY, MANY_IN_PYTHON = 64, 1024
 _AXES = 7
 _SOURCE = Path(__file__).with_name("ahead.c")
-_REAL, _POINTER, _INT = ctypes.c_double, ctypes.c_void_p, ctypes.c_int
+_WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 
 @functools.cache
@@ -32,26 +32,33 @@ def ahead_library() -> ctypes.CDLL | None:
         made = compiled_library("ahead", _SOURCE.read_bytes(), holds_gil=True)
     except Unavailable:
         return None
-    made.ha_ahead.argtypes = (_POINTER, _INT, _POINTER, _INT, *([_REAL] * 3), _INT, *([_POINTER] * 5))
-    made.ha_ahead.restype = _INT
+    made.ha_ahead.argtypes, made.ha_ahead.restype = (_POINTER, _POINTER, _REAL, _REAL), _WORD
     return made
 
 
-@dataclass(frozen=True, slots=True)
-class SetPointRows:
-    """Set-points of ticks one after the other.
+class _Table(ctypes.Structure):
+    """`struct table` of ahead.c."""
 
-    Attributes:
-        times: of the motion at each of them [s].
-        places: path parameter s at each of them.
-        joints: joint positions at each of them, shape (7,) [rad].
-        is_last: whether the next set-point is the end of the motion, or one that an axis cannot follow.
-    """
+    _fields_ = (
+        ("pieces", _POINTER),
+        ("lines", _POINTER),
+        ("piece_count", _WORD),
+        ("line_count", _WORD),
+        ("end", _REAL),
+    )
 
-    times: list[float]
-    places: list[float]
-    joints: list[Array]
-    is_last: bool
+
+class _Ahead(ctypes.Structure):
+    """`struct ahead` of ahead.c."""
+
+    _fields_ = (
+        ("last", _POINTER),
+        ("leap", _POINTER),
+        ("times", _POINTER),
+        ("places", _POINTER),
+        ("joints", _POINTER),
+        ("most", _WORD),
+    )
 
 
 class MotionTable:
@@ -61,14 +68,20 @@ class MotionTable:
         pieces: of the profile, see `TimeLaw.pieces`.
         lines: of the path, see `CompositePath.lines`.
         duration: of the profile [s].
+
+    Attributes:
+        address: of the same for C.
     """
 
-    __slots__ = ("_at", "_duration", "_library", "_lines", "_pieces")
+    __slots__ = ("_memory", "address", "duration", "lines", "pieces")
 
     def __init__(self, pieces: Array, lines: Array, duration: float) -> None:
-        self._pieces, self._lines = np.ascontiguousarray(pieces), np.ascontiguousarray(lines)
-        self._duration, self._library = duration, ahead_library()
-        self._at = (self._pieces.ctypes.data, len(pieces), self._lines.ctypes.data, len(lines), duration)
+        self.pieces, self.lines = np.ascontiguousarray(pieces), np.ascontiguousarray(lines)
+        self.duration = duration
+        self._memory = _Table(
+            self.pieces.ctypes.data, self.lines.ctypes.data, len(pieces), len(lines), duration
+        )
+        self.address = ctypes.addressof(self._memory)
 
     @classmethod
     def of(cls, path: CompositePath, profile: TimeLaw) -> MotionTable | None:
@@ -77,37 +90,72 @@ class MotionTable:
         pieces = None if lines is None else profile.pieces
         return None if lines is None or pieces is None else cls(pieces, lines, profile.duration)
 
-    def ahead(self, time: float, step: float, *, last: Array, leap: Array) -> SetPointRows:
-        """The next set-points.
+
+class SetPointRows:
+    """Set-points of ticks one after the other; computed in place, since a tick has cold caches.
+
+    Args:
+        leap: largest change of an axis in a tick, shape (7,) [rad].
+
+    Attributes:
+        most: how many are computed at once.
+        times: of the motion at each of them [s].
+        places: path parameter s at each of them.
+        joints: joint positions, shape (n, 7) [rad]; other arrays each time.
+        is_last: whether the next set-point is the end of the motion, or one that an axis cannot follow.
+    """
+
+    __slots__ = (
+        "_address",
+        "_last",
+        "_leap",
+        "_library",
+        "_memory",
+        "_written",
+        "is_last",
+        "joints",
+        "most",
+        "places",
+        "times",
+    )
+
+    def __init__(self, leap: Array) -> None:
+        self._library = ahead_library()
+        self.most = MANY_IN_PYTHON if self._library is None else MANY
+        self.times, self.places = array("d", bytes(8 * self.most)), array("d", bytes(8 * self.most))
+        self._leap, self._last, self._written = leap.copy(), np.zeros(_AXES), np.zeros((self.most, _AXES))
+        self.joints, self.is_last = self._written, False
+        self._memory = _Ahead(
+            self._last.ctypes.data,
+            self._leap.ctypes.data,
+            self.times.buffer_info()[0],
+            self.places.buffer_info()[0],
+            self._written.ctypes.data,
+            self.most,
+        )
+        self._address = ctypes.addressof(self._memory)
+
+    def compute(self, table: MotionTable, time: float, step: float, last: Array) -> int:
+        """Compute the next set-points; returns how many they are.
 
         Args:
+            table: of the motion.
             time: of the motion at the last one [s].
             step: by which it grows in each tick [s].
             last: the last one, shape (7,) [rad].
-            leap: largest change of an axis in a tick, shape (7,) [rad].
         """
+        self._last[:] = last
         if self._library is None:
-            return self._in_python(time, step, last, leap)
-        times, joints = np.empty((2, MANY)), np.empty((MANY, _AXES))
-        at = times.ctypes.data
-        count = self._library.ha_ahead(
-            *self._at,
-            time,
-            step,
-            MANY,
-            leap.ctypes.data,
-            last.ctypes.data,
-            at,
-            at + 8 * MANY,
-            joints.ctypes.data,
-        )
-        passed, places = times[:, :count].tolist()
-        return SetPointRows(passed, places, list(joints[:count]), count < MANY)
+            count = self._in_python(table, time, step)
+        else:
+            count = self._library.ha_ahead(table.address, self._address, time, step)
+        self.joints, self.is_last = self._written.copy(), count < self.most
+        return count
 
-    def _in_python(self, time: float, step: float, last: Array, leap: Array) -> SetPointRows:
-        pieces, lines = self._pieces, self._lines
-        times = np.cumsum(np.concatenate([[time], np.full(MANY_IN_PYTHON, step)]))[1:]
-        times = times[times < self._duration]
+    def _in_python(self, table: MotionTable, time: float, step: float) -> int:
+        pieces, lines = table.pieces, table.lines
+        times = np.cumsum(np.concatenate([[time], np.full(self.most, step)]))[1:]
+        times = times[times < table.duration]
         at = np.maximum(0, np.searchsorted(pieces[:, 0], times, side="right") - 1)
         since, (_, a, b, c, d) = times - pieces[at, 0], pieces[at].T
         places = np.maximum(a + since * (b + since * (c + since * d)), 0.0)
@@ -116,11 +164,11 @@ class MotionTable:
         low, high = lines[at, 0], lines[at, 1]
         part = np.minimum(1.0, (places - low) / (high - low))
         joints = lines[at, 2 : 2 + _AXES] + part[:, None] * lines[at, 2 + _AXES :]
-        leaps = np.abs(np.diff(joints, axis=0, prepend=last[None])) > leap
+        leaps = np.abs(np.diff(joints, axis=0, prepend=self._last[None])) > self._leap
         count = _first(leaps.any(axis=1))
-        return SetPointRows(
-            times[:count].tolist(), places[:count].tolist(), list(joints[:count]), count < MANY_IN_PYTHON
-        )
+        self.times[:count], self.places[:count] = array("d", times[:count]), array("d", places[:count])
+        self._written[:count] = joints[:count]
+        return count
 
 
 def _first(found: Array) -> int:
