@@ -118,6 +118,10 @@ class Comparison:
             "others": round(max(one.others for one in self.noise), 2),
             "stolen": round(max(one.stolen for one in self.noise), 2),
         }
+        if any(one.stalled for one in self.noise):
+            facts["stalled"] = [round(one.stalled, 4) for one in self.noise]
+        # where the machine by itself makes more late than the percentile leaves out, it decides
+        rare = 1.0 - percentile / 100.0
         return Figure(
             f"{name}_{self.placement.name}",
             float(np.median(values)),
@@ -125,7 +129,9 @@ class Comparison:
             limit=limit,
             reference=float(np.median(floors)),
             ratios=tuple((values / floors).tolist()),
-            noisy=tuple(k for k, one in enumerate(self.noise) if one.is_noisy or high[k]),
+            noisy=tuple(
+                k for k, one in enumerate(self.noise) if one.is_noisy or high[k] or one.stalled > rare
+            ),
             detail=facts | (detail or {}),
         )
 
@@ -138,6 +144,7 @@ def by_turns(
     where: Sequence[Placement] | None = None,
     blocks: int = BLOCKS,
     warm_up: int = 1,
+    stalled: Callable[[], float] | None = None,
 ) -> list[Comparison]:
     """Measure a quantity and its floor by turns, in blocks, under each placement.
 
@@ -148,6 +155,7 @@ def by_turns(
         where: placements; every one unless given.
         blocks: of each placement.
         warm_up: blocks before them that do not count.
+        stalled: measures before each block how often the machine by itself is late, see `stalls.stalled`.
     """
     found = [Comparison(placement) for placement in where or placements()]
     with placed():
@@ -155,7 +163,8 @@ def by_turns(
             for one in found:
                 pin(os.getpid(), one.placement.near)
                 place(one.placement)
-                with Noise() as noise:
+                by_itself = 0.0 if stalled is None else stalled()
+                with Noise(stalled=by_itself) as noise:
                     if number % 2:  # the order alternates, so that a drift affects both sides equally
                         values, floors = value(), floor()
                     else:

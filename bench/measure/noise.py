@@ -19,11 +19,13 @@ class Noise:
     Attributes:
         others: processors that processes other than those measured took.
         stolen: processors that the machine's host kept to itself.
+        stalled: fraction of milliseconds in which the machine did not run a thread, by itself; see `stalls.stalled`.
         measured: processes that belong to the measurement, with their descendants, besides this one.
     """
 
     others: float = 0.0
     stolen: float = 0.0
+    stalled: float = 0.0
     measured: tuple[int, ...] = ()
 
     def __enter__(self) -> Noise:

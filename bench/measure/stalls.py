@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
+import os
 import subprocess
 import tempfile
+import time
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 
@@ -14,21 +18,39 @@ from bench.measure.compiler import compiled
 
 #: Shorter stalls are not recorded [s].
 SHORTEST = 0.5e-3
+#: A wake-up that is so much later than another counts for `stalled` [s], which watches for so long [s].
+LATE, WATCH = 0.1e-3, 0.5
+
+
+def stalled() -> float:
+    """Fraction of the milliseconds in which this machine wakes a bare real-time thread late, beside nothing else."""
+    with Stalls(LATE) as stalls:
+        time.sleep(WATCH)
+    return len(stalls.lengths) / (os.sysconf("SC_NPROCESSORS_ONLN") * WATCH * 1e3)
+
+
+@cache
+def _program() -> Path:
+    """Compile the program once."""
+    folder = tempfile.TemporaryDirectory()
+    atexit.register(folder.cleanup)
+    return compiled(Path(__file__).with_name("stalls.c"), Path(folder.name))
 
 
 class Stalls:
     """Watches for stalls in a `with` block.
+
+    Args:
+        shortest: that is recorded [s].
 
     Attributes:
         starts: when a processor should have run on, shape (n,) [ns of the monotonic clock].
         lengths: for how long it did not, shape (n,) [s]; both are complete after the block.
     """
 
-    def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory()
-        program = compiled(Path(__file__).with_name("stalls.c"), Path(self._folder.name))
+    def __init__(self, shortest: float = SHORTEST) -> None:
         self._process = subprocess.Popen(
-            [str(program), str(round(SHORTEST * 1e6))],
+            [str(_program()), str(round(shortest * 1e6))],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -65,4 +87,3 @@ class Stalls:
         numbers = np.array([line.split() for line in output.splitlines()], dtype=np.int64).reshape(-1, 2)
         numbers = numbers[np.argsort(numbers[:, 0])]
         self.starts, self.lengths = numbers[:, 0], numbers[:, 1] * 1e-9
-        self._folder.cleanup()

@@ -23,6 +23,7 @@ from bench.measure.blocks import BLOCKS, Placement, by_turns, pin
 from bench.measure.cabinet import Cabinet
 from bench.measure.compiler import compiled
 from bench.measure.figure import Figure, benchmark
+from bench.measure.stalls import stalled
 from heptarm.model.kinematics import forward
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS
@@ -116,7 +117,11 @@ def state_push() -> Iterator[Figure]:
             for _ in arm.states(duration=WARM_UP):
                 pass
         found = by_turns(
-            states.block, lambda: bare(program, round(seconds * 1000), current[0]), place, blocks=MANY
+            states.block,
+            lambda: bare(program, round(seconds * 1000), current[0]),
+            place,
+            blocks=MANY,
+            stalled=stalled,
         )
         stats = cabinet.stats()
     noisy = any(one.is_noisy for comparison in found for one in comparison.noise)

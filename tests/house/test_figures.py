@@ -80,6 +80,15 @@ def test_a_stalled_machine_excuses_a_missed_limit_and_nothing_else() -> None:
     assert Figure("lost", 0.0, "count", limit=0, disturbed=True).ok is True
 
 
+def test_a_machine_that_is_late_by_itself_decides_nothing_about_what_is_as_rare() -> None:
+    found = blocks.Comparison(blocks.Placement("here", frozenset(), frozenset()))
+    for stalled in (0.001, 0.02, 0.03, 0.04, 0.009):
+        found.add([3.0, 4.0], [1.0, 1.0], Noise(stalled=stalled))
+    p99 = found.figure("age_p99", 99, "us", limit=1.6)
+    assert p99.noisy == (1, 2, 3) and p99.ok is None
+    assert found.figure("age", 50, "us", limit=1.6).ok is False
+
+
 @pytest.mark.parametrize(
     ("noisy", "error", "ok"),
     [

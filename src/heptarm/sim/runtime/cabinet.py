@@ -59,12 +59,14 @@ _START_TIMEOUT = 20.0
 _EXITED = (
     "the application called System.exit, which would end the whole JVM of a cabinet: let run() return instead"
 )
-#: Time between two looks for new threads [s]: each may delay a state by 0.2 ms.
+#: Time between two looks at the number of threads [s].
 _HOUSEKEEPING = 0.5
 #: Held while an action of the operator is executed and reported.
 _OPERATING = threading.Lock()
 #: So often a thread's name is read: it may have none yet at first.
 _LOOKS = 3
+#: Every so often threads are looked for though their number is the same.
+_SELDOM = 10
 #: Ticks between two updates of the file of positions.
 _POSITIONS_EVERY = 30
 
@@ -275,11 +277,13 @@ class _Priorities:
         self._loop = loop
         self._promoted: dict[int, int] = {}  # and the policies that they had
         self._looks: dict[str, int] = {}
+        self._threads = self._left = self._updates = 0
 
     def update(self) -> None:
         """Promote new threads, every client adds some; or demote those that were promoted."""
         if sys.platform == "linux" and self._loop.is_real_time:
-            # to read all names each time would delay one state in a hundred by a millisecond
+            if not self._is_due():
+                return
             looks = {task: self._looks.get(task, 0) + 1 for task in os.listdir("/proc/self/task")}
             for task in [task for task, count in looks.items() if count <= _LOOKS]:
                 with contextlib.suppress(OSError):  # it has ended, or is refused, which the statistics report
@@ -289,11 +293,20 @@ class _Priorities:
                             self._promote(int(task), priority)
             self._looks = looks
         elif self._promoted:
-            self._looks = {}
+            self._looks, self._threads = {}, 0
             for number, policy in self._promoted.items():
                 with contextlib.suppress(OSError):  # it has ended
                     os.sched_setscheduler(number, policy, os.sched_param(0))
             self._promoted = {}
+
+    def _is_due(self) -> bool:
+        """Whether to look for new threads: to list them takes 0.2 ms, in which a state would be late."""
+        threads = os.stat("/proc/self/task").st_nlink  # changes with their number
+        if threads != self._threads:
+            self._threads, self._left = threads, _LOOKS
+        self._updates += 1
+        self._left -= 1
+        return self._left >= 0 or self._updates % _SELDOM == 0  # one may have ended when another began
 
     def _promote(self, number: int, priority: int) -> None:
         policy = os.sched_getscheduler(number)

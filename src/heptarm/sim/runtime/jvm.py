@@ -49,7 +49,7 @@ _QUICK = "-XX:TieredStopAtLevel=1"
 _OPTIMISED = ("-Xms72m", "-Xmn64m", "-Xmx144m")
 #: What the threads of the JVM's compilers are called, and how much less they are served than others ("nice"): otherwise
 #: the one or the other runs for half a millisecond between a state that is sent and the client that it has woken.
-_COMPILERS, _NICE = ("C1 Compiler", "C2 Compiler"), 10
+_COMPILERS, _NICE = ("C1 Compiler", "C2 Compiler"), 19
 
 #: What a program written for the cabinet takes for granted, whatever this machine's settings are. What it prints
 #: arrives at this machine's terminal, hence the other charset there.
