@@ -27,8 +27,11 @@ public final class TimerQueue {
 
     /** A state is at most so many ticks old at rest: the clocks of the threads run ahead of it no further than that. */
     private static final int STRIDE = 20;
-    /** A thread that is awake before its tick is due spins for so long at most [ns]; before that it sleeps. */
-    private static final long SPIN_NS = 300000L;
+    /**
+     * A thread that is awake before its tick is due spins for so long at most [ns]; before that it sleeps. To wake takes 40 us; to
+     * spin longer takes time from others on its processor, and has more of it taken by the host of a virtual machine.
+     */
+    private static final long SPIN_NS = 100000L;
 
     private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
