@@ -1,4 +1,4 @@
-/* Set-points of a motion, many at once: what `SetPointsAhead` computes in Python, which is the reference. */
+/* Set-points of a motion, many at once: what `SetPointRows` computes in Python, which is the reference. */
 #include <math.h>
 #include <stdint.h>
 
