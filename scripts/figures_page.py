@@ -39,8 +39,8 @@ stand beside it.
 
 A block is noisy when other processes or the host take more than a tenth of a core, or when its floor is half as high
 again as usual. The age of states is also noisy where the machine by itself, beside nothing else, wakes a bare real-time
-thread late in more milliseconds than the percentile leaves out: one in a hundred for the 99th. Noisy blocks count, and
-are counted. `ok` is `null`, *undecided*, if most blocks are noisy or their
+thread late more often than the percentile leaves out: once in a hundred times for the 99th. Noisy blocks count, and are
+counted. `ok` is `null`, *undecided*, if most blocks are noisy or their
 middle half lies on both sides of the limit; `BENCH_BLOCKS=15` settles more. Counts and bounds have no floor: if the
 machine was disturbed while such a limit was missed, it is undecided, too.
 """

@@ -19,7 +19,7 @@ class Noise:
     Attributes:
         others: processors that processes other than those measured took.
         stolen: processors that the machine's host kept to itself.
-        stalled: fraction of milliseconds in which the machine did not run a thread, by itself; see `stalls.stalled`.
+        stalled: fraction of wake-ups for which the machine by itself is late, see `stalls.stalled`.
         measured: processes that belong to the measurement, with their descendants, besides this one.
     """
 

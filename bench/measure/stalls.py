@@ -18,15 +18,17 @@ from bench.measure.compiler import compiled
 
 #: Shorter stalls are not recorded [s].
 SHORTEST = 0.5e-3
-#: A wake-up that is so much later than another counts for `stalled` [s], which watches for so long [s].
+#: A wake-up that is so late counts for `stalled` [s], which watches for so long [s].
 LATE, WATCH = 0.1e-3, 0.5
+#: Time between two wake-ups of the program [s].
+STEP = 0.5e-3
 
 
 def stalled() -> float:
-    """Fraction of the milliseconds in which this machine wakes a bare real-time thread late, beside nothing else."""
+    """Fraction of the wake-ups of a bare real-time thread that are late on this machine, beside nothing else."""
     with Stalls(LATE) as stalls:
         time.sleep(WATCH)
-    return len(stalls.lengths) / (os.sysconf("SC_NPROCESSORS_ONLN") * WATCH * 1e3)
+    return len(stalls.lengths) * STEP / (os.sysconf("SC_NPROCESSORS_ONLN") * WATCH)
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import threading
@@ -163,6 +164,43 @@ def test_a_tick_that_somebody_waits_for_begins_and_ends_before_it_is_due() -> No
 def test_a_tick_that_nobody_waits_for_begins_when_it_is_due() -> None:
     earliest, in_time = _early(NEVER)
     assert earliest >= 0 and not in_time
+
+
+_COLLECTIONS = """
+import gc
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.runtime import realtime_loop
+from heptarm.sim.seam import HeaderWords
+realtime_loop.COLLECT_EVERY, realtime_loop.COLLECT_LATEST = 10_000_000, 20_000_000
+shared, found = SharedState(), []
+def tick():
+    shared.header[HeaderWords.NEWEST] += 1
+    number = int(shared.header[HeaderWords.NEWEST])
+    if number == 1:
+        gc.callbacks.append(lambda phase, facts: found.append(facts["generation"]))
+    if number == 400:
+        loop.stop()
+        gc.callbacks.clear()
+class Rest:
+    is_due = True
+    def begins(self):
+        return self.is_due and shared.header[HeaderWords.NEWEST] >= 200
+    def pass_time(self):
+        shared.header[HeaderWords.NEWEST] += 20
+        realtime_loop.time.sleep(0.02)
+        self.is_due = shared.header[HeaderWords.NEWEST] < 280
+        return not self.is_due
+loop = realtime_loop.RealtimeLoop(shared, tick, rest=Rest())
+loop.run()
+print("".join(map(str, found)))
+"""
+
+
+def test_all_objects_are_collected_while_the_robot_rests() -> None:
+    command = [sys.executable, "-c", _COLLECTIONS]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    moving, resting, moving_again = (set(one) for one in re.split("(2+)", done.stdout.strip()))
+    assert (moving, resting, moving_again) == ({"1"}, {"2"}, {"1"})
 
 
 def test_a_plant_needs_no_jvm() -> None:

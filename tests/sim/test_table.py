@@ -12,6 +12,7 @@ from heptarm.sim.planning.command import TICK, Order
 from heptarm.sim.planning.plan import Plan
 from heptarm.sim.planning.planner import plan
 from heptarm.sim.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
+from heptarm.sim.planning.time_scaling import TabulatedProfile
 from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
 from tests.sim.driving import READY
@@ -66,6 +67,14 @@ def test_they_are_those_of_the_path_and_its_profile(name: str, factor: float, la
     assert np.abs(places - np.clip([profile.at(time)[0] for time in times], 0.0, 1.0)).max() < 1e-14
     assert np.abs(joints - [planned.path.at(place, START) for place in places]).max() < 1e-14
     assert set(counts[:-1]) <= {MANY if language == "C" else MANY_IN_PYTHON}
+
+
+def test_a_profile_of_samples_consists_of_pieces() -> None:
+    profile = TabulatedProfile(TICK, np.sin(np.linspace(0.0, np.pi, 200)) ** 2, 0.2, 1.0)
+    pieces, times = profile.pieces, np.linspace(0.0, profile.duration, 777)[:-1]
+    at = np.searchsorted(pieces[:, 0], times, side="right") - 1
+    found = [np.polyval(pieces[k, :0:-1], time - pieces[k, 0]) for k, time in zip(at, times, strict=True)]
+    assert found == pytest.approx([profile.at(time)[0] for time in times], abs=1e-12)
 
 
 def test_the_first_that_an_axis_cannot_follow_is_none_of_them() -> None:

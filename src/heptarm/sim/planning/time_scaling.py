@@ -136,7 +136,7 @@ class TabulatedProfile:
         return place, v + k * (w - v), a + k * (b - a)
 
     @property
-    def pieces(self) -> Array | None:
+    def pieces(self) -> Array:
         """See `TimeLaw`."""
         count = len(self._place) - 1
         pieces = np.zeros((count, 5))

@@ -232,9 +232,9 @@ class RealtimeLoop:
                 f"real-time priority not requested: speed must be in (0, {REAL_TIME_SPEED:g}], got {self._speed:g}"
             )
 
-    def _pass_rest(self, rest: RestingPlant) -> None:
-        """Let the time pass while the plant rests."""
-        header, collected, over = self._shared.header, time.monotonic_ns(), False
+    def _pass_rest(self, rest: RestingPlant, collected: int) -> int:
+        """Let the time pass while the plant rests; takes and returns when all objects were collected last [ns]."""
+        header, over = self._shared.header, False
         while not (over or self._stop):
             newest, anchor = int(header[HeaderWords.NEWEST]), int(header[HeaderWords.ANCHOR])
             over = rest.pass_time()
@@ -244,6 +244,7 @@ class RealtimeLoop:
             if now - collected > COLLECT_EVERY:
                 gc.collect()
                 collected = now
+        return collected
 
     def _loop(self) -> None:
         self._shared.reals[HeaderWords.RATE] = self._speed
@@ -298,8 +299,8 @@ class RealtimeLoop:
             self._count += 1
             due += period
             if rest is not None and rest.begins():
-                self._pass_rest(rest)
-                end = now_ns()
+                all_collected = self._pass_rest(rest, all_collected)
+                end, collected = now_ns(), max(collected, all_collected)
                 done = int(header[HeaderWords.NEWEST])
                 due = int(header[HeaderWords.ANCHOR]) + (done + 1) * period
                 moment = (done + 1) * TICK_NS
