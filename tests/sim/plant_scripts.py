@@ -100,6 +100,8 @@ PLANT_SCRIPTS = {
     ),
     "pause": PlantScript({3: submit("lin"), 300: Plant.pause, 700: Plant.resume}),
     "stop on the path": PlantScript({3: submit("circ"), 400: Plant.stop}),
+    "pause of a joint motion": PlantScript({3: submit("ptp"), 300: Plant.pause, 700: Plant.resume}),
+    "stop of a joint motion": PlantScript({3: submit("ptp"), 400: Plant.stop}),
     "fast stop, and another motion": PlantScript(
         {3: submit("ptp"), 400: Plant.stop_fast, 700: submit("ptp", id=2, joints=READY)}
     ),

@@ -177,6 +177,18 @@ class ControllerInputs(Protocol):
         """The newest servo target; None: no new one."""
 
 
+class ForeseenTicks(Protocol):
+    """Ticks that needed no more than the table of the running motion."""
+
+    @property
+    def points(self) -> Array:
+        """Set-points of the last, this and the next tick, shape (3, 7) [rad]."""
+
+    @property
+    def where(self) -> tuple[float, float]:
+        """Time [s] and path parameter of the motion."""
+
+
 class Interpolator:
     """Computes the set-points of a plant.
 
@@ -191,11 +203,11 @@ class Interpolator:
     Attributes:
         queue: waiting commands.
         condition_monitor: evaluates the conditions.
-        command: the set-points.
         run: the command that is being executed; None: nothing runs.
         is_paused: come to rest on the path, keeping all commands.
         action: command of an FRI overlay for the next tick.
         is_overlaid: whether the last set-point was an overlay's.
+        passed: has computed the ticks since the last `advance`, which were foreseen; None: there was none.
     """
 
     def __init__(
@@ -210,8 +222,8 @@ class Interpolator:
         self._robot, self._inputs, self._load = robot, inputs, load
         self._control, self._safety = control, safety
         self._q, self._dq = sensed.q, sensed.dq
-        self.command = SetPoints(robot, self._q)
-        self._ahead = SetPointsAhead(self.command)
+        self._command = SetPoints(robot, self._q)
+        self._ahead = SetPointsAhead(self._command)
         self.queue = MotionQueue(robot, self._rest)
         self.condition_monitor = ConditionMonitor(robot, inputs.signals)
         self._speed_override = SpeedOverride(robot)
@@ -222,6 +234,7 @@ class Interpolator:
         self.is_paused = False
         self.action: Superposition | None = None
         self.is_overlaid = False
+        self.passed: ForeseenTicks | None = None
 
     @property
     def order(self) -> int:
@@ -248,7 +261,7 @@ class Interpolator:
         )
 
     def _rest(self) -> Array:
-        return self.command.after.copy()
+        return self._command.after.copy()
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
         """Change the parameters of the running command's control mode, from any thread; see `Plant.change_mode`."""
@@ -270,6 +283,7 @@ class Interpolator:
 
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
+        self.catch_up()
         while (cancellation := self.queue.cancelled()) is not None:
             self._cancel(cancellation)
         while self._aborts:
@@ -289,8 +303,8 @@ class Interpolator:
         if run is None:
             run = None if self._safety.latched else self._next()
             if run is None and self._control.stiffen():
-                self.command.stay(self._q)
-        self.command.shift()
+                self._command.stay(self._q)
+        self._command.shift()
         if run is None:
             return 0.0, nan
         if not run.started:
@@ -301,17 +315,74 @@ class Interpolator:
             self._stop_at_limit(run, self._control.violation)
         return self._follow(run)
 
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether something has happened since the last tick that the next one has to look at."""
+        return bool(
+            self._aborts
+            or self._changes
+            or self.queue.is_interrupted
+            or self.condition_monitor.is_busy
+            or self.is_paused
+            or self._safety.latched
+            or self._safety.manual * self._inputs.override != self._speed_override.factor
+        )
+
+    @property
+    def is_foreseen(self) -> bool:
+        """Whether the table of the running motion alone decides about the next set-points, unless it `is_disturbed`.
+
+        Such ticks need no `advance`, until the table ends or the next part of the motion begins: see `passed`.
+        """
+        run = self.run
+        return not (
+            run is None
+            or run.table is None
+            or not run.started
+            or run.ended
+            or run.braking
+            or run.cancelled
+            or run.failure
+            or run.watches
+            or self.is_overlaid
+            or self._safety.mode is _T1
+            or self._control.violation
+            or not self._speed_override.rests_at(self._goal)
+            or self.is_disturbed
+        )
+
+    @property
+    def step(self) -> float:
+        """By how much the time of a motion grows in a tick [s]."""
+        return TICK * self._speed_override.factor
+
+    @property
+    def command(self) -> SetPoints:
+        """The set-points; for the thread of the ticks."""
+        self.catch_up()
+        return self._command
+
+    def catch_up(self) -> None:
+        """Go on behind the ticks that `passed` has computed."""
+        passed, run = self.passed, self.run
+        if passed is None or run is None:
+            return
+        self.passed = None
+        command = self._command
+        command.before, command.now, command.after = passed.points
+        run.time, run.place = passed.where
+
     def _next(self) -> RunningMotion | None:
         while (accepted := self.queue.take()) is not None:
             order = accepted.order
             if self._control.take(order):
-                self.command.stay(self._q)
-            planned = self.queue.planned(accepted, self.command.after)
+                self._command.stay(self._q)
+            planned = self.queue.planned(accepted, self._command.after)
             if planned is None:
                 continue
             self.run = run = RunningMotion(planned, accepted.serial, self.condition_monitor.begin(planned))
             if order.is_servo:
-                run.follower = follower(self._robot, order, self.command.after)
+                run.follower = follower(self._robot, order, self._command.after)
             if order.guide is not None:
                 run.guided = self._guided(order, order.guide)
             return run
@@ -334,16 +405,21 @@ class Interpolator:
 
     def _advance_override(self) -> None:
         """Advance the speed override by one tick: overrides, pauses, stops, operation mode."""
-        safety = self._safety
-        held = self.is_paused or safety.latched
-        goal = 0.0 if held else safety.manual * min(1.0, max(0.0, self._inputs.override))
+        safety, goal = self._safety, self._goal
         if safety.mode is _T1 and self.run is not None:
             tcp = self.run.plan.order.tcp[:3]
             self._speed_override.advance(
-                goal, self.command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp
+                goal, self._command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp
             )
         else:
-            self._speed_override.advance(goal, self.command, halts=safety.latched)
+            self._speed_override.advance(goal, self._command, halts=safety.latched)
+
+    @property
+    def _goal(self) -> float:
+        """Speed that override, smartPAD, pauses and stops ask for, 0 to 1."""
+        safety = self._safety
+        held = self.is_paused or safety.latched
+        return 0.0 if held else safety.manual * min(1.0, max(0.0, self._inputs.override))
 
     def _follow(self, run: RunningMotion) -> tuple[float, float]:
         planned = run.plan
@@ -362,7 +438,7 @@ class Interpolator:
             return self._follow_targets(run, run.follower)
         if self.action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
             self.is_overlaid = True
-            self.command.after = self.action.q
+            self._command.after = self.action.q
             return 0.0, nan
         if self.is_overlaid:
             self.is_overlaid = False
@@ -384,7 +460,7 @@ class Interpolator:
         self._reach(run, s)
         # at the very end take the planned joints: the path itself may end a rounding error beside them
         if s == 1.0 and run.path is planned.path:
-            self.command.after = planned.end
+            self._command.after = planned.end
         else:
             self._follow_path(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
@@ -397,7 +473,7 @@ class Interpolator:
             table: of the motion.
             step: by which its time grows in this tick [s].
         """
-        command, ahead = self.command, self._ahead
+        command, ahead = self._command, self._ahead
         time = ahead.take(table, run.time, step, command.after)
         if time < 0.0:
             if step != run.step or step <= 0.0:  # the speed changes, or the motion pauses
@@ -426,7 +502,7 @@ class Interpolator:
         """Set the next set-point from the path; one that an axis could not follow ends the motion."""
         assert run.path is not None
         try:
-            there = run.path.at(s, self.command.after)
+            there = run.path.at(s, self._command.after)
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return
@@ -434,11 +510,11 @@ class Interpolator:
 
     def _set(self, run: RunningMotion, there: Array) -> None:
         """Set the next set-point; one that an axis could not follow ends the motion."""
-        axis = self.command.leap(there)
+        axis = self._command.leap(there)
         if axis is not None and not run.failure:
             self._fail(run, f"Command Velocity violates limit A{axis + 1} (singularity)")
             return
-        self.command.after = there
+        self._command.after = there
 
     def _settle(self, run: RunningMotion) -> tuple[float, float]:
         if self._control.stays and not run.cancelled and not run.failure:
@@ -448,7 +524,7 @@ class Interpolator:
         at_rest = run.still > 0 and (
             not self._control.is_stiff
             or run.still > STILL_TICKS
-            or float(np.abs(self._q - self.command.after).max()) <= SETTLED
+            or float(np.abs(self._q - self._command.after).max()) <= SETTLED
         )
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
@@ -466,7 +542,7 @@ class Interpolator:
         if run.guided is not None:
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
-        run.halt(self.command.after, self.command.speed, hardest)
+        run.halt(self._command.after, self._command.speed, hardest)
 
     def _cancel(self, cancellation: Cancellation) -> None:
         """Execute a cancellation."""
@@ -513,7 +589,7 @@ class Interpolator:
         elif safety.guides and not (safety.latched or self.is_paused or guided.law.is_frozen):
             guided.has_begun, guided.rest = True, None
             self._control.follow_hand(guided.law)
-            self.command.after = self._q + self._dq * TICK
+            self._command.after = self._q + self._dq * TICK
         elif guided.has_begun:
             self._set(run, self._stopped(guided).advance(TICK))
 
@@ -544,7 +620,7 @@ class Interpolator:
             self._fail(run, f"the path is not reachable: {error.text}")
             return nan, nan
         run.ended = follower.is_still if run.braking else follower.resting > order.servo_timing.goal_timeout
-        axis = self.command.beyond(there)
+        axis = self._command.beyond(there)
         if axis is not None:
             self._fail(run, f"Command Position violates limit A{axis + 1}")
         else:
@@ -556,11 +632,11 @@ class Interpolator:
         if run.stop is None:
             if run.braking or not self._safety.latched:
                 return False
-            run.stop = AxisStop(self._robot, self.command.after, self.command.speed, jerk=FAST_JERK)
+            run.stop = AxisStop(self._robot, self._command.after, self._command.speed, jerk=FAST_JERK)
             self._speed_override.rest()
         elif run.stop.is_over and (run.cancelled or not self._safety.latched):
             run.stop, run.ended = None, run.cancelled
-            follower.restart(self.command.after)
+            follower.restart(self._command.after)
             return run.ended
         self._set(run, run.stop.advance())
         return True
@@ -568,6 +644,6 @@ class Interpolator:
     def _stop_at_limit(self, run: RunningMotion, text: str) -> None:
         """A limit of the control mode is exceeded: switch to position control and brake from the measured velocity."""
         self._control.stiffen()
-        self.command.continue_from(self._q, self._dq)
+        self._command.continue_from(self._q, self._dq)
         run.settling = 0
         self._fail(run, text)

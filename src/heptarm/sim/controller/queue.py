@@ -77,6 +77,11 @@ class MotionQueue:
         """Whether it is idle and the next tick has no cancellation to execute."""
         return self._open == 0 and not self._cancels
 
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether the next tick has a cancellation to execute."""
+        return bool(self._cancels)
+
     def submit(self, order: Order) -> None:
         """Plan a command from the end of the queue and append it.
 

@@ -50,6 +50,14 @@ class SpeedOverride:
         """Whether motion time does not advance."""
         return self.scale == 0.0 and self.factor == 0.0
 
+    def rests_at(self, factor: float) -> bool:
+        """Whether this was the factor for two ticks, so that `advance` to it without a ceiling changes nothing."""
+        return (
+            self._slew is None
+            and factor == self._goal == self._free == self.factor == self.scale == self._before
+            and self.rate == 0.0
+        )
+
     def advance(
         self,
         goal: float,

@@ -1,4 +1,4 @@
-/* Set-points of a motion, many at once: what `SetPointRows` computes in Python, which is the reference. */
+/* Set-points of a motion: what `SetPointRows` computes in Python, which is the reference. */
 #include <math.h>
 #include <stdint.h>
 
@@ -12,6 +12,45 @@ struct table {
     double end;
 };
 
+/* Where a motion is: its time, s there, and the piece and the line that they are in. */
+struct cursor {
+    double time, place;
+    int64_t piece, line;
+};
+
+/* Puts a cursor at a time before all lines; s is not known there. */
+static void ha_put(const struct table *t, struct cursor *c, double time) {
+    int64_t low = 0, high = t->piece_count - 1;
+    while (low < high) { /* the last piece that begins before it */
+        int64_t middle = (low + high + 1) / 2;
+        if (t->pieces[middle * PIECE] <= time) low = middle;
+        else high = middle - 1;
+    }
+    c->time = time, c->place = 0.0, c->piece = low, c->line = 0;
+}
+
+/* Moves a cursor on, and gives the set-point there. Returns 0 at the end of the profile or of the path, and where an axis cannot
+   follow: `leap` is how far it comes from `last` in a tick. */
+static int64_t ha_next(const struct table *t, struct cursor *c, double step, const double *last, const double *leap, double *there) {
+    double time = c->time += step;
+    if (time >= t->end) return 0;
+    while (c->piece < t->piece_count - 1 && time >= t->pieces[(c->piece + 1) * PIECE]) c->piece++;
+    const double *piece = t->pieces + c->piece * PIECE;
+    double since = time - piece[0], s = piece[1] + since * (piece[2] + since * (piece[3] + since * piece[4]));
+    if (s < 0.0) s = 0.0;
+    if (s >= 1.0) return 0;
+    while (c->line < t->line_count - 1 && s >= t->lines[(c->line + 1) * LINE]) c->line++;
+    const double *line = t->lines + c->line * LINE;
+    double part = (s - line[0]) / (line[1] - line[0]);
+    if (part > 1.0) part = 1.0;
+    c->place = s;
+    for (int i = 0; i < AXES; i++) {
+        there[i] = line[2 + i] + part * line[2 + AXES + i];
+        if (fabs(there[i] - last[i]) > leap[i]) return 0;
+    }
+    return 1;
+}
+
 /* The last set-point and how far an axis can follow in a tick; what is computed. */
 struct ahead {
     const double *last, *leap;
@@ -19,32 +58,15 @@ struct ahead {
     int64_t most;
 };
 
-/* Fills in the ticks after a time and returns how many they are: at most `most`, none at the end of the profile or of the path,
-   and none from the first on that leaps further than an axis can follow. */
+/* Fills in the ticks after a time, at most `most`, until one has no set-point; returns how many they are. */
 int64_t ha_ahead(const struct table *t, const struct ahead *a, double time, double step) {
-    int64_t low = 0, high = t->piece_count - 1, count = 0;
-    while (low < high) { /* the last piece that begins before the first tick */
-        int64_t middle = (low + high + 1) / 2;
-        if (t->pieces[middle * PIECE] <= time) low = middle;
-        else high = middle - 1;
+    struct cursor at;
+    const double *last = a->last;
+    ha_put(t, &at, time);
+    for (int64_t count = 0; count < a->most; count++) {
+        double *there = a->joints + count * AXES;
+        if (!ha_next(t, &at, step, last, a->leap, there)) return count;
+        a->times[count] = at.time, a->places[count] = at.place, last = there;
     }
-    const double *piece = t->pieces + low * PIECE, *line = t->lines, *last = a->last;
-    int64_t pieces_left = t->piece_count - 1 - low, lines_left = t->line_count - 1;
-    for (; count < a->most; count++) {
-        time += step;
-        if (time >= t->end) break;
-        while (pieces_left && time >= piece[PIECE]) piece += PIECE, pieces_left--;
-        double since = time - piece[0], s = piece[1] + since * (piece[2] + since * (piece[3] + since * piece[4]));
-        if (s < 0.0) s = 0.0;
-        if (s >= 1.0) break;
-        while (lines_left && s >= line[LINE]) line += LINE, lines_left--;
-        double part = (s - line[0]) / (line[1] - line[0]), *there = a->joints + count * AXES;
-        if (part > 1.0) part = 1.0;
-        for (int i = 0; i < AXES; i++) {
-            there[i] = line[2 + i] + part * line[2 + AXES + i];
-            if (fabs(there[i] - last[i]) > a->leap[i]) return count;
-        }
-        a->times[count] = time, a->places[count] = s, last = there;
-    }
-    return count;
+    return a->most;
 }

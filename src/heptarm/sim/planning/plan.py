@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isnan
+from math import inf, isnan
 
 import numpy as np
 
@@ -58,11 +58,19 @@ class Plan:
         marks = (0.0, *self.marks, 1.0)
         return (0.0, 1.0) if part < 0 else (marks[part], marks[part + 1])
 
+    def end_of(self, part: int) -> float:
+        """Path parameter at which the next part begins; infinite: there is none."""
+        return self.marks[part] if part < len(self.marks) else inf
+
+    def measured(self, part: int) -> tuple[float, float]:
+        """Path parameters between which progress is measured: of the motion of a batch, or of the whole."""
+        return self.span(part if self.marks and self.order.kind == "batch" else -1)
+
     def progress(self, s: float, part: int) -> float:
         """Progress of the running motion of a batch at s in [0, 1]; any other motion is its only part."""
         if not self.marks:
             return s
-        low, high = self.span(part if self.order.kind == "batch" else -1)
+        low, high = self.measured(part)
         return min(1.0, max(0.0, (s - low) / (high - low))) if high > low else 1.0
 
 

@@ -21,7 +21,8 @@ from heptarm.values.arrays import Array
 #: So many set-points are computed at once in C, and without a compiler, where each time takes half a millisecond.
 MANY, MANY_IN_PYTHON = 64, 1024
 _AXES = 7
-_SOURCE = Path(__file__).with_name("ahead.c")
+#: The same in C.
+SET_POINTS = Path(__file__).with_name("ahead.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 
@@ -29,7 +30,7 @@ _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 def ahead_library() -> ctypes.CDLL | None:
     """Load the function; None: this system is not supported, or has no compiler."""
     try:
-        made = compiled_library("ahead", _SOURCE.read_bytes(), holds_gil=True)
+        made = compiled_library("ahead", SET_POINTS.read_bytes(), holds_gil=True)
     except Unavailable:
         return None
     made.ha_ahead.argtypes, made.ha_ahead.restype = (_POINTER, _POINTER, _REAL, _REAL), _WORD
@@ -46,6 +47,12 @@ class _Table(ctypes.Structure):
         ("line_count", _WORD),
         ("end", _REAL),
     )
+
+
+class Cursor(ctypes.Structure):
+    """`struct cursor` of ahead.c."""
+
+    _fields_ = (("time", _REAL), ("place", _REAL), ("piece", _WORD), ("line", _WORD))
 
 
 class _Ahead(ctypes.Structure):

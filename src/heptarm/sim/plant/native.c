@@ -2,9 +2,8 @@
    heptarm.sim.plant.plant, heptarm.sim.plant.external_load and heptarm.sim.plant.drive_monitor. This file does the same; sums of
    products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
 
-   The constants, and `struct tick`, whose members all have eight bytes, come from heptarm.sim.plant.native. */
-#include <math.h>
-
+   The constants, and `struct tick`, whose members all have eight bytes, come from heptarm.sim.plant.native; set-points, from
+   heptarm/sim/planning/ahead.c. */
 static void copy(double *to, const double *from, word count) {
     for (word i = 0; i < count; i++) to[i] = from[i];
 }
@@ -202,10 +201,38 @@ word ht_tick(struct tick *t, word tick, double progress, double remaining) {
     return ht_write(t, tick, progress, remaining);
 }
 
+/* Position in a motion, 0 to 1, at a place on its path: `Plan.progress`. */
+static double progress(const struct tick *t, double place) {
+    double part = (place - t->part_begin) / (t->part_end - t->part_begin);
+    return part < 0.0 ? 0.0 : part > 1.0 ? 1.0 : part;
+}
+
 /* Let readers see the state that was written last. Returns whether one of them waits for it. */
 word ht_publish(struct tick *t, word tick) {
     word *words = t->memory + STATES + tick % SLOTS * SIZE, *header = t->memory + HEADER;
     __atomic_store_n(words + SEQ, 2 * tick + 2, __ATOMIC_RELEASE);
     __atomic_store_n(header + NEWEST, tick, __ATOMIC_SEQ_CST);
     return tick * TICK_NS >= __atomic_load_n(header + WAKE_AT, __ATOMIC_SEQ_CST);
+}
+
+/* Puts the motion at its time, before `ht_follow`. */
+void ht_put(struct tick *t, double time) { ha_put(t->table, &t->cursor, time); }
+
+/* Ticks of a motion whose table decides about its set-points: until one of them has none or belongs to another part, one is not done
+   in C, somebody waits for the state of one, or `count` are done. Returns how many are done and published; `left` is what is left of
+   the next one, DONE if that has not begun. */
+word ht_follow(struct tick *t, word tick, word count) {
+    word done = 0;
+    for (t->left = DONE, t->is_awaited = 0; done < count && !t->is_awaited; done++) {
+        double there[AXES], *points = t->points, s;
+        struct cursor next = t->cursor;
+        if (!ha_next(t->table, &next, t->step, points + 2 * AXES, t->leap, there) || next.place >= t->mark) break;
+        t->cursor = next, s = next.place;
+        copy(points, points + AXES, 2 * AXES);
+        copy(points + 2 * AXES, there, AXES);
+        t->left = ht_tick(t, tick + done, progress(t, s), t->table->end - next.time);
+        if (t->left != DONE) break;
+        t->is_awaited = ht_publish(t, tick + done);
+    }
+    return done;
 }

@@ -18,6 +18,7 @@ import numpy as np
 from heptarm.io.compiled import Unavailable, compiled_library
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
 from heptarm.sim.controller.setpoints import SetPoints
+from heptarm.sim.planning.table import SET_POINTS, Cursor, MotionTable
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.values.arrays import Array
@@ -42,8 +43,14 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ),
     # what a tick computes
     ("reals", 0, "torque tau_cmd tau load wrench"),
-    ("word", 0, "stride pulls is_misjudged has_e1 flags mode order"),
+    ("word", 0, "stride pulls is_misjudged has_e1 flags mode order left is_awaited"),
     ("real", 0, "d_bs d_se d_ew d_wf straight on_axis mass_damping stiffness_damping e1"),
+    # the running motion: its table, where it is in that, how far its time and an axis come in a tick; where the part
+    # begins and ends whose progress is shown, and where the next one begins
+    ("table", 0, "table"),
+    ("cursor", 0, "cursor"),
+    ("reals", 0, "leap"),
+    ("real", 0, "step part_begin part_end mark"),
     ("real", AXES, "stiffness most"),
     ("real", 3 * AXES, "points"),
     # MuJoCo's model and state, its functions, and vectors of all its degrees of freedom for them
@@ -52,7 +59,7 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("product", 0, "multiply"),
     ("reals", 0, "vector product"),
 )
-_TYPES: dict[str, Any] = {"word": _WORD, "real": _REAL}
+_TYPES: dict[str, Any] = {"word": _WORD, "real": _REAL, "cursor": Cursor}
 _WORDS = "SEQ TIME FLAGS MODE ORDER PROGRESS REMAINING E1 STATUS TURN"
 _SLICES = "Q Q_CMD DQ TAU TAU_EXT TAU_CMD POSE WRENCH"
 
@@ -70,7 +77,6 @@ class _Memory(ctypes.Structure):
 def _header() -> str:
     """Constants and `struct tick` for native.c."""
     constants = {
-        "AXES": AXES,
         "DONE": DONE,
         "LOADED": LOADED,
         "ASK": ASK,
@@ -88,12 +94,13 @@ def _header() -> str:
     }
     types = {"words": "word *", "reals": "double *", "word": "word ", "real": "double ", "address": "void *"}
     types |= {"step": "step *", "product": "product *"}
+    types |= {"table": "const struct table *", "cursor": "struct cursor "}
     members = [
         f"    {types[kind]}{name}{f'[{size}]' if size else ''};"
         for kind, size, names in STRUCT
         for name in names.split()
     ]
-    lines = ["#include <stdint.h>", "typedef int64_t word;", "typedef void step(const void *, void *);"]
+    lines = ["typedef int64_t word;", "typedef void step(const void *, void *);"]
     lines += ["typedef void product(const void *, const void *, double *, const double *);"]
     lines += [f"enum {{ {name} = {value} }};" for name, value in constants.items()]
     return "\n".join([*lines, "struct tick {", *members, "};", ""])
@@ -119,7 +126,9 @@ def tick_library() -> ctypes.CDLL:
     Raises:
         Unavailable: this system is not supported, or has no compiler.
     """
-    made = compiled_library("tick", _header().encode() + _SOURCE.read_bytes(), holds_gil=True)
+    made = compiled_library(
+        "tick", SET_POINTS.read_bytes() + _header().encode() + _SOURCE.read_bytes(), holds_gil=True
+    )
     made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
     made.ht_write.restype = made.ht_publish.restype = _WORD
     made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
@@ -128,6 +137,8 @@ def tick_library() -> ctypes.CDLL:
     made.ht_write.argtypes = (_POINTER, _WORD, _REAL, _REAL)
     made.ht_tick.restype, made.ht_tick.argtypes = _WORD, made.ht_write.argtypes
     made.ht_publish.argtypes = (_POINTER, _WORD)
+    made.ht_put.argtypes, made.ht_put.restype = (_POINTER, _REAL), None
+    made.ht_follow.restype, made.ht_follow.argtypes = _WORD, (_POINTER, _WORD, _WORD)
     if made.ht_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct tick` must have {ctypes.sizeof(_Memory)} bytes, got {made.ht_size()}")
     if mujoco.get_mjcb_time() is None:
@@ -168,8 +179,9 @@ class NativeTick:
         library = tick_library()
         self._command, self._sense = library.ht_command, library.ht_sense
         self._strained, self._write, self._publish = library.ht_strained, library.ht_write, library.ht_publish
-        self._tick = library.ht_tick
+        self._tick, self._put, self._follow = library.ht_tick, library.ht_put, library.ht_follow
         self._memory = memory = _Memory()
+        self._table: MotionTable | None = None
         self._words = (0, 0, 0)
         self._at = ctypes.addressof(memory)
         arrays |= {"vector": np.zeros(model.nv), "product": np.zeros(model.nv)}
@@ -223,6 +235,66 @@ class NativeTick:
             self._show(words)
         left: int = self._tick(self._at, tick, times[0], times[1])
         return left
+
+    def prepare(
+        self,
+        points: SetPoints,
+        table: MotionTable,
+        *,
+        time: float,
+        step: float,
+        part: tuple[float, float, float],
+    ) -> None:
+        """Prepare `follow`; any other tick in between undoes that.
+
+        Args:
+            points: set-points so far.
+            table: of the motion.
+            time: of the motion [s].
+            step: by which it grows in each tick [s].
+            part: path parameters where the part begins and ends whose progress is shown, and where the next one begins.
+        """
+        memory, rows = self._memory, self._points
+        rows[0], rows[1], rows[2] = points.before, points.now, points.after
+        memory.part_begin, memory.part_end, memory.mark = part
+        memory.table, memory.step, memory.leap = table.address, step, points.largest_step.ctypes.data
+        self._table = table  # stays where it is meanwhile
+        self._put(self._at, time)
+
+    def follow(self, tick: int, count: int) -> int:
+        """Compute and publish ticks of a motion until somebody waits for the state of one, or another part begins.
+
+        Args:
+            tick: number of the first one.
+            count: of ticks at most.
+
+        Returns:
+            How many are done. Then `left` is what is left to do of the next one, as `tick` returns it; `DONE`: it
+            has not begun, and may have no such set-point.
+        """
+        done: int = self._follow(self._at, tick, count)
+        return done
+
+    @property
+    def left(self) -> int:
+        """What is left to do of the tick after those that `follow` has done."""
+        return int(self._memory.left)
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether somebody waits for the last state that `follow` has published."""
+        return bool(self._memory.is_awaited)
+
+    @property
+    def where(self) -> tuple[float, float]:
+        """Time [s] and path parameter of the motion after `follow`."""
+        cursor = self._memory.cursor
+        return cursor.time, cursor.place
+
+    @property
+    def points(self) -> Array:
+        """Set-points of the last, this and the next tick, shape (3, 7) [rad]; a copy."""
+        return self._points.copy()
 
     def _show(self, words: tuple[int, int, int]) -> None:
         """Set flags, mode and order of the states to come."""

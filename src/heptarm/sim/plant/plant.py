@@ -189,6 +189,8 @@ class Plant:
         self.on_safety: Callable[[int, int], None] | None = None  # called with changed flags and mode
         # safety flags, and the operation mode above them: as reported, and of the newest state
         self._flags = self._seen = 0
+        # whether the next ticks need no more than the table of the running motion, while the safety flags are these
+        self._is_foreseen, self._shown = False, 0
         self._brakes: PositionLaw | None = None  # closed
         self._braked = self._sensed
         self._halted = 0  # ticks for which a stop on the path has been in force
@@ -381,13 +383,72 @@ class Plant:
 
     def step(self, ticks: int = 1) -> None:
         """Run a number of ticks."""
-        for _ in range(ticks):
-            self.tick()
+        while ticks > 0:
+            ticks -= self.tick(ticks)
 
-    def tick(self) -> None:
-        """Advance by one millisecond: set-point, control law, dynamics, state."""
+    def tick(self, most: int = 1) -> int:
+        """Advance by one millisecond: set-point, control law, dynamics, state.
+
+        Args:
+            most: so many ticks at once where they need no more than the table of the running motion, and nobody waits
+                for a state before the last one.
+
+        Returns:
+            How many ticks they were.
+        """
+        if self._is_foreseen and self._is_undisturbed:
+            done = self._follow(most)
+            if done:
+                return done
         self._compute()
         self._publish()
+        self._foresee()
+        return 1
+
+    @property
+    def _is_undisturbed(self) -> bool:
+        """Whether nothing has happened since the last tick that the next one has to look at."""
+        return not (
+            self._changes
+            or self._load.is_pushed
+            or self.safety.flags != self._shown
+            or self.interpolator.is_disturbed
+        )
+
+    def _foresee(self) -> None:
+        """Find out whether the next ticks need no more than the running motion's table, unless something happens."""
+        native, interpolator = self._native, self.interpolator
+        self._is_foreseen = (
+            native is not None and self._gripper is None and interpolator.is_foreseen and self._is_plain
+        )
+        if native is None or not self._is_foreseen:
+            return
+        run, self._shown = interpolator.run, self.safety.flags
+        assert run is not None and run.table is not None
+        part = (*run.plan.measured(run.part), run.plan.end_of(run.part))
+        native.prepare(interpolator.command, run.table, time=run.time, step=interpolator.step, part=part)
+
+    def _follow(self, most: int) -> int:
+        """Compute at most so many ticks by the table of the running motion; returns how many."""
+        native, interpolator = self._native, self.interpolator
+        assert native is not None
+        done = native.follow(self.tick_count + 1, most)
+        left = DONE if done == most else native.left
+        if not done and left == DONE:
+            return 0
+        interpolator.passed = native
+        self.tick_count += done
+        if left == DONE:
+            if native.is_awaited and self.on_wake is not None:
+                self.on_wake(self.tick_count * TICK_NS)
+            return done
+        interpolator.catch_up()
+        run = interpolator.run
+        assert run is not None
+        self._complete(left, run.plan.progress(run.place, run.part), run.plan.duration - run.time)
+        self._publish()
+        self._foresee()
+        return done + 1
 
     def _compute(self) -> None:
         """Compute the next tick: set-point, control law, dynamics."""
@@ -400,6 +461,10 @@ class Plant:
         if native is not None and self._is_plain:
             words, times = self._words(), (progress, remaining)
             left = native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
+        self._complete(left, progress, remaining)
+
+    def _complete(self, left: int, progress: float, remaining: float) -> None:
+        """Do what is left of a tick; see `NativeTick.tick`."""
         if left == DONE:
             return
         if left == ELSEWHERE:
