@@ -67,6 +67,8 @@ _OPERATING = threading.Lock()
 _LOOKS = 3
 #: Every so often threads are looked for though their number is the same.
 _SELDOM = 10
+#: Ticks of a motion that are computed at once without pacing; other threads of Python wait meanwhile.
+AT_ONCE = 16
 #: Ticks between two updates of the file of positions.
 _POSITIONS_EVERY = 30
 
@@ -156,6 +158,9 @@ class VirtualCabinet:
         self._positions = (
             None if options.positions is None else PositionsFile(options.positions, len(self.plant.data.qpos))
         )
+        # trace and positions are of each tick
+        is_recorded = self._trace is not None or self._positions is not None
+        self._at_once = 1 if options.speed > 0 or is_recorded else AT_ONCE
         self._station = java_plant.open_station(self.plant, self.sessions)
         rest = Rest(self.plant, self.sessions, self.operator, self._station.timers)
         self.loop = RealtimeLoop(
@@ -200,11 +205,15 @@ class VirtualCabinet:
             self._server.stop()
 
     def tick(self) -> None:
-        """Advance operator, FRI and plant by one millisecond."""
+        """Advance operator, FRI and plant by one millisecond; without pacing by several where that is the same."""
         self.operator.tick()
         self.sessions.tick()
-        self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
-        self.plant.tick()
+        is_any_open = self.sessions.is_any_open
+        self.loop.answer_gap = ANSWER_GAP if is_any_open else 0.0
+        most = 1
+        if self._at_once > 1 and not is_any_open:
+            most = min(self._at_once, self.operator.next_due - self.plant.tick_count)
+        self.plant.tick(most)
         if self._trace is not None:
             self._trace.append()
         if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:

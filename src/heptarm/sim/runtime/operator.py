@@ -167,7 +167,7 @@ class SimulatedOperator:
         self._plant = plant
         self._due: list[tuple[int, int, str]] = []
         self._numbers = count()
-        self._acted_at = -SEEN
+        self._ticks, self._acted_at = 0, -SEEN  # calls of `tick`, now and at the last action
         self._verbs: dict[str, Callable[..., str | None]] = {
             **{request.value: self._requesting(request) for request in StopRequest},
             **{mode.name.lower(): self._choosing(mode) for mode in OperationMode},
@@ -212,7 +212,8 @@ class SimulatedOperator:
         return self._due[0][0] if self._due else NEVER
 
     def tick(self) -> None:
-        """Execute the actions that are due; called before each tick of the plant."""
+        """Execute the actions that are due; called before each tick of the plant, or several at once."""
+        self._ticks += 1
         due = self._due
         while due and due[0][0] <= self._plant.tick_count:
             words = heapq.heappop(due)[2]
@@ -232,7 +233,7 @@ class SimulatedOperator:
         """
         name, values = understood(words)
         shown = self._verbs[name](*values) or ""
-        self._acted_at = self._plant.tick_count
+        self._acted_at = self._ticks
         self.on_action()
         return shown
 
@@ -243,7 +244,7 @@ class SimulatedOperator:
         chosen T1 sees the pause which that causes. The ticks never call this.
         """
         until = time.monotonic() + LONGEST_WAIT
-        while self._plant.tick_count < self._acted_at + SEEN and time.monotonic() < until:
+        while self._ticks < self._acted_at + SEEN and time.monotonic() < until:
             time.sleep(0.5 * TICK)
 
     def _set(self, name: str, value: float) -> None:

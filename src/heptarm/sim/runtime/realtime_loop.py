@@ -158,7 +158,7 @@ class RealtimeLoop:
 
     Args:
         shared: shared state; its anchor word is the wall time of plant time zero, for Java.
-        tick: one tick.
+        tick: one tick; without pacing it may be several.
         speed: plant seconds per second; 0: as fast as possible.
         real_time: when to have real-time priority.
         rest: the plant while it rests; None: each tick is simulated.
@@ -190,7 +190,8 @@ class RealtimeLoop:
         # no arrays of numpy: between two ticks the caches get cold, and writing into these needs less code
         self._cost = array("q", bytes(8 * _HISTORY))
         self._late = array("q", bytes(8 * _HISTORY))
-        self._count = 0
+        self._count = self._ticks = 0  # recorded calls of `tick`, and ticks that they were
+        self._collected = self._all_collected = 0  # new objects, and all, when [ns]
         self._rebased = 0
         self._refused: list[str] = []
 
@@ -200,7 +201,7 @@ class RealtimeLoop:
 
     def reset(self) -> None:
         """Reset the statistics."""
-        self._count = self._rebased = self._rested = 0
+        self._count = self._ticks = self._rebased = self._rested = 0
 
     def run(self) -> None:
         """Tick until stopped."""
@@ -210,7 +211,12 @@ class RealtimeLoop:
         gc.freeze()
         gc.disable()
         try:
-            self._loop()
+            self._shared.reals[HeaderWords.RATE] = self._speed
+            self._collected = self._all_collected = time.monotonic_ns()
+            if self._period:
+                self._run_paced()
+            else:
+                self._run_free()
         finally:
             # otherwise the plant outlives its modules, and the bindings of its libraries report leaks
             gc.enable()
@@ -232,8 +238,20 @@ class RealtimeLoop:
                 f"real-time priority not requested: speed must be in (0, {REAL_TIME_SPEED:g}], got {self._speed:g}"
             )
 
-    def _pass_rest(self, rest: RestingPlant, collected: int) -> int:
-        """Let the time pass while the plant rests; takes and returns when all objects were collected last [ns]."""
+    def _collect(self, now: int, pause: int) -> None:
+        """Collect what is new, or all objects, if that is due and the next tick is far enough [ns]."""
+        waited = now - self._collected
+        if waited <= COLLECT_EVERY or (pause < COLLECT_PAUSE * self._period and waited <= COLLECT_LATEST):
+            return
+        if now - self._all_collected > COLLECT_ALL_EVERY:
+            gc.collect()
+            self._all_collected = now
+        else:
+            gc.collect(_NEW)
+        self._collected = now
+
+    def _pass_rest(self, rest: RestingPlant) -> None:
+        """Let the time pass while the plant rests."""
         header, over = self._shared.header, False
         while not (over or self._stop):
             newest, anchor = int(header[HeaderWords.NEWEST]), int(header[HeaderWords.ANCHOR])
@@ -241,37 +259,53 @@ class RealtimeLoop:
             self._rested += int(header[HeaderWords.NEWEST]) - newest
             self._rebased += int(header[HeaderWords.ANCHOR]) != anchor
             now = time.monotonic_ns()
-            if now - collected > COLLECT_EVERY:
+            if now - self._all_collected > COLLECT_EVERY:
                 gc.collect()
-                collected = now
-        return collected
+                self._collected = self._all_collected = now
 
-    def _loop(self) -> None:
-        self._shared.reals[HeaderWords.RATE] = self._speed
+    def _record(self, late: int, cost: int, ticks: int) -> None:
+        """Record by how much a call of `tick` was late, how long it took [ns], and how many ticks it was."""
+        at = self._count % _HISTORY
+        self._late[at], self._cost[at] = late, cost // ticks
+        self._count += 1
+        self._ticks += ticks
+
+    def _run_free(self) -> None:
+        """Tick as fast as possible: no tick is ever due."""
+        now_ns, header = time.monotonic_ns, self._shared.header
+        end = header[HeaderWords.ANCHOR] = now_ns()
+        if self._real_time == "on":
+            self._prioritise()
+        while not self._stop:
+            begin, before = now_ns(), int(header[HeaderWords.NEWEST])
+            self._tick()
+            late, end = begin - end, now_ns()
+            self._record(late, end - begin, max(1, int(header[HeaderWords.NEWEST]) - before))
+            self._collect(end, 0)
+
+    def _run_paced(self) -> None:
+        """Tick when ticks are due."""
         now_ns, period, header = time.monotonic_ns, self._period, self._shared.header
         spun, spin = min(SPIN_NS, int(SPIN_FRACTION * period)), 0
         always, never = self._real_time == "on", self._real_time == "off"
-        rest = None if period == 0 else self._rest
+        rest = self._rest
         done = int(header[HeaderWords.NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period
         header[HeaderWords.ANCHOR] = due - (done + 1) * period
         end, is_second = now_ns(), False
-        collected = all_collected = end
         moment, awaited = (done + 1) * TICK_NS, 0  # of the next tick; ticks in a row that somebody waited for
         while not self._stop:
             now, gap = now_ns(), int(self.answer_gap * period)
             if self.is_real_time is not (always or (gap > 0 and not never)):
                 self._prioritise()
                 spin = spun if self.is_real_time else 0
-            if period == 0:
-                due = now
-            elif now - due > (CATCH_UP_ANSWERED if gap else CATCH_UP) * period:
+            if now - due > (CATCH_UP_ANSWERED if gap else CATCH_UP) * period:
                 self._rebased += 1
                 time.sleep(YIELD_TIME)
                 due = now = now_ns()
                 header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
             # who waits for every tick does so only after the last one's state
-            is_early = gap == 0 < period and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
+            is_early = gap == 0 and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
             early = int(self._early) if is_early else 0
             start = max(due - early, end + gap)
             if now < start:
@@ -286,39 +320,28 @@ class RealtimeLoop:
                     end, is_second = now, True
                     continue
             begin, is_second = now_ns(), False
-            awaited = awaited + 1 if period > 0 and header[HeaderWords.WAKE] <= moment else 0
+            awaited = awaited + 1 if header[HeaderWords.WAKE] <= moment else 0
             self._tick()
             end = now_ns()
             if is_early:
                 spare = due - WAKING_NS - end
                 self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
             moment += TICK_NS
-            at = self._count % _HISTORY
-            self._late[at] = begin - due + early
-            self._cost[at] = end - begin
-            self._count += 1
+            self._record(begin - due + early, end - begin, 1)
             due += period
             if rest is not None and rest.begins():
-                all_collected = self._pass_rest(rest, all_collected)
-                end, collected = now_ns(), max(collected, all_collected)
-                done = int(header[HeaderWords.NEWEST])
+                self._pass_rest(rest)
+                end, done = now_ns(), int(header[HeaderWords.NEWEST])
                 due = int(header[HeaderWords.ANCHOR]) + (done + 1) * period
                 moment = (done + 1) * TICK_NS
-            waited = end - collected
-            if waited > COLLECT_EVERY and (due - end >= COLLECT_PAUSE * period or waited > COLLECT_LATEST):
-                if end - all_collected > COLLECT_ALL_EVERY:
-                    gc.collect()
-                    all_collected = end
-                else:
-                    gc.collect(_NEW)
-                collected = end
+            self._collect(end, due - end)
 
     @property
     def statistics(self) -> LoopStatistics:
         """Percentiles of the last 131,072 ticks, in microseconds."""
         size = min(self._count, _HISTORY)
         return LoopStatistics(
-            self._count,
+            self._ticks,
             self._rested,
             self._rebased,
             list(self._refused),
