@@ -57,6 +57,10 @@ public final class FriMonitors implements Watchdog.Check {
         }
     }
 
+    public boolean isIdle() {
+        return sessions.isEmpty();
+    }
+
     /** Closes sessions whose client does not answer. */
     public void check() {
         for (Map.Entry<Long, FriActivity> one : sessions.entrySet()) {

@@ -56,6 +56,10 @@ public final class SafetyMonitor implements Watchdog.Check {
         listeners.add(listener);
     }
 
+    public boolean isIdle() {
+        return false;
+    }
+
     /** Checks the robot's safety state; called periodically. */
     public void check() {
         SafetyAssessment now = update();

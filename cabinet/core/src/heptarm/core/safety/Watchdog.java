@@ -12,6 +12,10 @@ import heptarm.core.Threads;
 public final class Watchdog {
     /** Period of the thread [s]. */
     public static final double PERIOD = 0.01;
+    /** It rests for so many periods at most while there is less to check. */
+    private static final int LONGEST = 5;
+    /** Least time between two rounds by the machine's clock [s]: a simulated second may be over in 10 ms. */
+    private static final double LEAST = 5e-4;
 
     /** Pause after waking [ns]: the states of this moment are sampled and sent first. */
     private static final long PAUSE_NS = 400000L;
@@ -24,6 +28,9 @@ public final class Watchdog {
 
     /** Something that is checked periodically. */
     public interface Check {
+        /** Whether there is nothing to check at present. */
+        boolean isIdle();
+
         void check();
     }
 
@@ -31,6 +38,7 @@ public final class Watchdog {
         final String name;
         final int rounds;
         final Check check;
+        int waited;
         boolean failing;
 
         Entry(String name, int rounds, Check check) {
@@ -65,11 +73,14 @@ public final class Watchdog {
 
     private void work() {
         try {
-            for (int round = 1; !closed; round++) {
-                clock.sleepUntil(clock.nanos() + (long) (PERIOD * 1e9)); // a full period, also after a delay
+            while (!closed) {
+                int rounds = next();
+                clock.sleepUntil(clock.nanos() + (long) (rounds * PERIOD * 1e9)); // full periods, also after a delay
                 LockSupport.parkNanos((long) (PAUSE_NS / clock.rate()));
                 for (Entry one : entries) {
-                    if (round % one.rounds == 0) {
+                    one.waited += rounds;
+                    if (one.waited >= one.rounds) {
+                        one.waited = 0;
                         run(one);
                     }
                 }
@@ -77,6 +88,17 @@ public final class Watchdog {
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
         }
+    }
+
+    /** Periods until the next round. */
+    private int next() {
+        int rounds = LONGEST;
+        for (Entry one : entries) {
+            if (!one.check.isIdle()) {
+                rounds = Math.min(rounds, one.rounds);
+            }
+        }
+        return Math.min(LONGEST, Math.max(rounds, (int) Math.ceil(LEAST * clock.rate() / PERIOD)));
     }
 
     private void run(Entry one) {

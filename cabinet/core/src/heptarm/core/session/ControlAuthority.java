@@ -159,6 +159,11 @@ public final class ControlAuthority {
         }
     }
 
+    /** Whether a client controls the robot. */
+    synchronized boolean isHeld() {
+        return controller != null && controller.session() != NO_SESSION;
+    }
+
     synchronized boolean isController(Controller client) {
         return controller == client && !leaving;
     }

@@ -27,6 +27,10 @@ final class LinkWatchdog implements Watchdog.Check {
         this.clock = clock;
     }
 
+    public boolean isIdle() {
+        return !authority.isHeld(); // silence of others may be noticed a little later
+    }
+
     public void check() {
         long now = clock.nanos();
         double scale = 1e-9 / clock.rate(); // time-outs of the link are in the client's seconds

@@ -75,6 +75,10 @@ final class Places implements Watchdog.Check {
         return count;
     }
 
+    public boolean isIdle() {
+        return guests.isEmpty();
+    }
+
     public void check() {
         long now = System.nanoTime();
         for (Map.Entry<ClientConnection, Long> guest : guests.entrySet()) {

@@ -27,9 +27,11 @@ import heptarm.wire.WrenchState;
  * to read is read less often than it is sent; it is then sent again with its old stamp.
  */
 public final class StateSampler {
+    /** Time between two looks for new subscribers [ns], and the least by the machine's clock. */
     private static final long IDLE_NS = 20000000L;
-    /** Later than this [ns], and than so many states, the past states are given up: the ring of a virtual robot has 0.25 s. */
-    private static final long TOO_LATE_NS = 200000000L;
+    private static final long LEAST_IDLE_NS = 500000L;
+    /** Later than this [ns], and than so many states, the past states are given up: the ring of a virtual robot has 0.5 s. */
+    private static final long TOO_LATE_NS = 400000000L;
     private static final int TOO_LATE = 50;
 
     /** Groups cheaper than this [ns] are read whenever they are due. */
@@ -185,7 +187,7 @@ public final class StateSampler {
     }
 
     private long next() {
-        long next = clock.nanos() + IDLE_NS;
+        long next = clock.nanos() + Math.max(IDLE_NS, (long) (LEAST_IDLE_NS * clock.rate()));
         for (Subscription one : subscriptions.values()) {
             next = Math.min(next, one.due);
         }
