@@ -19,7 +19,7 @@ nan = float("nan")
 #: Length of one tick of the plant [ns].
 TICK_NS = 1000000
 #: States kept in the ring.
-SLOTS = 256
+SLOTS = 512
 #: Places of the IO image.
 SIGNALS = 512
 
@@ -210,7 +210,7 @@ class StateWords:
     #: Words of one.
     SIZE = 65
     #: Its place in the shared memory.
-    SECTION = slice(5, 16645)
+    SECTION = slice(5, 33285)
 
 
 class TargetWords:
@@ -229,7 +229,7 @@ class TargetWords:
     #: Words of one.
     SIZE = 17
     #: Its place in the shared memory.
-    SECTION = slice(16645, 16662)
+    SECTION = slice(33285, 33302)
 
 
 class ImageWords:
@@ -239,11 +239,11 @@ class ImageWords:
     #: Words of one.
     SIZE = 512
     #: Its place in the shared memory.
-    SECTION = slice(16662, 17174)
+    SECTION = slice(33302, 33814)
 
 
 #: Words of the shared memory.
-MEMORY_WORDS = 17174
+MEMORY_WORDS = 33814
 
 _RobotDescription_0 = Struct(">7d7d7d7ddddd")
 

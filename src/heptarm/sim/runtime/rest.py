@@ -19,7 +19,7 @@ from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 
 #: Ticks that pass at most before the inputs are looked at again.
-LONGEST = 100
+LONGEST = 250
 #: Ticks that are simulated at least after something may have changed: an override needs 0.3 s to take effect.
 AWAKE = 500
 #: Ticks between two looks at whether the robot rests, and between the two states that are compared.

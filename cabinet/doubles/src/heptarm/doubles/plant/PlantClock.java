@@ -8,7 +8,7 @@ import heptarm.doubles.seam.Seam;
 
 /** Simulation time as the clock of the cabinet. A thread that it wakes reads the robot state of the tick it was woken for. */
 public final class PlantClock implements Clock {
-    private static final long AHEAD_NS = 20 * Seam.TICK_NS;
+    private static final long AHEAD_NS = TimerQueue.STRIDE * Seam.TICK_NS;
     private static final double FREE_RUN = 100.0;
 
     private final SharedState sharedState;

@@ -23,7 +23,7 @@ public final class SharedState {
     private static final int WORD = Long.BYTES;
     private static final int TARGET = WORD * TargetWords.START;
     /** A thread that was woken longer ago than this [ticks], or that wakes later than half of it, reads the newest state. */
-    private static final int OLDEST = 200;
+    private static final int OLDEST = 400;
     private static final int FAR = OLDEST / 2;
 
     private static final VarHandle LONGS =

@@ -26,7 +26,7 @@ public final class TimerQueue {
     }
 
     /** A state is at most so many ticks old at rest: the clocks of the threads run ahead of it no further than that. */
-    private static final int STRIDE = 20;
+    static final int STRIDE = 50;
     /**
      * A thread that is awake before its tick is due spins for so long at most [ns]; before that it sleeps. To wake takes 40 us; to
      * spin longer takes time from others on its processor, and has more of it taken by the host of a virtual machine.

@@ -7,7 +7,7 @@ public final class ImageWords {
     /** Words of one. */
     public static final int SIZE = 512;
     /** First word in the shared memory. */
-    public static final int START = 16662;
+    public static final int START = 33302;
 
     private ImageWords() {
     }

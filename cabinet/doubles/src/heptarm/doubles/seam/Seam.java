@@ -6,11 +6,11 @@ public final class Seam {
     /** Length of one tick of the plant [ns]. */
     public static final int TICK_NS = 1000000;
     /** States kept in the ring. */
-    public static final int SLOTS = 256;
+    public static final int SLOTS = 512;
     /** Places of the IO image. */
     public static final int SIGNALS = 512;
     /** Words of the shared memory. */
-    public static final int MEMORY_WORDS = 17174;
+    public static final int MEMORY_WORDS = 33814;
 
     static double[] missing(int count) {
         double[] numbers = new double[count];

@@ -16,7 +16,7 @@ public final class TargetWords {
     /** Words of one. */
     public static final int SIZE = 17;
     /** First word in the shared memory. */
-    public static final int START = 16645;
+    public static final int START = 33285;
 
     private TargetWords() {
     }
