@@ -39,6 +39,7 @@ from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import LONGEST_WAIT, SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import (
     ANSWER_GAP,
+    AT_ONCE,
     RealtimeLoop,
     batch_scheduled,
     share_memory_pools,
@@ -67,8 +68,6 @@ _OPERATING = threading.Lock()
 _LOOKS = 3
 #: Every so often threads are looked for though their number is the same.
 _SELDOM = 10
-#: Ticks of a motion that are computed at once without pacing; other threads of Python wait meanwhile.
-AT_ONCE = 16
 #: Ticks between two updates of the file of positions.
 _POSITIONS_EVERY = 30
 

@@ -59,6 +59,8 @@ REAL_TIME_SPEED = 5.0
 #: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that other threads run.
 YIELD_TIME = 2e-4
 PRIORITY = 50
+#: Ticks of a motion that are computed at once without pacing; other threads of Python wait meanwhile.
+AT_ONCE = 16
 #: Time between two collections of reference cycles among new objects [ns], and at the latest [ns]. One takes 0.2 ms.
 COLLECT_EVERY = 5_000_000_000
 COLLECT_LATEST = 20_000_000_000

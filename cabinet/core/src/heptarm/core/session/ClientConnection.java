@@ -33,7 +33,7 @@ import heptarm.wire.Welcome;
 final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber, DatagramPeer.Receiver {
     private static final int BUFFER = 16384;
     private static final int MAX_EVENTS = 4096;
-    private static final int MAX_STATES = 64;
+    private static final int MAX_STATES = 256;
     private static final long LINGER_MS = 500;
     /** A write that takes longer has waited for the client [ns]; for so long the sampler then does not write itself [ns]. */
     private static final long SLOW_WRITE_NS = 5000000L;
