@@ -4,6 +4,7 @@
 
    The constants, and `struct tick`, whose members all have eight bytes, come from heptarm.sim.plant.native; set-points, from
    heptarm/sim/planning/ahead.c. */
+
 static void copy(double *to, const double *from, word count) {
     for (word i = 0; i < count; i++) to[i] = from[i];
 }
@@ -224,13 +225,13 @@ void ht_put(struct tick *t, double time) { ha_put(t->table, &t->cursor, time); }
 word ht_follow(struct tick *t, word tick, word count) {
     word done = 0;
     for (t->left = DONE, t->is_awaited = 0; done < count && !t->is_awaited; done++) {
-        double there[AXES], *points = t->points, s;
+        double there[AXES], *points = t->points;
         struct cursor next = t->cursor;
         if (!ha_next(t->table, &next, t->step, points + 2 * AXES, t->leap, there) || next.place >= t->mark) break;
-        t->cursor = next, s = next.place;
+        t->cursor = next;
         copy(points, points + AXES, 2 * AXES);
         copy(points + 2 * AXES, there, AXES);
-        t->left = ht_tick(t, tick + done, progress(t, s), t->table->end - next.time);
+        t->left = ht_tick(t, tick + done, progress(t, next.place), t->table->end - next.time);
         if (t->left != DONE) break;
         t->is_awaited = ht_publish(t, tick + done);
     }

@@ -93,8 +93,12 @@ def _header() -> str:
         **{name: getattr(StateWords, name).start for name in _SLICES.split()},
     }
     types = {"words": "word *", "reals": "double *", "word": "word ", "real": "double ", "address": "void *"}
-    types |= {"step": "step *", "product": "product *"}
-    types |= {"table": "const struct table *", "cursor": "struct cursor "}
+    types |= {
+        "step": "step *",
+        "product": "product *",
+        "table": "const struct table *",
+        "cursor": "struct cursor ",
+    }
     members = [
         f"    {types[kind]}{name}{f'[{size}]' if size else ''};"
         for kind, size, names in STRUCT
