@@ -45,7 +45,7 @@ def message(**fields: Any) -> SimpleNamespace:
     ],
 )
 def test_what_has_no_subscriber_is_not_made(wanted: tuple[str, ...], made: set[str]) -> None:
-    ros: Any = SimpleNamespace(joint_state=message, now=lambda: 10**9, time=lambda stamp: stamp)
+    ros: Any = SimpleNamespace(joint_state=message, now=lambda: 10**9, time=lambda stamp: stamp, doubles=list)
     messages = StateMessages(
         ros, NodeConfiguration.of({}), stamped=(message, message), state=message, status=message
     )

@@ -6,14 +6,17 @@ import random
 from collections.abc import Callable
 from dataclasses import fields
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import sample_bodies
 import spec as schema
+from heptarm.arm.translate.state import read_state
+from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.codec import DecodeError
-from heptarm.wire.messages import MESSAGES, State
+from heptarm.wire.messages import MESSAGES, SafetyBits, State
 from heptarm.wire.state_groups import StateGroups
 from tests.schema.python_side import recoded
 
@@ -69,6 +72,27 @@ def test_the_groups_of_a_state_one_by_one_are_those_of_the_whole(
                 _group_by_group(candidate)
         else:
             assert str(_group_by_group(candidate)) == str(whole)  # a damaged number may be NaN
+
+
+@given(seed=st.integers(0, 2**32))
+def test_the_groups_of_received_bytes_have_the_numbers_of_the_messages(seed: int) -> None:
+    body = sample_bodies.body(SPEC, "State", str(seed), 3)
+    sent, state = State.decode(body), read_state(body, ClockOffset(), lambda: 0, received=0)
+    for name in ("joints", "torques", "wrench", "motion", "safety"):
+        message, group = getattr(sent, name), getattr(state.groups, name)
+        assert (message is None) == (group is None)
+        if message is None:
+            continue
+        assert group.stamp == message.stamp
+        if name == "safety":
+            bits = {one.name.lower() for one in SafetyBits if one.name and one & message.bits}
+            assert bits == {one.name for one in fields(group) if getattr(group, one.name) is True}
+            continue
+        for one in fields(group):
+            read = getattr(group, one.name)
+            wanted = getattr(message, {"id": "motion"}.get(one.name, one.name))
+            np.testing.assert_array_equal(read, wanted)  # a number may be NaN
+            assert not (isinstance(read, np.ndarray) and read.flags.writeable)
 
 
 def _damaged(count: int) -> list[tuple[int, bytes]]:

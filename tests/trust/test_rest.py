@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -54,6 +55,21 @@ def test_states_at_rest_are_on_the_grid_of_their_rate_and_all_the_same(
     assert len(states) > 100 and (np.ptp([one.q for one in states], axis=0) < 1e-6).all()
     assert all(one.safety.ready_to_move for one in states)
     rest(cabinet)  # also while it is observed
+
+
+def test_observers_of_several_rates_get_their_states_at_rest(resting: Arm, cabinet: Cabinet) -> None:
+    rates = (40, 125, 500)
+    with ExitStack() as stack:
+        arms = [
+            stack.enter_context(ha.connect(cabinet.target, control=False, timeout=30.0, state_rate=rate))
+            for rate in rates
+        ]
+        streams = [arm.states(duration=1.0, size=5000) for arm in arms]
+        for stream, rate in zip(streams, rates, strict=True):
+            stamps = np.array([one.stamp for one in stream])[1:]
+            assert len(stamps) > 0.2 * rate and (stamps % round(1e9 / rate) == 0).all()
+            assert (np.diff(stamps) > 0).all()
+        rest(cabinet)
 
 
 def test_the_clock_goes_on_at_rest(resting: Arm) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import time
+from array import array
+from collections.abc import Callable
+
 from builtin_interfaces.msg import Duration, Time
 from control_msgs.action import FollowJointTrajectory
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -24,13 +28,20 @@ def ros(node: Node) -> RosAdapter:
         wrench=Wrench,
         diagnostic=DiagnosticStatus,
         key_value=KeyValue,
-        now=lambda: int(node.get_clock().now().nanoseconds),
+        now=_now(node),
         time=lambda nanos: Time(sec=nanos // 10**9, nanosec=nanos % 10**9),
         seconds=lambda message: float(message.sec + message.nanosec * 1e-9),
         duration=_duration,
         level=lambda level: bytes([level]),
+        doubles=lambda numbers: array("d", numbers),  # each number of a list is checked twice
         empty_stops=False,
     )
+
+
+def _now(node: Node) -> Callable[[], int]:
+    """ROS time [ns]; unless it is simulated, that of the system, which rclpy takes ten times as long to read."""
+    clock = node.get_clock()
+    return lambda: int(clock.now().nanoseconds) if clock.ros_time_is_active else time.time_ns()
 
 
 def _duration(seconds: float) -> Duration:

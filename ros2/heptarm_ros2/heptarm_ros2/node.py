@@ -216,11 +216,13 @@ class HeptarmNode(LifecycleNode):
 
     def on_state(self, state: State) -> None:
         """Publish a state."""
+        if not self._can_publish:
+            return
         for publisher in (*self._state_publishers, self._events):
-            if publisher is not None and self._can_publish:
+            if publisher is not None:
                 publisher.state(state)
         driver, states = self.driver, self._states
-        if driver is not None and states is not None and self._can_publish:
+        if driver is not None and states is not None:
             states.controller_state(state, driver)
 
     def on_feedback(self, feedback: GoalFeedback) -> None:

@@ -62,13 +62,14 @@ class StateGroups:
         body: of a State message.
 
     Attributes:
+        body: the bytes.
         stamp: cabinet time of the newest group [ns]; 0 without any.
 
     Raises:
         DecodeError: the bytes have another length than their groups.
     """
 
-    __slots__ = ("_body", "_layout", "_rest", "stamp")
+    __slots__ = ("_layout", "_rest", "body", "stamp")
 
     def __init__(self, body: bytes) -> None:
         if len(body) < _MASK.size:
@@ -76,12 +77,16 @@ class StateGroups:
         layout = _layout(body[0] << 8 | body[1])
         if len(body) < layout.least or (len(body) > layout.least and not layout.rest):
             raise DecodeError(f"a state with these groups has {layout.least} bytes, got {len(body)}")
-        self._body, self._layout = body, layout
+        self.body, self._layout = body, layout
         self._rest: State | None = None
         stamps = layout.stamps.unpack_from(body)
         if layout.rest and layout.stamps.size == layout.size:  # the place of the last stamp has to be found
             stamps += tuple(group.stamp for group in (self.get("io"), self.get("mode")) if group is not None)
         self.stamp: int = max(stamps) if stamps else 0
+
+    def place(self, name: str) -> int | None:
+        """Where a group of a fixed size begins in the body; None: the state has none of that name."""
+        return self._layout.places.get(name)
 
     def get(self, name: str) -> Any:
         """The message of a group; None: the state has none of that name.
@@ -89,12 +94,11 @@ class StateGroups:
         Raises:
             DecodeError: its bytes are no such message.
         """
-        layout = self._layout
-        place = layout.places.get(name)
+        layout, place = self._layout, self.place(name)
         if place is not None:
-            return READ_GROUP[name](self._body, place)[0]
+            return READ_GROUP[name](self.body, place)[0]
         if name not in layout.others:
             return None
         if self._rest is None:
-            self._rest = State.decode(_MASK.pack(layout.rest) + self._body[layout.size :])
+            self._rest = State.decode(_MASK.pack(layout.rest) + self.body[layout.size :])
         return getattr(self._rest, name)

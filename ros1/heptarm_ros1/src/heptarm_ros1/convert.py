@@ -26,6 +26,7 @@ ROS = RosAdapter(
     seconds=lambda message: float(message.to_sec()),
     duration=rospy.Duration.from_sec,
     level=int,
+    doubles=list,
     empty_stops=True,
 )
 

@@ -209,9 +209,9 @@ _POLLING, _STEP = 30_000_000, 0.0005
 _FAST_STATES = 250.0
 #: From this state rate on a loop over states reads the socket itself [Hz].
 _LOOPED_STATES = 100.0
-#: The link thread leaves the socket to such a loop while it reads and for this long after that [ns]. It looks after the
-#: loop then, soon after a state of 1 kHz rather than just before one.
-_LOOPING = 5_150_000
+#: The link thread leaves the socket to such a loop while it reads and for at least this long after that [ns]. It looks
+#: after the loop a quarter of a period after a state: that has been taken then, and the next one is not due.
+_LOOPING = 5_000_000
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
 #: The usual answer, and its type and body.
@@ -287,6 +287,7 @@ class Link:
         self._ping_due = self._requested
         self._polling = _POLLING
         self._may_loop = self._loop_reads = False
+        self._looping = _LOOPING
         self._looped = self._requested - _LOOPING
         self._datagrams: DatagramLine | None = None
         self._targets = 0
@@ -417,6 +418,9 @@ class Link:
         """Prepare for this many pushed states per second of our clock [Hz]."""
         self._polling = _POLLING if rate <= _FAST_STATES else 0
         self._may_loop = rate >= _LOOPED_STATES
+        if self._may_loop:
+            period = max(1, round(1e9 / rate))
+            self._looping = (_LOOPING + period - 1) // period * period + period // 4
 
     def request(
         self,
@@ -752,14 +756,14 @@ class Link:
             try:
                 now = clock.nanos()
                 self._heartbeat.look(now)
-                is_looped = self._loop_reads or now - self._looped < _LOOPING
-                if now >= self._ping_due + (_LOOPING if is_looped else 0):
+                is_looped = self._loop_reads or now - self._looped < self._looping
+                if now >= self._ping_due + (self._looping if is_looped else 0):
                     self._ping(now)
                 rest = max(0.0, (self._ping_due - now) * 1e-9)
                 if is_looped:
                     # a loop over states reads, or is back within a moment
-                    left = self._looped + _LOOPING - now
-                    clock.sleep((left if left > 0 else _LOOPING) * 1e-9)
+                    left = self._looped + self._looping - now
+                    clock.sleep((left if left > 0 else self._looping) * 1e-9)
                     # after a standstill of this process bytes wait to be read
                     if not transport.wait_readable(0.0):
                         self._heartbeat.check(clock.nanos(), self.peer)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import lru_cache
+from itertools import accumulate, pairwise
+from operator import attrgetter
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -22,9 +25,8 @@ from heptarm.wire import messages as wire
 from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.state_groups import StateGroups
 
-_SAFETY = tuple(
-    (int(bit), bit.name.lower()) for bit in wire.SafetyBits if bit.name is not None and bit.name != "NONE"
-)
+#: The bits of the safety state in the order of the fields of `values.Safety` behind its stamp and mode.
+_SAFETY = tuple(int(wire.SafetyBits[one.name.upper()]) for one in fields(values.Safety)[2:])
 _MODES = {one: values.OperationMode(one.name.lower()) for one in wire.OperationMode}
 
 
@@ -32,15 +34,19 @@ class _Received:
     """A received state: each group is decoded and made when it is asked for.
 
     Args:
-        message: the message of each group by its name; None: there is none.
-        stamp: cabinet time of the newest group [ns].
+        groups: its bytes.
         signals: of the cabinet, in the order of their indices.
     """
 
-    __slots__ = ("_message", "_signals", "stamp")
+    __slots__ = ("_groups", "_signals")
 
-    def __init__(self, message: Callable[[str], Any], stamp: int, signals: Sequence[Signal]) -> None:
-        self._message, self.stamp, self._signals = message, stamp, signals
+    def __init__(self, groups: StateGroups, signals: Sequence[Signal]) -> None:
+        self._groups, self._signals = groups, signals
+
+    @property
+    def stamp(self) -> int:
+        """Cabinet time of the newest group [ns]; 0 without any."""
+        return self._groups.stamp
 
     def make(self, name: str) -> Any:
         """The group of a name; None: the state has none.
@@ -48,11 +54,16 @@ class _Received:
         Raises:
             RemoteProtocolError: the cabinet sent bytes or numbers that no such group can have.
         """
+        groups = self._groups
+        vectors = _VECTORS.get(name)
+        if vectors is not None:
+            place = groups.place(name)
+            return None if place is None else vectors.read(groups.body, place)
         try:
-            group = self._message(name)
-            if group is None:
+            message = groups.get(name)
+            if message is None:
                 return None
-            return _signals(group, self._signals) if name == "io" else _READERS[name](group)
+            return _signals(message, self._signals) if name == "io" else _READERS[name](message)
         except ValueError as error:
             raise _undecodable(error) from error
 
@@ -85,7 +96,7 @@ def read_state(
         groups = StateGroups(body)
     except ValueError as error:
         raise _undecodable(error) from error
-    source = _Received(groups.get, groups.stamp, signals)
+    source = _Received(groups, signals)
     return values.State(values.Groups.of(source), min(offset.to_ours(groups.stamp), received), clock)
 
 
@@ -109,10 +120,9 @@ def read_firing(
     """The state of the robot when a condition or a trigger fired, as far as the cabinet reported it."""
     if message.joints is None:
         return None
-    groups = (getattr(message, name, None) for name in values.GROUP_NAMES)
-    stamp = max((group.stamp for group in groups if group is not None), default=0)
-    received = _Received(lambda name: getattr(message, name, None), stamp, ())
-    return values.State(values.Groups.of(received), offset.to_ours(stamp), clock)
+    sent = ((name, getattr(message, name, None)) for name in values.GROUP_NAMES)
+    groups = values.Groups(**{name: _READERS[name](group) for name, group in sent if group is not None})
+    return values.State(groups, offset.to_ours(groups.stamp), clock)
 
 
 def read_result(message: wire.MotionFinished, state: values.State | None) -> Result:
@@ -162,13 +172,51 @@ def _cartesian(message: wire.PoseState) -> values.Cartesian:
     )
 
 
+class _Vectors:
+    """A group of which all fields behind the stamp are vectors, in the order of the value's: read as one array.
+
+    Args:
+        kind: class of the value.
+        fields: of the message; see `STATE_LAYOUT`.
+    """
+
+    __slots__ = ("_count", "_kind", "_rows")
+
+    def __init__(self, kind: Callable[..., Any], fields: Sequence[tuple[str, str, int]]) -> None:
+        ends = list(accumulate(size for _, _, size in fields[1:]))
+        self._kind, self._count = kind, ends[-1]
+        self._rows = [slice(begin, end) for begin, end in pairwise((0, *ends))]
+
+    def read(self, body: bytes, place: int) -> Any:
+        """The value at a place in a state's body."""
+        (stamp,) = _STAMP.unpack_from(body, place)
+        numbers = np.frombuffer(body, ">f8", self._count, place + _STAMP.size).astype(np.float64)
+        return self._kind(stamp, *[numbers[row] for row in self._rows])
+
+
+_STAMP = Struct(">q")
+_VECTORS = {
+    name: _Vectors(kind, fields)
+    for kind, name in ((values.Joints, "joints"), (values.Torques, "torques"), (values.Wrench, "wrench"))
+    for group, _, fields in wire.STATE_LAYOUT
+    if group == name
+}
+
+
+def _motion(message: wire.MotionState) -> values.MotionStatus:
+    return values.MotionStatus(*_MOTION(message))
+
+
+_MOTION = attrgetter("stamp", "motion", "item", "queued", "progress", "remaining", "override")
+
+
 def _safety(message: wire.SafetyState) -> values.Safety:
-    return values.Safety(message.stamp, _MODES[message.mode], **_safety_bits(int(message.bits)))
+    return values.Safety(message.stamp, _MODES[message.mode], *_safety_bits(int(message.bits)))
 
 
 @lru_cache(maxsize=256)
-def _safety_bits(bits: int) -> dict[str, bool]:
-    return {name: bool(bits & bit) for bit, name in _SAFETY}
+def _safety_bits(bits: int) -> tuple[bool, ...]:
+    return tuple(bool(bits & bit) for bit in _SAFETY)
 
 
 #: The groups of a state, each with the function that makes a value of its message.
@@ -177,7 +225,7 @@ _READERS: Mapping[str, Callable[[Any], Any]] = {
     "torques": lambda message: value_of(values.Torques, message),
     "pose": _cartesian,
     "wrench": lambda message: value_of(values.Wrench, message),
-    "motion": lambda message: value_of(values.MotionStatus, message, id=message.motion),
+    "motion": _motion,
     "safety": _safety,
     "mode": lambda message: value_of(values.Control, message, mode=read_mode(message.mode)),
 }

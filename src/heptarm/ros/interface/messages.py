@@ -44,6 +44,7 @@ class RosAdapter:
         seconds: converts a time or a duration of a message to [s].
         duration: makes a duration of a message from [s].
         level: makes a level of a diagnostic message.
+        doubles: makes the contents of a field of doubles, in the type that costs the least to set.
         empty_stops: whether an empty trajectory on the topic stops the arm, as upstream's controller of ROS 1
             does; that of ROS 2 refuses it.
     """
@@ -60,6 +61,7 @@ class RosAdapter:
     seconds: Callable[[Any], float]
     duration: Callable[[float], Any]
     level: Callable[[int], Any]
+    doubles: Callable[[list[float]], Any]
     empty_stops: bool
 
 
@@ -211,13 +213,18 @@ def _point(ros: RosAdapter, sample: KinematicState, time: float) -> Any:
 
 def joint_state(ros: RosAdapter, state: State, names: Sequence[str], *, external: bool = False) -> Any:
     """Make a joint state of measured positions, velocities and torques; `external`: of external torques."""
-    velocity = [
-        speed if speed == speed else 0.0 for speed in state.dq.tolist()
-    ]  # NaN before the second sample
-    message = ros.joint_state(name=list(names), position=state.q.tolist(), velocity=velocity)
-    if state.torques is not None:
-        message.effort = (state.tau_ext if external else state.tau).tolist()
+    message = ros.joint_state(name=list(names))
+    fill_joint_state(ros, message, state, external=external)
     return message
+
+
+def fill_joint_state(ros: RosAdapter, message: Any, state: State, *, external: bool = False) -> None:
+    """Set all but the names and the header of a joint state; see `joint_state`."""
+    # NaN before the second sample
+    velocity = [speed if speed == speed else 0.0 for speed in state.dq.tolist()]
+    effort = [] if state.torques is None else (state.tau_ext if external else state.tau).tolist()
+    message.position, message.velocity = ros.doubles(state.q.tolist()), ros.doubles(velocity)
+    message.effort = ros.doubles(effort)
 
 
 def pose_message(ros: RosAdapter, pose: Pose) -> Any:

@@ -102,11 +102,14 @@ class StateMessages:
         self._joints, self._base = configuration.joints, configuration.frame("base")
         self._pose_stamped, self._wrench_stamped = stamped
         self._state, self._status = state, status
+        self._joint_state = ros.joint_state(name=list(self._joints))
         self._last: Any = None
         self._stamp = 0
 
     def states(self, state: State, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
         """Make the messages of a state by topic, each stamped with the ROS time at which its group was measured.
+
+        The message of the joints is the same object each time, filled again: to make one takes longer than to fill it.
 
         Args:
             state: the state.
@@ -120,7 +123,8 @@ class StateMessages:
         self._stamp = measured
         stamp = ros.time(self._stamp)
         if wanted("joint_states"):
-            yield "joint_states", _stamped(messages.joint_state(ros, state, self._joints), stamp)
+            messages.fill_joint_state(ros, self._joint_state, state)
+            yield "joint_states", _stamped(self._joint_state, stamp)
         if wanted("external_torques") and state.torques is not None:
             external = ros.joint_state(name=list(self._joints), effort=state.tau_ext.tolist())
             yield "external_torques", _stamped(external, self._time_of(groups.torques, state))

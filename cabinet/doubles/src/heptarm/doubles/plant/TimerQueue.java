@@ -11,14 +11,17 @@ import heptarm.doubles.seam.Seam;
 /**
  * Threads that sleep in simulation time; the plant calls {@link #tick} only when at least one of them is due.
  *
- * <p>While the robot rests, the realtime loop of the plant waits here as well, see {@link #rest}. A change that the plant must not
- * miss ends that by {@link #rouse}.
+ * <p>While the robot rests, the realtime loop of the plant waits here as well, see {@link #rest}. Then each thread wakes by itself,
+ * when its tick is due, and publishes the ticks until then: to be woken by the loop would cost two wakings instead of one. A change
+ * that the plant must not miss ends the rest by {@link #rouse}.
  */
 public final class TimerQueue {
     private static final class Sleeper {
         final Thread thread = Thread.currentThread();
         final long until;
         volatile boolean awake;
+        /** Whether it wakes by itself. */
+        volatile boolean timed;
 
         Sleeper(long until) {
             this.until = until;
@@ -36,9 +39,10 @@ public final class TimerQueue {
     private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
     private final AtomicBoolean roused = new AtomicBoolean();
-    private volatile long earliest = Long.MAX_VALUE;
     /** The realtime loop while it sleeps; null: it ticks. */
     private volatile Thread resting;
+    /** Tick at which the rest ends. */
+    private volatile long last;
 
     public TimerQueue(SharedState sharedState) {
         this.sharedState = sharedState;
@@ -53,27 +57,46 @@ public final class TimerQueue {
      * @return whether it was roused, also if that was before it came here; then the next tick has to be simulated
      */
     public boolean rest(long latest) {
-        long last = latest / Seam.TICK_NS;
-        resting = Thread.currentThread();
+        last = latest / Seam.TICK_NS;
+        beginRest();
         try {
             while (sharedState.computed() < last) {
                 boolean changed = roused.get();
-                long next = Math.min(sharedState.computed() + STRIDE, Math.min(last, ticks(earliest)));
-                long left = sharedState.wallTime(next) - System.nanoTime();
+                long left = sharedState.wallTime(Math.min(sharedState.computed() + STRIDE, last)) - System.nanoTime();
                 if (left > 0 && !changed) {
                     LockSupport.parkNanos(this, left);
                     continue;
                 }
-                sharedState.repeat(last, next + STRIDE);
+                repeat();
                 if (changed) {
                     break; // sleepers wait for the next tick, which shows the change
                 }
-                tick(sharedState.computed() * Seam.TICK_NS);
             }
         } finally {
-            resting = null;
+            endRest();
         }
         return roused.getAndSet(false);
+    }
+
+    private synchronized void beginRest() {
+        resting = Thread.currentThread();
+        for (Sleeper one : sleepers) {
+            if (!one.timed) {
+                LockSupport.unpark(one.thread);
+            }
+        }
+    }
+
+    private synchronized void endRest() {
+        resting = null;
+    }
+
+    /** Publishes the ticks that are due by now, as long as the robot rests. */
+    private synchronized void repeat() {
+        if (resting != null) {
+            sharedState.repeat(last, sharedState.computed() + 2 * STRIDE);
+            tick(sharedState.computed() * Seam.TICK_NS);
+        }
     }
 
     /** The first tick at or after a simulation time. */
@@ -106,12 +129,7 @@ public final class TimerQueue {
         for (Sleeper one : sleepers) {
             first = Math.min(first, one.until);
         }
-        boolean sooner = first < earliest;
-        earliest = first;
         sharedState.setWakeTime(first);
-        if (sooner) {
-            LockSupport.unpark(resting); // to sleep less long
-        }
     }
 
     /** Sleeps until the simulation time has reached {@code nanos}. */
@@ -123,7 +141,7 @@ public final class TimerQueue {
         }
         // the tick may have passed before the timer was registered: then no wake-up follows
         while (!own.awake && sharedState.computed() * Seam.TICK_NS < nanos) {
-            LockSupport.park(this);
+            await(own);
             if (Thread.interrupted()) {
                 remove(own);
                 throw new InterruptedException();
@@ -135,15 +153,31 @@ public final class TimerQueue {
         awaitDue(ticks(nanos));
     }
 
+    /** Waits for the plant's wake-up, or while the robot rests until the tick is due; may return sooner. */
+    private void await(Sleeper own) {
+        own.timed = resting != null && !roused.get() && ticks(own.until) <= last;
+        if (!own.timed) {
+            LockSupport.park(this);
+        } else if (!awaitMoment(ticks(own.until))) {
+            repeat();
+        }
+    }
+
+    /** Sleeps or spins for a moment unless a tick is due by now; returns whether it did. */
+    private boolean awaitMoment(long tick) {
+        long left = sharedState.wallTime(tick) - System.nanoTime();
+        if (left > SPIN_NS) {
+            LockSupport.parkNanos(this, left - SPIN_NS);
+        } else {
+            Thread.onSpinWait();
+        }
+        return left > 0;
+    }
+
     /** Waits until a tick that is computed is due: the plant wakes the sleepers before, since waking takes a while, too. */
     public void awaitDue(long tick) throws InterruptedException {
         while (sharedState.newest() < tick) {
-            long left = sharedState.wallTime(tick) - System.nanoTime();
-            if (left > SPIN_NS) {
-                LockSupport.parkNanos(this, left - SPIN_NS);
-            } else {
-                Thread.onSpinWait();
-            }
+            awaitMoment(tick);
             if (Thread.interrupted()) {
                 throw new InterruptedException();
             }
