@@ -13,10 +13,21 @@ public interface Clock {
     long sleepUntil(long nanos) throws InterruptedException;
 
     /**
+     * Sleeps until the robot's state of a cabinet time can be read by {@link #hold}: on a real robot until that time. A virtual one
+     * computes its state a moment sooner; {@link #awaitDue} waits for the rest.
+     *
+     * @return the cabinet time to hold [ns], at least the requested one
+     */
+    long sleepUntilReadable(long nanos) throws InterruptedException;
+
+    /** Waits until a cabinet time that {@link #sleepUntilReadable} has returned. */
+    void awaitDue(long nanos) throws InterruptedException;
+
+    /**
      * Fixes the instant that the calling thread reads from the robot, until {@link #release}. A real robot has no past: what
      * is read there is always of the present.
      *
-     * @param nanos time of the instant, at the latest the present
+     * @param nanos time of the instant, at the latest the present or what {@link #sleepUntilReadable} has returned
      */
     void hold(long nanos);
 

@@ -15,6 +15,14 @@ public final class RealClock implements Clock {
         return System.nanoTime();
     }
 
+    public long sleepUntilReadable(long nanos) throws InterruptedException {
+        return sleepUntil(nanos);
+    }
+
+    public void awaitDue(long nanos) {
+        // it has come
+    }
+
     public void hold(long nanos) {
         // a real robot shows the present
     }

@@ -28,6 +28,15 @@ final class ScaledClock implements Clock {
     }
 
     @Override
+    public long sleepUntilReadable(long nanos) throws InterruptedException {
+        return sleepUntil(nanos);
+    }
+
+    @Override
+    public void awaitDue(long nanos) {
+    }
+
+    @Override
     public void hold(long nanos) {
     }
 

@@ -161,7 +161,7 @@ public final class StateSampler {
         try {
             while (!closed) {
                 awaitSubscriber();
-                long now = clock.sleepUntil(next());
+                long now = clock.sleepUntilReadable(next());
                 try {
                     serve(now);
                     failing = false;
@@ -194,7 +194,7 @@ public final class StateSampler {
         return next;
     }
 
-    private void serve(long now) {
+    private void serve(long now) throws InterruptedException {
         int due = 0;
         for (Subscription one : subscriptions.values()) {
             if (one.due <= now) {
@@ -233,16 +233,19 @@ public final class StateSampler {
     }
 
     /** Reads the groups that are due and worth their cost now; keeps the newest samples of the others. */
-    private State sample(long now, int groups) {
+    private State sample(long now, int groups) throws InterruptedException {
         clock.hold(now);
         try {
-            return read(now, groups);
+            readMeasurements(now, groups);
+            clock.awaitDue(now); // what follows may change until then
+            readStatus(now, groups);
         } finally {
             clock.release();
         }
+        return choose(new State(joints, torques, pose, wrench, motion, safety, io, mode), groups);
     }
 
-    private State read(long now, int groups) {
+    private void readMeasurements(long now, int groups) {
         if (begin(jointsBudget, groups, now)) {
             joints = reader.sampleJoints(jointsBudget.stamp);
             end(jointsBudget);
@@ -259,6 +262,9 @@ public final class StateSampler {
             wrench = robot.sensors.readWrench(wrenchBudget.stamp);
             end(wrenchBudget);
         }
+    }
+
+    private void readStatus(long now, int groups) {
         if (begin(motionBudget, groups, now)) {
             double[] progress = {Double.NaN, Double.NaN};
             robot.sensors.readProgress(progress);
@@ -279,7 +285,6 @@ public final class StateSampler {
             String[] attached = tools.attached();
             mode = new ModeState(now, motions.status().mode, attached[0], attached[1], attached[2], attached[3]);
         }
-        return choose(new State(joints, torques, pose, wrench, motion, safety, io, mode), groups);
     }
 
     private boolean begin(ReadBudget budget, int groups, long now) {

@@ -39,13 +39,34 @@ public final class PlantClock implements Clock {
 
     @Override
     public long sleepUntil(long nanos) throws InterruptedException {
-        long tick = Math.max(0, (nanos + Seam.TICK_NS - 1) / Seam.TICK_NS);
-        if (sharedState.newest() < tick) {
-            timers.sleep(tick * Seam.TICK_NS);
+        long tick = tick(nanos);
+        sleepUntilComputed(tick);
+        timers.awaitDue(tick);
+        return sharedState.view(tick) * Seam.TICK_NS;
+    }
+
+    @Override
+    public long sleepUntilReadable(long nanos) throws InterruptedException {
+        long tick = tick(nanos);
+        sleepUntilComputed(tick);
+        return sharedState.view(tick) * Seam.TICK_NS;
+    }
+
+    @Override
+    public void awaitDue(long nanos) throws InterruptedException {
+        timers.awaitDue(tick(nanos));
+    }
+
+    private void sleepUntilComputed(long tick) throws InterruptedException {
+        if (sharedState.computed() < tick) {
+            timers.sleepUntilComputed(tick * Seam.TICK_NS);
         } else if (Thread.interrupted()) {
             throw new InterruptedException();
         }
-        return sharedState.view(tick) * Seam.TICK_NS;
+    }
+
+    private static long tick(long nanos) {
+        return Math.max(0, (nanos + Seam.TICK_NS - 1) / Seam.TICK_NS);
     }
 
     @Override

@@ -85,15 +85,17 @@ public final class SharedState {
     }
 
     /**
-     * Publishes the newest state again as that of each tick that is due: the robot rests. Only on the plant's realtime thread.
+     * Publishes the newest state again as that of each tick that is due: the robot rests. Only while the plant's realtime thread waits
+     * in {@link TimerQueue#rest}, and in one thread at a time.
      *
      * @param last tick after which none is published
      * @param late a tick that cannot be due, unless the machine was suspended: then that time is given up
+     * @param ahead the next tick counts as due if it is so near [ns]; no other one is published before it is due
      */
-    void repeat(long last, long late) {
+    void repeat(long last, long late, long ahead) {
         long tick = computed();
         long now = System.nanoTime();
-        long due = (now - anchor()) / period();
+        long due = (now + Math.min(ahead, period()) - anchor()) / period();
         if (due > late) {
             due = tick + 1;
             setWord(HeaderWords.START + HeaderWords.ANCHOR, now - due * period());
@@ -157,14 +159,19 @@ public final class SharedState {
     long view(long tick) {
         View view = views.get();
         view.held = false;
-        copy(view, newest() - tick > FAR ? newest() : tick);
+        copy(view, newest() - tick > FAR ? newest() : Math.min(tick, computed()));
         return view.tick;
     }
 
-    /** Keeps the calling thread at a tick, or at the newest if that tick is not kept any more, until {@link #release}. */
+    /**
+     * Keeps the calling thread at a tick, or at the newest if that tick is not kept any more, until {@link #release}. A tick that is
+     * not due yet can be held by the thread that has selected it.
+     */
     void hold(long tick) {
         View view = views.get();
-        copy(view, tick);
+        if (view.tick != tick) {
+            copy(view, Math.min(tick, newest()));
+        }
         view.held = true;
     }
 
@@ -182,7 +189,7 @@ public final class SharedState {
     }
 
     private void copy(View view, long wanted) {
-        long tick = Math.min(wanted, newest());
+        long tick = wanted;
         while (view.tick != tick) {
             int base = base(tick);
             if (word(base + StateWords.SEQ) == 2 * tick + 2) {

@@ -67,7 +67,7 @@ public final class TimerQueue {
                     LockSupport.parkNanos(this, left);
                     continue;
                 }
-                repeat();
+                repeat(0);
                 if (changed) {
                     break; // sleepers wait for the next tick, which shows the change
                 }
@@ -91,10 +91,10 @@ public final class TimerQueue {
         resting = null;
     }
 
-    /** Publishes the ticks that are due by now, as long as the robot rests. */
-    private synchronized void repeat() {
+    /** Publishes the ticks that are due by now, and the next one if it is so near [ns], as long as the robot rests. */
+    private synchronized void repeat(long ahead) {
         if (resting != null) {
-            sharedState.repeat(last, sharedState.computed() + 2 * STRIDE);
+            sharedState.repeat(last, sharedState.computed() + 2 * STRIDE, ahead);
             tick(sharedState.computed() * Seam.TICK_NS);
         }
     }
@@ -134,6 +134,12 @@ public final class TimerQueue {
 
     /** Sleeps until the simulation time has reached {@code nanos}. */
     public void sleep(long nanos) throws InterruptedException {
+        sleepUntilComputed(nanos);
+        awaitDue(ticks(nanos));
+    }
+
+    /** Sleeps until the tick of a simulation time is computed; it may not be due yet, see {@link #awaitDue}. */
+    void sleepUntilComputed(long nanos) throws InterruptedException {
         Sleeper own = new Sleeper(nanos);
         synchronized (this) {
             sleepers.add(own);
@@ -150,34 +156,33 @@ public final class TimerQueue {
         if (!own.awake) {
             remove(own);
         }
-        awaitDue(ticks(nanos));
     }
 
-    /** Waits for the plant's wake-up, or while the robot rests until the tick is due; may return sooner. */
+    /** Waits for the plant's wake-up, or while the robot rests until the tick is nearly due; may return sooner. */
     private void await(Sleeper own) {
         own.timed = resting != null && !roused.get() && ticks(own.until) <= last;
         if (!own.timed) {
             LockSupport.park(this);
-        } else if (!awaitMoment(ticks(own.until))) {
-            repeat();
+        } else if (!parkUntilNearly(ticks(own.until))) {
+            repeat(SPIN_NS);
         }
     }
 
-    /** Sleeps or spins for a moment unless a tick is due by now; returns whether it did. */
-    private boolean awaitMoment(long tick) {
-        long left = sharedState.wallTime(tick) - System.nanoTime();
-        if (left > SPIN_NS) {
-            LockSupport.parkNanos(this, left - SPIN_NS);
-        } else {
-            Thread.onSpinWait();
+    /** Sleeps unless a tick is due within {@link #SPIN_NS}; returns whether it did. */
+    private boolean parkUntilNearly(long tick) {
+        long left = sharedState.wallTime(tick) - System.nanoTime() - SPIN_NS;
+        if (left > 0) {
+            LockSupport.parkNanos(this, left);
+            return true;
         }
-        return left > 0;
+        Thread.onSpinWait();
+        return false;
     }
 
     /** Waits until a tick that is computed is due: the plant wakes the sleepers before, since waking takes a while, too. */
     public void awaitDue(long tick) throws InterruptedException {
         while (sharedState.newest() < tick) {
-            awaitMoment(tick);
+            parkUntilNearly(tick);
             if (Thread.interrupted()) {
                 throw new InterruptedException();
             }
