@@ -15,6 +15,9 @@ from typing import Any
 
 from tests.interrupts import ctrl_c_interrupts
 
+#: Java's optimising compiler is busy for so long with what is called a thousand times a second [s].
+WARM_UP = 12.0
+
 
 class Cabinet:
     """Starts `python -m heptarm.sim.runtime.cabinet` on a free port.

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+import heptarm as ha
 from bench.measure.blocks import Comparison, placements
-from bench.measure.cabinet import Cabinet
+from bench.measure.cabinet import WARM_UP, Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
 from bench.ros.peer import RATE
@@ -105,6 +106,9 @@ def _states(ros: str) -> Iterator[Figure]:
     if not _is_there(ros):
         return
     with Cabinet() as cabinet:
+        with ha.connect(cabinet.target, state_rate=1000) as arm:
+            for _ in arm.states(duration=WARM_UP):
+                pass
         found = _peer(ros, "states", cabinet.target, str(cabinet.process.pid))
     for rate, measured in found.items():
         name = f"{ros}_states_{rate}hz"

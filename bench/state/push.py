@@ -20,7 +20,7 @@ import numpy as np
 
 import heptarm as ha
 from bench.measure.blocks import BLOCKS, Placement, by_turns, pin
-from bench.measure.cabinet import Cabinet
+from bench.measure.cabinet import WARM_UP, Cabinet
 from bench.measure.compiler import compiled
 from bench.measure.figure import Figure, benchmark
 from bench.measure.stalls import stalled
@@ -32,8 +32,6 @@ from heptarm.values.robot import ROBOTS
 SECONDS = float(os.environ.get("BENCH_SECONDS", "60"))
 #: One late state in a hundred is what a machine's other work decides as well, so many blocks have to settle it.
 MANY = max(15, BLOCKS)
-#: Java's optimising compiler is busy for so long with what is called a thousand times a second [s].
-WARM_UP = 12.0
 #: From a client's connection to its first state that counts, and from its end until the cabinet rests: the arm brakes,
 #: and half a second later nothing is simulated [s].
 SETTLING, RESTING = 1.0, 1.5

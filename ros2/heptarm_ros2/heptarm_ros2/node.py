@@ -216,8 +216,13 @@ class HeptarmNode(LifecycleNode):
 
     def on_state(self, state: State) -> None:
         """Publish a state."""
-        if not self._can_publish:
-            return
+        try:
+            self._publish_state(state)
+        except Exception:
+            if self._can_publish:  # asked only now: it takes half as long as to make a message
+                raise
+
+    def _publish_state(self, state: State) -> None:
         for publisher in (*self._state_publishers, self._events):
             if publisher is not None:
                 publisher.state(state)

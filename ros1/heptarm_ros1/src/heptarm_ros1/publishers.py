@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import rospy
 from control_msgs.msg import JointTrajectoryControllerState
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,7 +15,6 @@ from heptarm.ros.interface.state_messages import StateMessages, TransformMessage
 from heptarm.ros.node.diagnostics import Diagnosis
 from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration
-from heptarm.ros.trajectory.execution import speed_scaling
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
@@ -45,16 +42,14 @@ class StatePublisher:
         self._status = publisher(Status, "~status", latch=True)
         self._controller = publisher(JointTrajectoryControllerState, "~controller_state")
         self._scaling = publisher(Float64, "~speed_scaling", latch=True)
-        self._last_scaling = math.nan
         self._diagnostics = publisher(DiagnosticArray, "/diagnostics")
 
     def state(self, state: State) -> None:
         """Publish a state, and the fraction of its speed at which a trajectory is executed if that has changed."""
         for name, message in self._messages.states(state, self._is_wanted):
             self._states[name].publish(message)
-        scaling = speed_scaling(state)
-        if scaling != self._last_scaling:
-            self._last_scaling = scaling
+        scaling = self._messages.scaling(state)
+        if scaling is not None:
             self._scaling.publish(Float64(data=scaling))
 
     def _is_wanted(self, topic: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
@@ -14,6 +15,7 @@ from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.interface.names import NameRole, PresetName
 from heptarm.ros.node.diagnostics import Diagnosis
 from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.ros.trajectory.execution import speed_scaling
 from heptarm.ros.trajectory.trajectory import TrajectorySample
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
@@ -69,6 +71,8 @@ _SAFETY = (
 _STAMP_STEP = 1000
 #: A stamp that is this much older than the last one [ns]: the ROS clock was set back, as by a simulation that restarts.
 _CLOCK_JUMP = 10**9
+#: Least time between two looks at the speed scaling, and at who subscribes to what [ns].
+_LOOK_STEP = 20_000_000
 
 
 class _Sampled(Protocol):
@@ -105,6 +109,9 @@ class StateMessages:
         self._joint_state = ros.joint_state(name=list(self._joints))
         self._last: Any = None
         self._stamp = 0
+        self._scaling, self._scaling_due = math.nan, 0
+        self._wanted: dict[str, bool] = {}
+        self._wanted_until = 0
 
     def states(self, state: State, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
         """Make the messages of a state by topic, each stamped with the ROS time at which its group was measured.
@@ -113,29 +120,45 @@ class StateMessages:
 
         Args:
             state: the state.
-            wanted: whether anybody subscribes to a topic; asked when those before it are published. The others cost
-                nothing: on a busy processor, a message reaches its subscribers when all messages have been made.
+            wanted: whether anybody subscribes to a topic; asked when those before it are published, 50 times a second.
+                The others cost nothing: on a busy processor, a message reaches its subscribers when all have been made.
         """
         ros, groups = self._ros, state.groups
+        if state.sampled >= self._wanted_until:
+            self._wanted, self._wanted_until = {}, state.sampled + _LOOK_STEP
         measured = _measured(ros, state, groups.joints)
         if measured > self._stamp - _CLOCK_JUMP:
             measured = max(self._stamp + _STAMP_STEP, measured)
         self._stamp = measured
         stamp = ros.time(self._stamp)
-        if wanted("joint_states"):
+        if self._is_wanted("joint_states", wanted):
             messages.fill_joint_state(ros, self._joint_state, state)
             yield "joint_states", _stamped(self._joint_state, stamp)
-        if wanted("external_torques") and state.torques is not None:
+        if self._is_wanted("external_torques", wanted) and state.torques is not None:
             external = ros.joint_state(name=list(self._joints), effort=state.tau_ext.tolist())
             yield "external_torques", _stamped(external, self._time_of(groups.torques, state))
-        if wanted("pose") and groups.pose is not None:
+        if self._is_wanted("pose", wanted) and groups.pose is not None:
             pose = self._pose_stamped(pose=messages.pose_message(ros, state.pose))
             yield "pose", _stamped(pose, self._time_of(groups.pose, state), self._base)
-        if wanted("wrench") and groups.wrench is not None:
+        if self._is_wanted("wrench", wanted) and groups.wrench is not None:
             wrench = self._wrench_stamped(wrench=messages.wrench_message(ros, state))
             yield "wrench", _stamped(wrench, self._time_of(groups.wrench, state), self._base)
-        if wanted("state"):
+        if self._is_wanted("state", wanted):
             yield "state", _stamped(self._robot_state(state), stamp, self._base)
+
+    def _is_wanted(self, topic: str, wanted: Callable[[str], bool]) -> bool:
+        known = self._wanted.get(topic)
+        if known is None:
+            known = self._wanted[topic] = wanted(topic)
+        return known
+
+    def scaling(self, state: State) -> float | None:
+        """The fraction of its speed at which a trajectory is executed if it has changed; looks 50 times a second."""
+        if state.sampled < self._scaling_due:
+            return None
+        self._scaling_due = state.sampled + _LOOK_STEP
+        before, self._scaling = self._scaling, speed_scaling(state)
+        return None if self._scaling == before else self._scaling
 
     def controller_state(self, kind: Any, state: State, sample: TrajectorySample | None) -> Any:
         """Make the state of the controller for the last one of `states`; see `messages.controller_state`."""
