@@ -37,7 +37,7 @@ TURNS = np.array([1.0, 2.0, 1.5, 1.0, 2.0, 1.5, 2.5])
 
 
 class Watch:
-    """Records all messages of a topic of joint states.
+    """Records all messages of a topic of joint states or robot states.
 
     Args:
         stamp: time stamp of a message [s].
@@ -65,10 +65,11 @@ class Watch:
         return np.array([came for came, _ in taken]), np.array([self._stamp(one) for _, one in taken])
 
     @property
-    def track(self) -> tuple[Floats, Floats]:
-        """Stamps [s] and positions [rad], shapes (n,) and (n, 7)."""
-        taken = list(self._taken)
-        return np.array([self._stamp(one) for _, one in taken]), np.array([one.position for _, one in taken])
+    def track(self) -> tuple[Floats, Floats, Floats]:
+        """Of robot states: stamps, controller's clock [s], and positions [rad], shapes (n,), (n,) and (n, 7)."""
+        taken = [one for _, one in self._taken]
+        clock = 1e-9 * np.array([one.cabinet_stamp for one in taken])
+        return np.array([self._stamp(one) for one in taken]), clock, np.array([one.position for one in taken])
 
 
 def wave(fraction: Floats) -> tuple[Floats, Floats, Floats]:
@@ -89,9 +90,12 @@ def wave(fraction: Floats) -> tuple[Floats, Floats, Floats]:
 def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
     """Send the trajectory, wait for its end, and measure its accuracy.
 
+    The moments at which the arm passes the points are of the controller's clock, compared with that of ROS until the
+    start: a virtual cabinet that its machine holds up loses time, and passes all later points as much later by ROS.
+
     Args:
         client: of the action.
-        watch: on the node's joint states.
+        watch: on the node's robot states.
         execution: of the node.
     """
     fraction = np.arange(1, POINTS + 1) / POINTS
@@ -106,8 +110,10 @@ def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
     ended = client.result(sent)
     assert ended.outcome is GoalOutcome.SUCCEEDED, ended
     time.sleep(0.1)  # the last states are in transit
-    stamps, places = watch.track
-    times = stamps - start
+    stamps, clock, places = watch.track
+    by_ros = stamps - start
+    apart = clock - stamps
+    times = by_ros + apart - np.median(apart[by_ros < 0.0])
     fine = np.arange(-0.02, 0.02005, 0.0001)
     distances, moments = [], []
     for point in points:
@@ -116,15 +122,16 @@ def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
         near = off <= NEAR[execution]
         moments.append(float(np.abs(fine[near]).min()) if near.any() else float("inf"))
         distances.append(float(off.min()))
-    plain = np.stack([np.interp([p.time for p in points], times, places[:, j]) for j in range(7)], axis=1)
+    plain = np.stack([np.interp([p.time for p in points], by_ros, places[:, j]) for j in range(7)], axis=1)
     error = np.abs(plain - np.array([p.q for p in points])).max(axis=1)
-    gaps = np.diff(times[(times > 0.0) & (times < SECONDS)])
+    gaps = np.diff(by_ros[(by_ros > 0.0) & (by_ros < SECONDS)])
     return {
         "distance": max(distances),
         "moment": max(moments),
         "missed": int(np.isinf(moments).sum()),
         "at_its_time": float(error.max()),
         "at_its_time_rms": float(np.sqrt((error**2).mean())),
+        "held_up": float((by_ros - times)[(by_ros > 0.0) & (by_ros < SECONDS)].max()),
         "states": len(times),
         "longest_gap": float(gaps.max()),
     }

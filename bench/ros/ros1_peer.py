@@ -14,16 +14,17 @@ import time
 from typing import Any
 
 import rospy
+from heptarm_msgs.msg import RobotState
 from sensor_msgs.msg import JointState
 
 from bench.ros.peer import DRIFT, RATE, RATES, Watch, compare, follow, stream
 from tests.ros1.peer import Client, Core, NodeProcess, until
 
 
-def watched(topic: str) -> Watch:
-    """Watch a topic of joint states."""
+def watched(topic: str, kind: type = JointState) -> Watch:
+    """Watch a topic."""
     watch = Watch(lambda message: message.header.stamp.to_sec())
-    rospy.Subscriber(topic, JointState, watch.take, queue_size=100, tcp_nodelay=True)
+    rospy.Subscriber(topic, kind, watch.take, queue_size=100, tcp_nodelay=True)
     return watch
 
 
@@ -38,7 +39,7 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
     node = NodeProcess(target, state_rate=RATE, execution=execution)
     client = Client(None)
     client.ready()
-    found = follow(client, watched("/joint_states"), execution)
+    found = follow(client, watched("/heptarm/state", RobotState), execution)
     _end(node)
     return found
 

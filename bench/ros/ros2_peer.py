@@ -14,6 +14,7 @@ import time
 from typing import Any, NoReturn
 
 import rclpy
+from heptarm_msgs.msg import RobotState
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
@@ -21,10 +22,10 @@ from bench.ros.peer import DRIFT, RATE, RATES, Watch, compare, follow, stream
 from tests.ros2.peer import Client, NodeProcess, Ros, stamp, until
 
 
-def watched(ros: Ros, topic: str) -> Watch:
-    """Watch a topic of joint states."""
+def watched(ros: Ros, topic: str, kind: type = JointState) -> Watch:
+    """Watch a topic."""
     watch = Watch(stamp)
-    ros.node.create_subscription(JointState, topic, watch.take, 100)
+    ros.node.create_subscription(kind, topic, watch.take, 100)
     return watch
 
 
@@ -34,7 +35,7 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
     node = NodeProcess(target, state_rate=RATE, execution=execution)
     client = Client(ros, None)
     client.ready()
-    found = follow(client, watched(ros, "/joint_states"), execution)
+    found = follow(client, watched(ros, "/heptarm/state", RobotState), execution)
     node.finish()
     ros.close()
     return found
