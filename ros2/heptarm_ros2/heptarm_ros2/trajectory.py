@@ -69,7 +69,7 @@ class TrajectoryAction:
 
     def _on_goal(self, message: FollowJointTrajectory.Goal) -> GoalResponse:
         try:
-            goal = messages.action_goal(self._ros, message, now=self._driver.now)
+            goal = messages.action_goal(self._ros, message, now=lambda: self._driver.now)
             with self._accepting:
                 number = self._driver.accept(goal)
                 with self._lock:

@@ -59,7 +59,7 @@ class TrajectoryAction:
         try:
             if driver is None:
                 raise GoalRefused("the node is not configured", hint="call ~configure")
-            goal = messages.action_goal(ROS, handle.get_goal(), now=driver.now)
+            goal = messages.action_goal(ROS, handle.get_goal(), now=lambda: driver.now)
             with self._lock:
                 self._handles[driver.accept(goal)] = handle
                 handle.set_accepted()
@@ -99,7 +99,7 @@ class TrajectoryAction:
             handle = self._handles.get(value.number)
         driver = self._driver
         if handle is not None and driver is not None:
-            handle.publish_feedback(messages.feedback(ROS, value, self._joints, now=driver.now))
+            handle.publish_feedback(messages.feedback(ROS, value, self._joints, now=lambda: driver.now))
 
     def _end(self, result: GoalResult) -> None:
         with self._lock:

@@ -25,6 +25,8 @@ from heptarm.values.state import State
 
 #: Fields of a goal that only ROS 2 has, and that are not supported.
 _EXTRAS = ("component_path_tolerance", "component_goal_tolerance")
+#: Readings of two clocks that are compared: another thread may run between the two for some milliseconds.
+_READINGS = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,13 +90,13 @@ def put(message: Any, fields: Mapping[str, Any]) -> None:
 # -------------------------------------------------------------------------------------- trajectories
 
 
-def trajectory_goal(ros: RosAdapter, message: Any, *, now: float) -> TrajectoryGoal:
+def trajectory_goal(ros: RosAdapter, message: Any, *, now: Callable[[], float]) -> TrajectoryGoal:
     """Convert a trajectory without tolerances.
 
     Args:
         ros: types and time of the ROS.
         message: trajectory_msgs/JointTrajectory.
-        now: current time on the clock of the execution [s].
+        now: reads the clock of the execution [s].
     """
     stamp = ros.seconds(message.header.stamp)
     return TrajectoryGoal(
@@ -109,11 +111,18 @@ def trajectory_goal(ros: RosAdapter, message: Any, *, now: float) -> TrajectoryG
             )
             for point in message.points
         ),
-        start=None if stamp == 0.0 else now + (stamp - 1e-9 * ros.now()),
+        start=None if stamp == 0.0 else _moment(ros, stamp, now),
     )
 
 
-def action_goal(ros: RosAdapter, message: Any, *, now: float) -> TrajectoryGoal:
+def _moment(ros: RosAdapter, stamp: float, now: Callable[[], float]) -> float:
+    """A ROS time [s] on another clock [s]: of several readings of both clocks the one with the least time between."""
+    readings = ((ros.now(), now(), ros.now()) for _ in range(_READINGS))
+    before, here, after = min(readings, key=lambda one: one[2] - one[0])
+    return here + (stamp - 0.5e-9 * (before + after))
+
+
+def action_goal(ros: RosAdapter, message: Any, *, now: Callable[[], float]) -> TrajectoryGoal:
     """Convert a goal of control_msgs/FollowJointTrajectory; see `trajectory_goal`."""
     plain = trajectory_goal(ros, message.trajectory, now=now)
     several = getattr(message, "multi_dof_trajectory", None)

@@ -111,7 +111,7 @@ def joint_trajectory(context: NodeContext, message: Any, sent: PublishInfo) -> N
     if not message.points and context.ros.empty_stops:
         context.driver.end_trajectory()
         return
-    goal = trajectory_goal(context.ros, message, now=context.driver.now)
+    goal = trajectory_goal(context.ros, message, now=lambda: context.driver.now)
     context.driver.accept(replace(goal, from_topic=True, sent=sent))
 
 

@@ -160,6 +160,7 @@ public final class TimerQueue {
 
     /** Waits for the plant's wake-up, or while the robot rests until the tick is nearly due; may return sooner. */
     private void await(Sleeper own) {
+        own.timed = false; // before the look, so that a rest that begins just now ends the sleep
         own.timed = resting != null && !roused.get() && ticks(own.until) <= last;
         if (!own.timed) {
             LockSupport.park(this);
