@@ -356,7 +356,8 @@ def test_udp_that_is_cut_is_replaced_by_tcp_at_once_and_used_again_later(arm: Pa
         assert moving(servo, 2.5)
         assert one.state.age < 1.0
         report = one.connection.datagrams
-        assert report is not None and report.targets_over_tcp > 100 and not report.gets_through
+        assert report is not None and not report.gets_through
+        assert report.targets_over_tcp > 0.5 * report.targets  # a busy machine sends fewer of them
         for direction in ("up", "down"):
             datagrams.attack(direction, None)  # type: ignore[arg-type]
         until(lambda: moving(servo, 0.05) and one.connection.datagrams.gets_through, "datagrams again")  # type: ignore[union-attr]
