@@ -99,7 +99,7 @@ class TrajectoryAction:
             handle = self._handles.get(value.number)
         driver = self._driver
         if handle is not None and driver is not None:
-            handle.publish_feedback(messages.feedback(ROS, value, self._joints, now=lambda: driver.now))
+            handle.publish_feedback(messages.feedback(ROS, value, self._joints, now=driver.now))
 
     def _end(self, result: GoalResult) -> None:
         with self._lock:
