@@ -68,6 +68,29 @@ class _Received:
             raise _undecodable(error) from error
 
 
+class _Fired:
+    """The state in an event: each group is made when it is asked for, so that a group that cannot be read ends no link.
+
+    Args:
+        message: the event.
+    """
+
+    __slots__ = ("_message", "stamp")
+
+    def __init__(self, message: wire.ConditionFired | wire.TriggerFired) -> None:
+        groups = (getattr(message, name, None) for name in values.GROUP_NAMES)
+        self._message = message
+        self.stamp: int = max((group.stamp for group in groups if group is not None), default=0)
+
+    def make(self, name: str) -> Any:
+        """The group of a name; None: the event has none. Raises as `_Received.make` does."""
+        group = getattr(self._message, name, None)
+        try:
+            return None if group is None else _READERS[name](group)
+        except ValueError as error:
+            raise _undecodable(error) from error
+
+
 def _undecodable(error: Exception) -> RemoteProtocolError:
     return RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}")
 
@@ -120,9 +143,8 @@ def read_firing(
     """The state of the robot when a condition or a trigger fired, as far as the cabinet reported it."""
     if message.joints is None:
         return None
-    sent = ((name, getattr(message, name, None)) for name in values.GROUP_NAMES)
-    groups = values.Groups(**{name: _READERS[name](group) for name, group in sent if group is not None})
-    return values.State(groups, offset.to_ours(groups.stamp), clock)
+    source = _Fired(message)
+    return values.State(values.Groups.of(source), offset.to_ours(source.stamp), clock)
 
 
 def read_result(message: wire.MotionFinished, state: values.State | None) -> Result:
