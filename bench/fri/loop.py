@@ -38,7 +38,7 @@ _JOINTS = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
 _NONE = 1000.0
 #: How long before a message is due a client polls that does [s].
 _POLL = 0.2e-3
-#: Largest ratio of a compiled law's median to the echo's, each side on a processor of its own.
+#: Largest ratio of a compiled law's median to the echo's.
 _LAW_LIMIT = 1.1
 _LIMITS = (("", 50.0, 1.35), ("_p99", 99.0, 1.5))
 
@@ -79,9 +79,7 @@ def fri_laws() -> Iterator[Figure]:
         in_c = law_from(made, "step", params=drift.params, memory=drift.memory)
         for label, law in (("numba", drift), ("c", in_c)):
             for found, detail in _compare(folder, CYCLES // BLOCKS, busy=True, law=law):
-                # on one processor the echo does not have to wake up, and a microsecond is a fourth of its latency
-                limit = _LAW_LIMIT if found.placement.name == "two_cores" else None
-                yield found.figure(f"fri_law_{label}", 50.0, "us", limit=limit, detail=detail)
+                yield found.figure(f"fri_law_{label}", 50.0, "us", limit=_LAW_LIMIT, detail=detail)
             for found, detail in _compare(folder, CYCLES // BLOCKS, busy=True, law=law, busy_poll=_POLL):
                 yield found.figure(f"fri_law_{label}_polled", 50.0, "us", limit=_LAW_LIMIT, detail=detail)
 

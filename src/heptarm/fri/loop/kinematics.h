@@ -94,15 +94,16 @@ struct chain {
     double origin[N][3], flange[3];
 };
 
-/* What relates wrenches on the flange to torques of the joints in a posture: its Jacobian, base axes, and the factor of the
-   damped square of that. */
+/* What gives the wrench on the flange by the torques of the joints in a posture: the damped inverse of the transposed
+   Jacobian, base axes. */
 struct wrench_map {
-    double q[N], j[6][N], factor[36];
+    double q[N], inverse[6][N];
 };
 
 /* 0 if the damped square is not positive definite. */
 static int map_wrenches(const struct chain *chain, const double *q, struct wrench_map *map) {
     double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3], axis[N][3], origin[N][3];
+    double j[6][N], factor[36], column[6];
     memcpy(map->q, q, sizeof map->q);
     for (int i = 0; i < N; i++) {
         advance(i, chain->origin[i], q[i], turn, place, axis[i]);
@@ -110,14 +111,19 @@ static int map_wrenches(const struct chain *chain, const double *q, struct wrenc
     }
     rotate(turn, chain->flange, offset);
     for (int k = 0; k < 3; k++) place[k] += offset[k];
-    jacobian(axis, origin, place, map->j);
-    return damped_square(map->j, map->factor);
+    jacobian(axis, origin, place, j);
+    if (!damped_square(j, factor)) return 0;
+    for (int i = 0; i < N; i++) {
+        for (int r = 0; r < 6; r++) column[r] = j[r][i];
+        solve(factor, 6, column);
+        for (int r = 0; r < 6; r++) map->inverse[r][i] = column[r];
+    }
+    return 1;
 }
 
 /* External wrench on the flange, base axes [N, Nm], that explains external torques of the joints best (least squares). */
 static void explain_torques(const struct wrench_map *map, const double *tau, double *wrench) {
-    for (int r = 0; r < 6; r++) wrench[r] = dot(map->j[r], tau, N);
-    solve(map->factor, 6, wrench);
+    for (int r = 0; r < 6; r++) wrench[r] = dot(map->inverse[r], tau, N);
 }
 
 #endif

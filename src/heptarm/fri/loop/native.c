@@ -100,6 +100,11 @@ static int doubles(struct part p, int tag, int count, int frame, double *into) {
     while (p.at < p.end) {
         uint64_t key, number;
         struct part one;
+        if (*p.at == (tag << 3 | 1) && found < count && p.end - p.at > 8) { /* a controller sends one by one */
+            memcpy(into + found++, p.at + 1, 8);
+            p.at += 9;
+            continue;
+        }
         if (!field(&p, &key, &number, &one)) return 0;
         if (frame && key == (1 << 3 | 2) && !names++ && is_plain_name(one)) continue;
         if (frame && key == (3 << 3 | 2) && stamp(one, &none)) continue;

@@ -41,8 +41,9 @@ HEAD = 80
 LAW_PATIENCE = 10
 #: A call of a compiled law that has used this much of the processor's time is ended [ns].
 LAW_CUT = 20_000_000
-#: How long before a message is due the loop warms up caches [ns]; an answer takes less, however cold they are.
-WARM_UP = 100_000
+#: How long before a message is due the loop warms up caches [ns]; an answer takes less, however cold they are. What
+#: else runs on its processor takes them again: after 100 us, a program that collects garbage has taken most.
+WARM_UP = 50_000
 #: Largest size of robot and connection info in messages for the native part.
 MAX_PLAIN = 64
 
@@ -103,7 +104,7 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("word", 1, "has_chain has_map"),
     ("real", 24, "chain"),
     ("real", AXES, "posture"),
-    ("real", AXES + 6 * AXES + 36, "map"),
+    ("real", AXES + 6 * AXES, "map"),
     # bands of the external torques
     ("word", 1, "has_watch"),
     ("real", AXES, "watch_threshold watch_baseline watch_margin"),

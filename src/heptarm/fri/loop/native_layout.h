@@ -203,7 +203,7 @@ enum {
 #define LONGEST 1000000000000000LL
 #define LAW_PATIENCE 10LL
 #define LAW_CUT 20000000LL
-#define WARM_UP 100000LL
+#define WARM_UP 50000LL
 #define NEARBY 0.002
 
 struct loop {
@@ -233,7 +233,7 @@ struct loop {
     word has_chain, has_map;
     double chain[24];
     double posture[7];
-    double map[85];
+    double map[49];
     word has_watch;
     double watch_threshold[7], watch_baseline[7], watch_margin[7];
     double plausible_low[7], plausible_high[7];

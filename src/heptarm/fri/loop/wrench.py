@@ -53,6 +53,8 @@ class WrenchEstimator:
         self.chain = tuple(chain)
         self._origins = [tuple(chain[3 * i : 3 * i + 3]) for i in range(JOINTS)]
         self._flange = tuple(chain[3 * JOINTS :])
+        self._posture: tuple[float, ...] | None = None
+        self._inverse: list[list[float]] = []
 
     def wrench(self, q: Sequence[float], tau_ext: Sequence[float]) -> list[float]:
         """Estimate the wrench.
@@ -64,7 +66,13 @@ class WrenchEstimator:
         Returns:
             Force and moment on the flange in base axes [N, Nm].
         """
-        columns = self._jacobian(q)
+        if self._posture != tuple(q):
+            self._posture, self._inverse = tuple(q), self._inverse_of(q)
+        return [_dot(row, tau_ext) for row in self._inverse]
+
+    def _inverse_of(self, q: Sequence[float]) -> list[list[float]]:
+        """Damped inverse of the transposed Jacobian, of shape (6, 7)."""
+        columns = [list(column) for column in self._jacobian(q)]
         rows = [[column[r] for column in columns] for r in range(6)]
         factor = [[0.0] * 6 for _ in range(6)]
         for i in range(6):
@@ -72,14 +80,14 @@ class WrenchEstimator:
                 value = _dot(rows[i], rows[j]) + (DAMPING if i == j else 0.0)
                 value -= _dot(factor[i][:j], factor[j])
                 factor[i][j] = sqrt(value) if i == j else value / factor[j][j]
-        result = [_dot(row, tau_ext) for row in rows]
-        for i in range(6):
-            result[i] = (result[i] - _dot(factor[i][:i], result)) / factor[i][i]
-        for i in range(5, -1, -1):
-            for j in range(i + 1, 6):
-                result[i] -= factor[j][i] * result[j]
-            result[i] /= factor[i][i]
-        return result
+        for column in columns:
+            for i in range(6):
+                column[i] = (column[i] - _dot(factor[i][:i], column)) / factor[i][i]
+            for i in range(5, -1, -1):
+                for j in range(i + 1, 6):
+                    column[i] -= factor[j][i] * column[j]
+                column[i] /= factor[i][i]
+        return [[column[r] for column in columns] for r in range(6)]
 
     def _jacobian(self, q: Sequence[float]) -> list[tuple[float, ...]]:
         """Columns of the Jacobian of the flange."""
