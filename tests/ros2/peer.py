@@ -346,6 +346,8 @@ def _value(value: object) -> ParameterValue:
         return ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=value)
     if isinstance(value, str):
         return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    if isinstance(value, int):
+        return ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=value)
     assert isinstance(value, float)
     return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
 

@@ -37,7 +37,7 @@ from tests.conformance.case import (
 )
 from tests.conformance.stage import Stage
 from tests.conformance.streams import streamed
-from tests.ros2.peer import Client, NodeProcess, Ros, fresh, parameter, until
+from tests.ros2.peer import PATIENCE, Client, NodeProcess, Ros, fresh, parameter, until
 
 Start = Callable[..., NodeProcess]
 
@@ -117,6 +117,39 @@ def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
             assert descriptor.floating_point_range[0].to_value == one.high
         for choice in one.choices:
             assert choice in descriptor.additional_constraints
+
+
+def test_an_integer_is_a_number_as_users_write_it(ros: Ros, spare: Stage, nodes: Start) -> None:
+    nodes(spare.target, name="whole", space="/alone", autostart=False, state_rate=200, execution="servo")
+    whole = Client(ros, spare, "/alone/whole")
+
+    def value(name: str) -> float:
+        request = GetParameters.Request(names=[name])
+        return float(ros.call(GetParameters, "/alone/whole/get_parameters", request).values[0].double_value)
+
+    assert value("state_rate") == 200.0
+    assert whole.set(state_rate=50, start_tolerance=1)
+    assert value("state_rate") == 50.0 and value("start_tolerance") == 1.0
+    assert not whole.set(state_rate="fast") and not whole.set(state_rate=1000) and value("state_rate") == 50.0
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"state_rate": 1000}, "state_rate must be in [1, 500], got 1000"),
+        ({"state_rate": "fast"}, "state_rate must be a number, got 'fast'"),
+        ({"execution": "magic"}, "execution must be one of 'servo', 'spline', 'fri', got 'magic'"),
+        ({"joint_names": "A"}, "joint_names must be a list of strings, got 'A'"),
+    ],
+)
+def test_a_parameter_that_cannot_be_ends_the_node_with_one_line(
+    spare: Stage, values: dict[str, object], words: str
+) -> None:
+    node = NodeProcess(spare.target, name="wrong", space="/alone", **values)
+    assert node.process.wait(PATIENCE) == 1
+    assert words in node.said and "Traceback" not in node.said
+    assert len(node.said.strip().splitlines()) == 1, node.said
+    node.log.unlink()
 
 
 def test_parameters_that_count_later_are_refused_while_connected(client: Client) -> None:

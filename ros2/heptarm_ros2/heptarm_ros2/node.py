@@ -60,6 +60,8 @@ class HeptarmNode(LifecycleNode):
         for one in parameters.joint_parameters(self.get_parameter("joint_names").value or []):
             self._declare(one)
         self.configuration = NodeConfiguration.of({})
+        if hasattr(self, "add_pre_set_parameters_callback"):  # Humble refuses an integer for a number
+            self.add_pre_set_parameters_callback(self._before_set)
         self.add_on_set_parameters_callback(self._on_set)
         self._start_timer = None
         if self.get_parameter("autostart").value:
@@ -77,7 +79,10 @@ class HeptarmNode(LifecycleNode):
             descriptor.floating_point_range = [FloatingPointRange(from_value=one.low, to_value=one.high)]
         if one.choices:
             descriptor.additional_constraints = f"one of {', '.join(one.choices)}"
-        self.declare_parameter(one.name, one.default, descriptor)
+        # with a type from the first, rclpy would end the process at `state_rate: 200` in a file
+        given = self.declare_parameter(one.name, one.default, ParameterDescriptor(dynamic_typing=True)).value
+        self.undeclare_parameter(one.name)
+        self.declare_parameter(one.name, one.check(given), descriptor, ignore_override=True)
 
     def _values(self) -> dict[str, object]:
         names = [one.name for one in parameters.PARAMETERS]
@@ -85,6 +90,16 @@ class HeptarmNode(LifecycleNode):
             one.name for one in parameters.joint_parameters(self.get_parameter("joint_names").value or [])
         ]
         return {name: self.get_parameter(name).value for name in names}
+
+    def _before_set(self, changes: list[RosParameter]) -> list[RosParameter]:
+        """Make numbers of the integers that are given for numbers."""
+        numbers = {name for name, value in self._values().items() if isinstance(value, float)}
+        return [
+            RosParameter(one.name, value=float(one.value))
+            if one.name in numbers and one.type_ is RosParameter.Type.INTEGER
+            else one
+            for one in changes
+        ]
 
     def _on_set(self, changes: Sequence[RosParameter]) -> SetParametersResult:
         """Check parameters before they are set, and apply them."""

@@ -13,9 +13,12 @@ from typing import Any, NoReturn, TypeVar
 
 import rclpy
 from rclpy.executors import Executor, InvalidHandle, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from heptarm.errors import HeptarmError
 
 One = TypeVar("One", bound=Node)
 
@@ -48,6 +51,8 @@ def run(
     close: Callable[[One], None] = lambda _: None,
 ) -> NoReturn:
     """Run a node until a signal comes or a callback fails, and end the process; its exit code is 1 after a failure.
+
+    A node that refuses its parameters is a failure, which is logged.
 
     The signal handlers of ROS would shut it down immediately, while the executor and the node still use it.
 
@@ -87,6 +92,9 @@ def run(
         failed.wait()
     except KeyboardInterrupt:
         pass
+    except HeptarmError as error:  # of a parameter
+        get_logger("heptarm").fatal(str(error))
+        failed.set()
     if node is not None:
         close(node)
     over.set_result(None)
