@@ -28,7 +28,7 @@ from bench.ros import nodes  # noqa: F401
 from bench.safety import lost_client, stopping  # noqa: F401
 from bench.servo import stream  # noqa: F401
 from bench.simulator import life, tick  # noqa: F401
-from bench.speed import fleet, idle, kinematics, request, unpaced  # noqa: F401
+from bench.speed import dynamics, fleet, idle, kinematics, request, unpaced  # noqa: F401
 from bench.state import push  # noqa: F401
 from bench.strangers import programs  # noqa: F401
 from bench.trust import lost_client as lost_clients  # noqa: F401

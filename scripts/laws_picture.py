@@ -18,18 +18,20 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from heptarm import laws  # noqa: E402
-from tests.laws.plant import ARM, DT, HOME, Plant  # noqa: E402
+from tests.laws.plant import DT, HOME, Plant  # noqa: E402
 
 
 def main() -> None:
     """Draw the picture."""
-    figure, axes = plt.subplots(2, 3, figsize=(12, 6), constrained_layout=True)
+    figure, axes = plt.subplots(2, 4, figsize=(15, 6), constrained_layout=True)
     _cartesian(axes[0, 0])
     _wall(axes[0, 1])
     _joints(axes[0, 2])
+    _readings(axes[0, 3])
     _guiding(axes[1, 0])
     _admittance(axes[1, 1])
-    _targets(axes[1, 2])
+    _hybrid(axes[1, 2])
+    _targets(axes[1, 3])
     for one in axes.flat:
         one.set_xlabel("t [s]")
         one.grid(alpha=0.3)
@@ -92,7 +94,7 @@ def _guiding(axis: plt.Axes) -> None:
     moved = 1e3 * (np.array(plant.run(1.5))[:, 1] - start[1])
     axis.plot(_times(len(moved)), moved)
     axis.axhline(-50.0, color="grey", linestyle=":")
-    axis.set(title="free_guiding: 20 N for 1 s against a wall", ylabel="y [mm]")
+    axis.set(title="free_guiding: 20 N against a wall", ylabel="y [mm]")
 
 
 def _admittance(axis: plt.Axes) -> None:
@@ -104,13 +106,45 @@ def _admittance(axis: plt.Axes) -> None:
         plant.position_step()
         forces.append(plant.force)
     axis.plot(_times(len(forces)), forces)
-    axis.set(title="admittance: pressing with 20 N on 20 kN/m", ylabel="force [N]")
+    axis.set(title="admittance: 20 N on 20 kN/m", ylabel="force [N]")
+
+
+def _hybrid(axis: plt.Axes) -> None:
+    plant = Plant(laws.hybrid(wrench=(0, 0, -20.0, 0, 0, 0), speed=0.05), wall_stiffness=20_000.0)
+    plant.wall = plant.place[2] - 0.005
+    begin, forces, moved = plant.place, [], []
+    for k in range(2000):
+        if k == 600:
+            plant.trial.params.goal = plant.trial.memory.goal + [0.0, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0]
+        plant.position_step()
+        forces.append(plant.force)
+        moved.append(1e3 * (plant.place[1] - begin[1]))
+    axis.plot(_times(len(forces)), forces, label="force [N]")
+    axis.plot(_times(len(moved)), moved, label="y [mm]")
+    axis.set(title="hybrid: 20 N on a wall, 50 mm along it")
+    axis.legend()
+
+
+def _readings(axis: plt.Axes) -> None:
+    made = [("order 1", laws.low_pass_readings()), ("order 2", laws.low_pass_readings(order=2))]
+    noise = np.random.default_rng(1).normal(0.0, 1.0, 400)
+    raw = np.where(np.arange(400) < 100, 0.0, 10.0) + noise
+    axis.plot(_times(400), raw, color="lightgrey", label="measured")
+    for name, law in made:
+        trial, shown = Plant(law).trial, []
+        for one in raw:
+            trial(HOME, q_ipo=HOME, tau_ext=np.full(7, one))
+            shown.append(float(trial.memory.tau_ext[0]))
+        axis.plot(_times(400), shown, label=name)
+    axis.set(title="low_pass_readings: 10 Hz", ylabel="external torque [Nm]")
+    axis.legend()
 
 
 def _targets(axis: plt.Axes) -> None:
     goal = HOME + np.radians([30, 0, 0, 0, 0, 0, 0])
     made = (
         ("minimum_jerk", laws.minimum_jerk()),
+        ("jerk_limited", laws.jerk_limited()),
         ("low_pass, order 1", laws.low_pass(order=1)),
         ("low_pass, order 2", laws.low_pass()),
     )
@@ -122,7 +156,7 @@ def _targets(axis: plt.Axes) -> None:
             trial.params.goal = goal if k < 700 else HOME
             path.append(np.degrees(trial(HOME, q_ipo=HOME).q[0] - HOME[0]))
         axis.plot(_times(len(path)), path, label=name)
-    axis.set(title=f"targets that change ({ARM.title})", ylabel="A1 [deg]")
+    axis.set(title="targets that change", ylabel="A1 [deg]")
     axis.legend()
 
 

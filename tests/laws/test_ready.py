@@ -206,7 +206,90 @@ def test_admittance_presses_on_a_stiff_wall_with_its_force() -> None:
     assert rest.mean() == pytest.approx(20.0, rel=0.05) and np.ptp(rest) < 1.0
 
 
+# ------------------------------------------------------------------------------------------------------- hybrid
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_hybrid_presses_with_its_force_while_it_follows_a_goal_along_the_wall(turned: bool) -> None:
+    down = (
+        Pose.xyz_abc(0.0, 0.0, 0.0, 0.4, math.pi, 0.0) if turned else None
+    )  # z of the frame points into the wall
+    push = 20.0 if turned else -20.0
+    law = laws.hybrid(wrench=(0, 0, push, 0, 0, 0), frame=down, speed=0.05)
+    plant = Plant(law, wall_stiffness=20_000.0)
+    plant.wall = plant.place[2] - 0.005
+    begin = plant.place
+    plant.run(1.5, by="position")
+    assert plant.force == pytest.approx(20.0, rel=0.05), "in contact"
+    goal = np.array(plant.trial.memory.goal)
+    plant.trial.params.goal = goal + [0.03, 0.06, 0.05, 0.0, 0.0, 0.0, 0.0]  # z does not count
+    forces, behind = [], []
+    for _ in range(2000):
+        plant.position_step()
+        forces.append(plant.force)
+        behind.append(np.abs(plant.place[:2] - plant.trial.memory.goal[:2]).max())
+    assert np.abs(np.array(forces) - 20.0).max() < 2.0, "also while it slides"
+    assert plant.place[:2] - begin[:2] == pytest.approx([0.03, 0.06], abs=1e-3)
+    assert max(behind) < 1.5e-3
+    assert plant.trial.memory.wrench[2] == pytest.approx(-push, rel=0.05), "in axes of the frame"
+    turn = Pose.from_matrix(model.forward(ARM, plant.q)).array[3:] @ goal[3:]
+    assert abs(turn) > math.cos(0.5 * 2e-3), "its orientation is controlled by position"
+
+
+def test_hybrid_searches_contact_slowly_and_limits_its_speeds() -> None:
+    plant = Plant(laws.hybrid(wrench=(0, 0, -40.0, 0, 0, 0), damping=(100,) * 3 + (40,) * 3, speed=0.02))
+    plant.trial.params.goal = [0.3, 0.3, 0.3, 0.0, 1.0, 0.0, 0.0]
+    places = np.array(plant.run(1.0, by="position"))
+    speeds = np.diff(places[100:], axis=0) / DT
+    assert -speeds[:, 2].max() == pytest.approx(0.02, rel=0.1), "40 N on 100 N s/m, but limited"
+    assert np.linalg.norm(speeds[:, :2], axis=1).max() < 0.021
+
+
 # --------------------------------------------------------------------------------------- targets, filters, search
+
+
+def test_jerk_limited_targets_arrive_fast_within_their_limits_and_turn_at_any_time() -> None:
+    limits = {"speed": 0.8, "acceleration": 2.0, "jerk": 20.0}
+    far = np.array([0.5, -0.3, 0.2, 0.1, 0.001, 0.3, -0.5])
+    trial = LawTrial(
+        laws.jerk_limited(HOME + far, **{name: np.full(7, value) for name, value in limits.items()})
+    )
+    path, arrived = [HOME, HOME, HOME], 0.0
+    for k in range(5000):
+        if k == 2000:
+            trial.params.goal = HOME
+        if 2250 <= k < 2600 and k % 33 == 0:  # as from a camera, while it moves
+            trial.params.goal = HOME + np.random.default_rng(k).uniform(-0.5, 0.5, 7)
+        if k == 2600:
+            trial.params.goal = HOME + far
+        path.append(np.array(trial(HOME, q_ipo=HOME).q))
+        if not arrived and np.abs(path[-1] - HOME - far).max() < 1e-9:
+            arrived = k * DT
+    steps = np.array(path)
+    for order, name in enumerate(limits, start=1):
+        assert np.abs(np.diff(steps, order, axis=0)).max() / DT**order <= limits[name] * 1.001, name
+    moved = steps[3:2000] - HOME
+    assert (np.abs(moved) <= np.abs(far) + 1e-12).all() and (moved * far >= -1e-12).all(), "no overshoot"
+    # a trapezium of the acceleration: d / v + v / a + a / j
+    assert arrived <= 1.15 * (0.5 / 0.8 + 0.8 / 2.0 + 2.0 / 20.0)
+    assert np.abs(steps[-1] - HOME - far).max() < 1e-12 and trial.memory.is_there == 1.0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_readings_pass_the_filter_and_the_arm_keeps_to_its_motion(order: int) -> None:
+    trial = LawTrial(laws.low_pass_readings(frequency=5.0, order=order))
+    step = np.arange(1.0, 8.0)
+    trial(HOME, q_ipo=HOME, tau_ext=np.zeros(7))
+    rises = []
+    for k in range(400):
+        noise = 0.5 * (-1) ** k
+        out = trial(HOME, q_ipo=HOME + 1e-3 * k, tau_ext=step + noise)
+        assert np.array(out.q) == pytest.approx(HOME + 1e-3 * k)
+        rises.append(np.array(trial.memory.tau_ext))
+    one = round(1.0 / (2.0 * math.pi * 5.0) / DT) - 1  # a time constant
+    expected = 1.0 - math.exp(-1.0) if order == 1 else 1.0 - 2.0 * math.exp(-1.0)
+    assert rises[one] / step == pytest.approx([expected] * 7, abs=0.02)
+    assert np.abs(rises[-1] - step).max() < 0.02, "an alternating noise of 0.5 Nm is gone"
 
 
 def test_minimum_jerk_arrives_in_time_within_its_limits_and_turns_smoothly() -> None:
@@ -280,6 +363,10 @@ def test_search_pushes_and_sweeps_the_plane_across(pattern: str) -> None:
         lambda: laws.minimum_jerk(speed=(0.0,) * 7),
         lambda: laws.low_pass(order=3),
         lambda: laws.search("zigzag"),
+        lambda: laws.hybrid(force_axes=(0, 0, 2, 0, 0, 0)),
+        lambda: laws.hybrid(wrench=(5.0, 0, 0, 0, 0, 0)),
+        lambda: laws.jerk_limited(jerk=(0.0,) * 7),
+        lambda: laws.low_pass_readings(order=0),
     ],
 )
 def test_bad_arguments_are_refused(make: object) -> None:

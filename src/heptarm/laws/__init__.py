@@ -11,8 +11,11 @@ from heptarm.laws.ready import (
     admittance,
     cartesian_impedance,
     free_guiding,
+    hybrid,
+    jerk_limited,
     joint_impedance,
     low_pass,
+    low_pass_readings,
     minimum_jerk,
     search,
 )
@@ -22,8 +25,11 @@ __all__ = [
     "admittance",
     "cartesian_impedance",
     "free_guiding",
+    "hybrid",
+    "jerk_limited",
     "joint_impedance",
     "low_pass",
+    "low_pass_readings",
     "minimum_jerk",
     "search",
 ]

@@ -1,6 +1,8 @@
 /* The ready laws; heptarm.laws.ready has their parameters and memories, in the order of the structures here. */
+#include <heptarm_filter.h>
 #include <heptarm_law.h>
 
+#include "../fri/loop/limited_steps.h"
 #include "model.h"
 
 static double clamp(double value, double limit) { return value > limit ? limit : value < -limit ? -limit : value; }
@@ -44,22 +46,22 @@ struct cartesian_memory {
     double goal[7], error[6], force[6], dq[N], posture[N], started, saturated;
 };
 
-/* Move the followed goal towards the wanted one, at most at the speeds. */
-static void follow_pose(const struct cartesian *p, double dt, struct cartesian_memory *m) {
+/* Move a followed pose towards a goal, by at most `far` [m] and `angle_max` [rad]. */
+static void follow_pose(const double *goal, double far, double angle_max, double *pose) {
     double wanted[7], step[6], frame[9];
-    for (int k = 0; k < 7; k++) wanted[k] = sane(p->goal[k], m->goal[k]);
+    for (int k = 0; k < 7; k++) wanted[k] = sane(goal[k], pose[k]);
     double norm = sqrt(dot(wanted + 3, wanted + 3, 4));
-    for (int k = 3; k < 7; k++) wanted[k] = norm > 1e-6 ? wanted[k] / norm : m->goal[k];
-    for (int k = 0; k < 3; k++) step[k] = wanted[k] - m->goal[k];
-    double x = m->goal[3], y = m->goal[4], z = m->goal[5], w = m->goal[6];
+    for (int k = 3; k < 7; k++) wanted[k] = norm > 1e-6 ? wanted[k] / norm : pose[k];
+    for (int k = 0; k < 3; k++) step[k] = wanted[k] - pose[k];
+    double x = pose[3], y = pose[4], z = pose[5], w = pose[6];
     double own[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
                      2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
     memcpy(frame, own, sizeof frame);
     rotation_error(frame, wanted + 3, step + 3);
-    shorten(step, 3, p->speed * dt);
-    for (int k = 0; k < 3; k++) m->goal[k] += step[k];
-    if (!shorten(step + 3, 3, p->turn_speed * dt)) {
-        memcpy(m->goal + 3, wanted + 3, 4 * sizeof(double));
+    shorten(step, 3, far);
+    for (int k = 0; k < 3; k++) pose[k] += step[k];
+    if (!shorten(step + 3, 3, angle_max)) {
+        memcpy(pose + 3, wanted + 3, 4 * sizeof(double));
         return;
     }
     double angle = sqrt(dot(step + 3, step + 3, 3)), f = sin(0.5 * angle) / angle, c = cos(0.5 * angle);
@@ -67,7 +69,7 @@ static void follow_pose(const struct cartesian *p, double dt, struct cartesian_m
     double turned_goal[4] = {c * x + u * w + v * z - t * y, c * y - u * z + v * w + t * x, c * z + u * y - v * x + t * w,
                              c * w - u * x - v * y - t * z};
     double size = sqrt(dot(turned_goal, turned_goal, 4));
-    for (int k = 0; k < 4; k++) m->goal[3 + k] = turned_goal[k] / size;
+    for (int k = 0; k < 4; k++) pose[3 + k] = turned_goal[k] / size;
 }
 
 /* Impedance at the flange with a compliant posture in its null space (Khatib 1987; Ott, "Cartesian Impedance Control of
@@ -84,7 +86,7 @@ static int cartesian(const struct heptarm_state *s, struct heptarm_command *out,
         memcpy(m->posture, s->q, sizeof m->posture);
         m->started = 1.0;
     }
-    follow_pose(p, s->dt, m);
+    follow_pose(p->goal, p->speed * s->dt, p->turn_speed * s->dt, m->goal);
     jacobian(posture.axis, posture.origin, posture.place, j);
     moved_mass(&p->robot, &posture, mass);
     memcpy(factor, mass, sizeof factor);
@@ -260,6 +262,65 @@ static int admittance(const struct heptarm_state *s, struct heptarm_command *out
 }
 HEPTARM_LAW(admittance_of_the_flange, admittance, struct admittance, struct admittance_memory)
 
+/* ---------------------------------------------------------------------------------------- hybrid force and position */
+
+struct hybrid {
+    struct robot robot;
+    double goal[7], turn[9], force_axes[6], wrench[6], mass[6], damping[6], speed, turn_speed;
+};
+
+struct hybrid_memory {
+    double goal[7], q[N], wrench[6], error[6], velocity[6], started, saturated;
+};
+
+/* Both halves of a twist or a wrench from base axes to those of a frame, or back. */
+static void turn_halves(const double *turn, int back, const double *from, double *into) {
+    for (int half = 0; half < 6; half += 3)
+        for (int k = 0; k < 3; k++) {
+            into[half + k] = 0.0;
+            for (int i = 0; i < 3; i++) into[half + k] += (back ? turn[3 * k + i] : turn[3 * i + k]) * from[half + i];
+        }
+}
+
+/* Along some axes of a frame the flange exerts a wrench, along the others it follows a goal (Raibert and Craig, "Hybrid
+   Position/Force Control of Manipulators", 1981), with velocities: a mass on a damper under the error of the force, and half
+   of the error of the position in each step. */
+static int hybrid(const struct heptarm_state *s, struct heptarm_command *out, const struct hybrid *p, struct hybrid_memory *m) {
+    struct posture posture;
+    double j[6][N], square[36], found[6], error[6], velocity[6], twist[6];
+    int fresh = m->started == 0.0;
+    if (fresh) memcpy(m->q, s->q_ipo, sizeof m->q);
+    m->started = 1.0;
+    find_posture(&p->robot, m->q, &posture);
+    if (fresh) {
+        memcpy(m->goal, posture.place, sizeof posture.place);
+        quaternion(posture.turn, m->goal + 3);
+    }
+    follow_pose(p->goal, p->speed * s->dt, p->turn_speed * s->dt, m->goal);
+    jacobian(posture.axis, posture.origin, posture.place, j);
+    if (!damped_square(j, square)) return 1;
+    for (int r = 0; r < 6; r++) found[r] = dot(j[r], s->tau_ext, N);
+    solve(square, 6, found);
+    for (int k = 0; k < 3; k++) error[k] = m->goal[k] - posture.place[k];
+    rotation_error(posture.turn, m->goal + 3, error + 3);
+    turn_halves(p->turn, 0, found, m->wrench);
+    turn_halves(p->turn, 0, error, m->error);
+    for (int r = 0; r < 6; r++) {
+        double free = (m->velocity[r] + s->dt * (p->wrench[r] + m->wrench[r]) / p->mass[r]) / (1.0 + s->dt * p->damping[r] / p->mass[r]);
+        m->velocity[r] = p->force_axes[r] != 0.0 ? clamp(free, r < 3 ? p->speed : p->turn_speed) : 0.0;
+        velocity[r] = p->force_axes[r] != 0.0 ? m->velocity[r] : 0.5 * m->error[r] / s->dt;
+    }
+    m->saturated += (shorten(velocity, 3, 2.0 * p->speed) | shorten(velocity + 3, 3, 2.0 * p->turn_speed)) != 0;
+    turn_halves(p->turn, 1, velocity, twist);
+    solve(square, 6, twist);
+    for (int i = 0; i < N; i++) {
+        for (int r = 0; r < 6; r++) m->q[i] += s->dt * j[r][i] * twist[r];
+        out->q[i] = m->q[i];
+    }
+    return 0;
+}
+HEPTARM_LAW(hybrid_of_the_flange, hybrid, struct hybrid, struct hybrid_memory)
+
 /* -------------------------------------------------------------------------------------------------- minimum jerk */
 
 struct minimum_jerk {
@@ -316,6 +377,37 @@ static int minimum_jerk(const struct heptarm_state *s, struct heptarm_command *o
 }
 HEPTARM_LAW(minimum_jerk_targets, minimum_jerk, struct minimum_jerk, struct minimum_jerk_memory)
 
+/* ------------------------------------------------------------------------------------------ jerk-limited targets */
+
+struct jerk_limited {
+    double goal[N], speed[N], acceleration[N], jerk[N];
+};
+
+struct jerk_limited_memory {
+    double q[N], dq[N], ddq[N], is_there, started;
+};
+
+/* Each joint on its own to a goal that may change at any time, as fast as its limits allow; the next step is chosen such that
+   the joint can still come to rest at the goal, as in the guard of positions. */
+static int jerk_limited(const struct heptarm_state *s, struct heptarm_command *out, const struct jerk_limited *p, struct jerk_limited_memory *m) {
+    double dt = s->dt;
+    if (m->started == 0.0) memcpy(m->q, s->q_ipo, sizeof m->q);
+    m->started = m->is_there = 1.0;
+    for (int i = 0; i < N; i++) {
+        double step = sane(p->goal[i], m->q[i]) - m->q[i], v = m->dq[i] * dt;
+        int is_there;
+        double a = acceleration_to(step, 0.0, v, m->ddq[i] * dt * dt, p->speed[i] * dt, p->acceleration[i] * dt * dt,
+                                   p->jerk[i] * dt * dt * dt, &is_there);
+        m->q[i] = is_there ? m->q[i] + step : m->q[i] + v + a;
+        m->dq[i] = (v + a) / dt;
+        m->ddq[i] = a / (dt * dt);
+        if (!is_there) m->is_there = 0.0;
+    }
+    memcpy(out->q, m->q, sizeof m->q);
+    return 0;
+}
+HEPTARM_LAW(jerk_limited_targets, jerk_limited, struct jerk_limited, struct jerk_limited_memory)
+
 /* ------------------------------------------------------------------------------------------------------- filters */
 
 struct low_pass {
@@ -326,24 +418,51 @@ struct low_pass_memory {
     double q[N], dq[N], started;
 };
 
-/* Low pass of the goal: of first order, exactly discretised, or of second order, semi-implicit. */
 static int low_pass(const struct heptarm_state *s, struct heptarm_command *out, const struct low_pass *p, struct low_pass_memory *m) {
-    double rate = 2.0 * 3.14159265358979323846 * p->frequency;
     if (m->started == 0.0) memcpy(m->q, s->q_ipo, sizeof m->q);
     m->started = 1.0;
     for (int i = 0; i < N; i++) {
         double goal = sane(p->goal[i], m->q[i]);
-        if (p->order < 2.0) {
-            m->q[i] += (1.0 - exp(-rate * s->dt)) * (goal - m->q[i]);
-        } else {
-            m->dq[i] = (m->dq[i] + s->dt * rate * rate * (goal - m->q[i])) / (1.0 + s->dt * rate * (2.0 * p->damping + s->dt * rate));
-            m->q[i] += s->dt * m->dq[i];
-        }
+        if (p->order < 2.0)
+            heptarm_low_pass_1(m->q + i, goal, p->frequency, s->dt);
+        else
+            heptarm_low_pass_2(m->q + i, m->dq + i, goal, p->frequency, p->damping, s->dt);
         out->q[i] = m->q[i];
     }
     return 0;
 }
 HEPTARM_LAW(low_pass_of_targets, low_pass, struct low_pass, struct low_pass_memory)
+
+struct readings {
+    double frequency, damping, order;
+};
+
+enum { READINGS = 3 * N + 6 };
+struct readings_memory {
+    double dq[N], tau[N], tau_ext[N], wrench[6], rate[READINGS], started;
+};
+
+/* Low pass of what the arm measures; the arm follows its motion of the cabinet. A reading that is missing keeps the last value. */
+static int readings(const struct heptarm_state *s, struct heptarm_command *out, const struct readings *p, struct readings_memory *m) {
+    double *kept = (double *)m, raw[READINGS];
+    (void)out;
+    memcpy(raw, s->dq, sizeof s->dq);
+    memcpy(raw + N, s->tau, sizeof s->tau);
+    memcpy(raw + 2 * N, s->tau_ext, sizeof s->tau_ext);
+    memcpy(raw + 3 * N, s->wrench, sizeof s->wrench);
+    for (int i = 0; i < READINGS; i++) {
+        double x = sane(raw[i], kept[i]);
+        if (m->started == 0.0)
+            kept[i] = x;
+        else if (p->order < 2.0)
+            heptarm_low_pass_1(kept + i, x, p->frequency, s->dt);
+        else
+            heptarm_low_pass_2(kept + i, m->rate + i, x, p->frequency, p->damping, s->dt);
+    }
+    m->started = 1.0;
+    return 0;
+}
+HEPTARM_LAW(low_pass_of_readings, readings, struct readings, struct readings_memory)
 
 /* -------------------------------------------------------------------------------------------------------- search */
 

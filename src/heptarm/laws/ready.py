@@ -27,8 +27,8 @@ Kind: TypeAlias = Literal["torque", "position", "wrench"]
 _SOURCE = Path(__file__).with_name("ready.c")
 _HEADERS = (
     _SOURCE.with_name("model.h"),
-    include_dir().with_name("kinematics.h"),
-    include_dir() / "heptarm_law.h",
+    *(include_dir().with_name(name) for name in ("kinematics.h", "limited_steps.h", "native_layout.h")),
+    *(include_dir() / name for name in ("heptarm_filter.h", "heptarm_law.h")),
 )
 _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
@@ -326,6 +326,75 @@ def admittance(
     )
 
 
+def hybrid(
+    goal: Pose | None = None,
+    *,
+    force_axes: npt.ArrayLike = (0, 0, 1, 0, 0, 0),
+    wrench: npt.ArrayLike = (0.0, 0.0, -10.0, 0.0, 0.0, 0.0),
+    frame: Pose | None = None,
+    mass: npt.ArrayLike = (8.0, 8.0, 8.0, 0.4, 0.4, 0.4),
+    damping: npt.ArrayLike = (800.0, 800.0, 800.0, 40.0, 40.0, 40.0),
+    speed: float = 0.1,
+    turn_speed: float = 0.5,
+) -> ReadyLaw:
+    """Exert forces along some axes of a frame and follow a goal along the others: hybrid force and position control.
+
+    Without contact the flange moves at the wrench divided by the damping. `rt.memory` has, in axes of the frame,
+    `wrench` (external [N, Nm]), `error` to the followed `goal` [m, rad] and `velocity` along the force-controlled axes;
+    `saturated` is the number of cycles in which a speed was limited.
+
+    Args:
+        goal: of the flange in the base; None: where it is. Live: `rt.params.goal`. Along force-controlled axes it does
+            not count.
+        force_axes: 1 for each axis of the frame that is controlled by force, 0 for the others, shape (6,).
+        wrench: that the flange exerts along those axes, shape (6,) [N, Nm]. Live: `rt.params.wrench`.
+        frame: whose orientation in the base the axes have; None: that of the base.
+        mass: along and about the force-controlled axes, shape (6,) [kg, kg m²].
+        damping: shape (6,) [N s/m, Nm s/rad]. The stiffer the surface, the more it needs.
+        speed: largest speed of the followed goal, and along force-controlled axes [m/s].
+        turn_speed: largest angular velocity of both [rad/s].
+    """
+    chosen, exerted = array(force_axes, 6, "force_axes"), array(wrench, 6, "wrench")
+    if not np.isin(chosen, (0.0, 1.0)).all():
+        raise CommandRejected(
+            f"force_axes must be 1 or 0 for each axis, got {chosen.tolist()}",
+            parameter="force_axes",
+            value=chosen.tolist(),
+        )
+    if (exerted[chosen == 0.0] != 0.0).any():
+        raise CommandRejected(
+            f"wrench must be 0 along axes that are not controlled by force, got {exerted.tolist()}",
+            parameter="wrench",
+            value=exerted.tolist(),
+            hint="set the axis to 1 in force_axes",
+        )
+    turn = np.eye(3) if frame is None else instance(frame, Pose, "frame").rotation
+    return ReadyLaw(
+        "hybrid_of_the_flange",
+        {
+            "robot": constants,
+            "goal": _ANYWHERE if goal is None else instance(goal, Pose, "goal").array,
+            "turn": np.ravel(turn),
+            "force_axes": chosen,
+            "wrench": exerted,
+            "mass": _positive(array(mass, 6, "mass"), "mass", above=True),
+            "damping": _positive(array(damping, 6, "damping"), "damping", above=True),
+            "speed": within(speed, "speed", 0.0, 1.0, above=True, unit="m/s"),
+            "turn_speed": within(turn_speed, "turn_speed", 0.0, 3.0, above=True, unit="rad/s"),
+        },
+        {
+            "goal": _ZEROS7,
+            "q": _ZEROS7,
+            "wrench": _ZEROS6,
+            "error": _ZEROS6,
+            "velocity": _ZEROS6,
+            "started": 0.0,
+            "saturated": 0.0,
+        },
+        kind="position",
+    )
+
+
 def minimum_jerk(
     goal: npt.ArrayLike | None = None,
     *,
@@ -346,13 +415,40 @@ def minimum_jerk(
         {
             "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
             "speed": _speeds(speed),
-            "acceleration": (
-                (lambda arm: 0.25 * arm.ddq_max)
-                if acceleration is None
-                else _positive(array(acceleration, 7, "acceleration"), "acceleration", above=True)
-            ),
+            "acceleration": _quarter(acceleration, "acceleration", "ddq_max"),
         },
         {"q": _ZEROS7, "dq": _ZEROS7, "ddq": _ZEROS7, "goal": _ZEROS7, "left": 0.0, "started": 0.0},
+        kind="position",
+    )
+
+
+def jerk_limited(
+    goal: npt.ArrayLike | None = None,
+    *,
+    speed: npt.ArrayLike | None = None,
+    acceleration: npt.ArrayLike | None = None,
+    jerk: npt.ArrayLike | None = None,
+) -> ReadyLaw:
+    """Move to a goal that may change at any time, each joint on its own as fast as its limits allow, without overshoot.
+
+    The joints arrive at different times; `minimum_jerk` lets them arrive together. `rt.memory` has the setpoint `q`,
+    `dq`, `ddq`, and `is_there`, 1 once all have arrived.
+
+    Args:
+        goal: shape (7,) [rad]; None: where the arm is. Live: `rt.params.goal`, for instance from a camera at 30 Hz.
+        speed: largest speeds, shape (7,) [rad/s]; None: half of the robot's. Live, as the others.
+        acceleration: largest accelerations, shape (7,) [rad/s²]; None: a quarter of the robot's.
+        jerk: largest jerks, shape (7,) [rad/s³]; None: a quarter of the robot's.
+    """
+    return ReadyLaw(
+        "jerk_limited_targets",
+        {
+            "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
+            "speed": _speeds(speed),
+            "acceleration": _quarter(acceleration, "acceleration", "ddq_max"),
+            "jerk": _quarter(jerk, "jerk", "dddq_max"),
+        },
+        {"q": _ZEROS7, "dq": _ZEROS7, "ddq": _ZEROS7, "is_there": 0.0, "started": 0.0},
         kind="position",
     )
 
@@ -378,6 +474,37 @@ def low_pass(
             "order": float(order),
         },
         {"q": _ZEROS7, "dq": _ZEROS7, "started": 0.0},
+        kind="position",
+    )
+
+
+def low_pass_readings(*, frequency: float = 10.0, order: int = 1, damping: float = 1.0) -> ReadyLaw:
+    """Filter what the arm measures, while it follows its motion of the cabinet.
+
+    `rt.memory` has the filtered `dq` [rad/s], `tau` and `tau_ext` [Nm] and `wrench` [N, Nm]. For laws of your own in C,
+    heptarm_filter.h has the same filters.
+
+    Args:
+        frequency: corner frequency [Hz]. Live: `rt.params.frequency`.
+        order: 1 or 2.
+        damping: ratio of a filter of second order; 1 is the fastest one without overshoot.
+    """
+    integer(order, "order", 1, 2)
+    return ReadyLaw(
+        "low_pass_of_readings",
+        {
+            "frequency": within(frequency, "frequency", 0.0, 500.0, above=True, unit="Hz"),
+            "damping": within(damping, "damping", 0.0, 5.0),
+            "order": float(order),
+        },
+        {
+            "dq": _ZEROS7,
+            "tau": _ZEROS7,
+            "tau_ext": _ZEROS7,
+            "wrench": _ZEROS6,
+            "rate": (0.0,) * 27,
+            "started": 0.0,
+        },
         kind="position",
     )
 
@@ -468,3 +595,10 @@ def _speeds(values: npt.ArrayLike | None) -> Array | Callable[[RobotModel], Arra
     if values is None:
         return lambda arm: 0.5 * arm.dq_max
     return _positive(array(values, 7, "speed"), "speed", above=True)
+
+
+def _quarter(values: npt.ArrayLike | None, name: str, limit: str) -> Array | Callable[[RobotModel], Array]:
+    """Limits of the joints; None: a quarter of the robot's, which has them as `limit`."""
+    if values is None:
+        return lambda arm: 0.25 * np.asarray(getattr(arm, limit))
+    return _positive(array(values, 7, name), name, above=True)

@@ -21,6 +21,7 @@
 
 #include "include/heptarm_law.h"
 #include "kinematics.h"
+#include "limited_steps.h"
 #include "native_layout.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
@@ -297,35 +298,6 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
 
 /* ------------------------------------------------------------------------------------------------------ guard */
 
-static double least(double a, double b) { return a < b ? a : b; }
-static double most(double a, double b) { return a > b ? a : b; }
-
-static double ramp(double room, double jerk) {
-    if (room <= 0.0) return room;
-    double n = (double)(word)((sqrt(1.0 + 8.0 * room / jerk) - 1.0) * 0.5);
-    return n * jerk + (room - jerk * n * (n + 1) * 0.5) / (n + 1);
-}
-
-static double brake(double v, double a, double top, double jerk) {
-    double target = v > 0.0 ? -ramp(v, jerk) : ramp(-v, jerk);
-    return least(least(most(most(target, -top), a - jerk), top), a + jerk);
-}
-
-static double overrun(double v, double a, double top, double jerk) {
-    double peak = v + a * a / (2.0 * jerk), covered, rest;
-    if (a >= 0.0)
-        covered = (v > 0.0 ? v : 0.0) * a / jerk + a * a * a / (3.0 * jerk * jerk);
-    else if (v <= 0.0)
-        return 0.0;
-    else if (a * a >= 2.0 * jerk * v)
-        return v * (1.0 - a / jerk);
-    else
-        covered = a * (peak - a * a / (6.0 * jerk)) / jerk;
-    if (peak <= 0.0) return 0.0;
-    rest = peak * jerk <= top * top ? peak * sqrt(peak / jerk) : 0.5 * peak * (peak / top + top / jerk);
-    return most(covered + rest, 0.0);
-}
-
 static void limited(struct loop *l, int kind, int axis, double asked, double allowed) {
     int at = AXES * kind + axis;
     double *worst = (double *)l->header + H_LIMITED_WORST + at;
@@ -364,28 +336,11 @@ static double bounded(struct loop *l, int i, double goal, double before, const d
 }
 
 static double approach(struct loop *l, int i, double goal, double before) {
-    double q = l->q[i], v = l->v[i], a = l->a[i], high = l->top_v[i], top = l->top_a[i], jerk = l->top_j[i], acc;
-    double upper = least(least(a + jerk, top), ramp(high - v, jerk));
-    double lower = most(most(a - jerk, -top), -ramp(high + v, jerk));
-    double goal_v = least(most(goal - before, -high), high);
+    double q = l->q[i], v = l->v[i], a = l->a[i], high = l->top_v[i], top = l->top_a[i], jerk = l->top_j[i];
     double step = goal - q, wanted = step - v;
-    if (lower <= wanted && wanted <= upper && ON_TRACK * fabs(step - goal_v) <= jerk) {
-        acc = wanted;
-    } else {
-        report_violation(l, i, step, wanted, a);
-        double sign = step >= goal_v ? 1.0 : -1.0;
-        double ahead = sign * (step - goal_v), speed = sign * (v - goal_v), bent = sign * a;
-        double full = sign > 0 ? upper : -lower, slow = sign > 0 ? lower : -upper;
-        double planned_a = PLANNED * top, planned_j = PLANNED * jerk;
-        slow = least(most(brake(speed, bent, planned_a, planned_j), slow), full);
-        double room = ahead - speed - full - overrun(speed + full, full, planned_a, planned_j);
-        if (room >= 0.0) {
-            acc = sign * full;
-        } else {
-            double rest = ahead - speed - slow - overrun(speed + slow, slow, planned_a, planned_j);
-            acc = sign * (rest <= 0.0 ? slow : slow + (full - slow) * rest / (rest - room));
-        }
-    }
+    int is_there;
+    double acc = acceleration_to(step, least(most(goal - before, -high), high), v, a, high, top, jerk, &is_there);
+    if (!is_there) report_violation(l, i, step, wanted, a);
     double speed = v + acc, there = q + speed;
     if (there + overrun(speed, acc, top, jerk) > l->high[i] || there - overrun(-speed, -acc, top, jerk) < l->low[i]) {
         double braking = brake(v, a, top, jerk);

@@ -50,7 +50,7 @@ MAX_PLAIN = 64
 _SOURCE = Path(__file__).with_name("native.c")
 #: Headers that native.c includes, each behind those that include it.
 _HEADERS = (
-    *(_SOURCE.with_name(name) for name in ("kinematics.h", "native_layout.h")),
+    *(_SOURCE.with_name(name) for name in ("kinematics.h", "limited_steps.h", "native_layout.h")),
     _SOURCE.parent / "include" / "heptarm_law.h",
 )
 _WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p

@@ -126,6 +126,25 @@ def minimum_jerk(arm: Arm) -> None:
 
 
 @scenario(line=5, rows="E20", space=0.1, needs=("fri_position",))
+def jerk_limited(arm: Arm) -> None:
+    """Goals that come while the arm moves are reached as fast as the limits of each joint allow, without overshoot."""
+    speed, acceleration = 0.4 * arm.speed * arm.robot.dq_max, 0.2 * arm.speed * arm.robot.ddq_max
+    jerk = 0.2 * arm.speed * arm.robot.dddq_max
+    goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.15]
+    with _session(arm, laws.jerk_limited(speed=speed, acceleration=acceleration, jerk=jerk)) as session:
+        _run(session, 0.1)
+        for part in (0.3, 0.7, 0.2):  # as from a camera
+            session.params.goal = HOME + part * (goal - HOME)
+            _run(session, 0.05)
+        session.params.goal = goal
+        due = 0.15 / speed[6] + speed[6] / acceleration[6] + acceleration[6] / jerk[6]
+        _run(session, 1.2 * due + 0.1)
+        near(session.state.q_sent, goal, 1e-6, "positions", unit="rad")
+        sent = np.array([one.q_sent for one in session.history(400) if np.isfinite(one.q_sent).all()])
+        below(float((sent - goal)[:, 5:].max()), 1e-6, "overshoot", unit="rad")
+
+
+@scenario(line=5, rows="E20", space=0.1, needs=("fri_position",))
 def low_pass(arm: Arm) -> None:
     """A goal passes through a filter of second order: its response to a step, without overshoot."""
     frequency, step = 0.5, 0.05
@@ -139,6 +158,47 @@ def low_pass(arm: Arm) -> None:
     (moved,) = np.nonzero(q > 1e-9)
     due = 2.0 * math.pi * frequency * (t[moved] - t[moved[0]] + _PERIOD * 1e-3)
     near(q[moved], step * (1.0 - (1.0 + due) * np.exp(-due)), 0.03 * step, "response", unit="rad")
+
+
+@scenario(line=8, rows="E20", risk=Risk.CONTACT, operator=True, space=0.1, needs=("fri_position",))
+def hybrid(arm: Arm) -> None:
+    """Pushed along an axis that is controlled by force, the flange moves with the hand; along the others it follows a goal."""
+    force, damping, rest = 20.0, 400.0, baseline(arm)
+    law = laws.hybrid(
+        force_axes=(0, 1, 0, 0, 0, 0),
+        wrench=(0.0, -float(rest.force[1]), 0.0, 0.0, 0.0, 0.0),  # what the sensors show while nobody pushes
+        damping=(damping,) * 3 + (40.0,) * 3,
+        speed=0.1,
+    )
+    with _session(arm, law) as session:
+        begin = _place(arm, _run(session, 0.1).q)
+        session.params.goal = session.memory.goal + [0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        first = _run(session, 0.5)
+        last = _run(session, 0.5)
+        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        speed = (_place(arm, last.q) - _place(arm, first.q)) / (last.t - first.t)
+        near(speed[1], force / damping, 0.02, "speed along the push", unit="m/s")
+        moved = _place(arm, last.q) - begin
+        near(moved[[0, 2]], (0.02, 0.0), 4e-3, "moved across the push by", unit="m")
+
+
+@scenario(line=5, rows="E20", risk=Risk.CONTACT, operator=True, space=0.05, needs=("fri_position",))
+def low_pass_readings(arm: Arm) -> None:
+    """The filtered force follows a push as its corner frequency allows, while the arm holds its place."""
+    frequency, force, rest = 1.0, 20.0, baseline(arm)
+    with _session(arm, laws.low_pass_readings(frequency=frequency)) as session:
+        _run(session, 0.3)
+        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        _run(session, 1.0)
+        shown = session.memory.wrench[1] - rest.force[1]
+        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        near(shown, force, 3.0, "force after six time constants", unit="N")
+        _run(session, 0.1)
+        fading = session.memory.wrench[1] - rest.force[1]
+        near(
+            fading, force * math.exp(-2.0 * math.pi * frequency * 0.1), 5.0, "0.1 s after the push", unit="N"
+        )
 
 
 @scenario(line=8, rows="E20", space=0.05, virtual=True, needs=("fri_wrench",))
