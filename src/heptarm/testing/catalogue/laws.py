@@ -162,7 +162,7 @@ def low_pass(arm: Arm) -> None:
 
 @scenario(line=8, rows="E20", risk=Risk.CONTACT, operator=True, space=0.1, needs=("fri_position",))
 def hybrid(arm: Arm) -> None:
-    """Pushed along an axis that is controlled by force, the flange moves with the hand; along the others it follows a goal."""
+    """Pushed along an axis of force control, the flange moves with the hand; along the others it follows a goal."""
     force, damping, rest = 20.0, 400.0, baseline(arm)
     law = laws.hybrid(
         force_axes=(0, 1, 0, 0, 0, 0),
