@@ -394,10 +394,13 @@ static int jerk_limited(const struct heptarm_state *s, struct heptarm_command *o
     if (m->started == 0.0) memcpy(m->q, s->q_ipo, sizeof m->q);
     m->started = m->is_there = 1.0;
     for (int i = 0; i < N; i++) {
-        double step = sane(p->goal[i], m->q[i]) - m->q[i], v = m->dq[i] * dt;
+        double step = sane(p->goal[i], m->q[i]) - m->q[i], v = m->dq[i] * dt, before = m->ddq[i] * dt * dt;
+        double jerk = p->jerk[i] * dt * dt * dt;
+        double top = most(p->acceleration[i] * dt * dt, fabs(before) - jerk);
         int is_there;
-        double a = acceleration_to(step, 0.0, v, m->ddq[i] * dt * dt, p->speed[i] * dt, p->acceleration[i] * dt * dt,
-                                   p->jerk[i] * dt * dt * dt, &is_there);
+        double a = acceleration_to(step, 0.0, v, before, p->speed[i] * dt, top, jerk, &is_there);
+        /* limits that were lowered on the way are reached within the jerk */
+        a = least(most(most(a, -top), before - jerk), least(top, before + jerk));
         m->q[i] = is_there ? m->q[i] + step : m->q[i] + v + a;
         m->dq[i] = (v + a) / dt;
         m->ddq[i] = a / (dt * dt);
