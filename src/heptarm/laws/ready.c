@@ -396,6 +396,7 @@ static int jerk_limited(const struct heptarm_state *s, struct heptarm_command *o
     for (int i = 0; i < N; i++) {
         double step = sane(p->goal[i], m->q[i]) - m->q[i], v = m->dq[i] * dt, before = m->ddq[i] * dt * dt;
         double jerk = p->jerk[i] * dt * dt * dt;
+        if (!(jerk > 0.0)) return 1; /* without jerk no joint comes to rest */
         double top = most(p->acceleration[i] * dt * dt, fabs(before) - jerk);
         int is_there;
         double a = acceleration_to(step, 0.0, v, before, p->speed[i] * dt, top, jerk, &is_there);
