@@ -45,7 +45,7 @@ def outputs() -> dict[Path, str]:
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",
     }
     seam = plant.load()
-    result[ROOT / "src" / "heptarm" / "sim" / "seam.py"] = plant.python_module(seam)
+    result[ROOT / "src" / "heptarm" / "planning" / "seam.py"] = plant.python_module(seam)
     result |= {SEAM / name: text for name, text in plant.java_files(seam).items()}
     return result | {JAVA / name: text for name, text in java.files(spec).items()}
 

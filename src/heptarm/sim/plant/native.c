@@ -3,7 +3,7 @@
    products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
 
    The constants, and `struct tick`, whose members all have eight bytes, come from heptarm.sim.plant.native; set-points, from
-   heptarm/sim/planning/ahead.c. */
+   heptarm/planning/ahead.c. */
 
 static void copy(double *to, const double *from, word count) {
     for (word i = 0; i < count; i++) to[i] = from[i];

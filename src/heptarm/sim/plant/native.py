@@ -16,11 +16,11 @@ import mujoco
 import numpy as np
 
 from heptarm.io.compiled import Unavailable, compiled_library
+from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
+from heptarm.planning.table import SET_POINTS, Cursor, MotionTable
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.sim.planning.table import SET_POINTS, Cursor, MotionTable
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from heptarm.io.compiled import Unavailable, compiled_library
-from heptarm.sim.planning.composite_path import CompositePath
-from heptarm.sim.planning.jerk_profile import TimeLaw
+from heptarm.planning.composite_path import CompositePath
+from heptarm.planning.jerk_profile import TimeLaw
 from heptarm.values.arrays import Array
 
 #: So many set-points are computed at once in C, and without a compiler, where each time takes half a millisecond.

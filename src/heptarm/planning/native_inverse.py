@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.io.compiled import Unavailable, compiled_library
 from heptarm.model.kinematics import Vec
-from heptarm.sim.planning.geometry import Quat
+from heptarm.planning.geometry import Quat
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
