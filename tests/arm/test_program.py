@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import heptarm as ha
 from heptarm.arm.motion.program import is_endless, listed, longest
-from heptarm.arm.translate.motions import items
+from heptarm.arm.translate.motions import item as item_of
 from heptarm.model.inverse_kinematics import redundancy
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import Motion, hold
@@ -24,8 +24,8 @@ ROBOT = robot("iiwa14")
 POSE = Pose.xyz_abc(0.5, 0.1, 0.4, *deg(180, 0, 180))
 
 
-def one(motion: Motion, ceiling: float = 1.0) -> wire.Item:
-    (item,) = items([motion], ROBOT, ceiling)
+def one(motion: Motion, speed: float = 1.0) -> wire.Item:
+    item = item_of(motion, ROBOT, speed=speed)
     item._check("")
     return item
 
@@ -126,8 +126,8 @@ motions = st.one_of(
 
 
 @given(st.lists(motions, min_size=1, max_size=4), fraction)
-def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], ceiling: float) -> None:
-    run = wire.Run(items=items(program, ROBOT, ceiling))
+def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], speed: float) -> None:
+    run = wire.Run(items=tuple(item_of(motion, ROBOT, speed=speed) for motion in program))
     run.validate()
     assert len(run.items) == len(wire.Run.decode(run.encode()).items) == len(program)
     for item in run.items:
@@ -135,8 +135,8 @@ def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], c
             item.motion, "dynamics" if isinstance(item.motion, wire.Ptp | wire.PtpPose) else "joints", None
         )
         if limits is not None:
-            assert all(v <= ceiling or (ceiling == 1.0 and isnan(v)) for v in limits.velocity)
-    assert longest(program, ROBOT, ceiling) > 0
+            assert all(v <= speed or (speed == 1.0 and isnan(v)) for v in limits.velocity)
+    assert longest(program, ROBOT, speed) > 0
 
 
 def test_arcs_and_how_the_orientation_is_led() -> None:

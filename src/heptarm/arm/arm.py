@@ -27,6 +27,7 @@ from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
 from heptarm.arm.motion.preview import ProgramPreview
+from heptarm.arm.motion.program import ProgramTerms
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
@@ -478,13 +479,10 @@ class Arm:
             StaleState: the newest state is too old, or lacks the joints.
             MissingExtra: the planner is not installed.
         """
-        motions, breaks = program.listed(motion), self._breaks
+        motions = program.listed(motion)
         return self._foresight.preview(
             motions,
-            ceiling=self._ceiling(speed),
-            mode=self._mode if mode is None else mode,
-            until=self._until(until, breaks),
-            then=self._then(then, until, breaks),
+            self._terms(mode=mode, speed=speed, until=until, then=then),
             start=None if start is None else array(start, 7, "start"),
             step=within(step, "step", 0.001, 1.0, unit="s"),
             check=None if collision_check is None else _checked(collision_check),
@@ -564,7 +562,7 @@ class Arm:
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
-            handle = self._send(motions, mode=mode, speed=speed, until=until, then=then, when="queue")
+            handle = self._send(motions, self._terms(mode=mode, speed=speed, until=until, then=then))
             try:
                 result = handle.wait(timeout=timeout)
             except Timeout:
@@ -597,9 +595,8 @@ class Arm:
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            return self._send(
-                program.listed(motion), mode=mode, speed=speed, until=until, then=then, when=when
-            )
+            motions = program.listed(motion)
+            return self._send(motions, self._terms(mode=mode, speed=speed, until=until, then=then, when=when))
 
     @contextlib.contextmanager
     def using(self, mode: Mode) -> Iterator[None]:
@@ -643,11 +640,26 @@ class Arm:
         finally:
             self._breaks = tuple(one for one in self._breaks if one is not rule)
 
-    def _ceiling(self, speed: float | None) -> float:
-        """The ceiling of one call: the lower one of its own, None for none, and that of all."""
-        return (
-            self._speed if speed is None else min(self._speed, within(speed, "speed", 0.0, 1.0, above=True))
+    def _terms(
+        self,
+        *,
+        mode: Mode | None,
+        speed: float | None,
+        until: Condition | None,
+        then: Reaction | None,
+        when: str = "queue",
+    ) -> ProgramTerms:
+        """The terms of a call: its own, with those of the arm and of the enclosing blocks."""
+        breaks = self._breaks
+        terms = ProgramTerms(
+            speed=self._speed if speed is None else speed,
+            mode=self._mode if mode is None else mode,
+            until=self._until(until, breaks),
+            then=self._then(then, until, breaks),
+            when=when,
+            breaks=breaks,
         )
+        return replace(terms, speed=min(terms.speed, self._speed))
 
     def _until(self, until: Condition | None, breaks: tuple[BreakRule, ...]) -> Condition | None:
         """A break condition together with those of the enclosing blocks."""
@@ -672,30 +684,10 @@ class Arm:
             )
         return check_reaction(then)
 
-    def _send(
-        self,
-        motions: tuple[Motion, ...],
-        *,
-        mode: Mode | None,
-        speed: float | None,
-        until: Condition | None,
-        then: Reaction | None,
-        when: str,
-    ) -> MotionHandle:
-        ceiling, breaks = self._ceiling(speed), self._breaks
-        motions = program.resolved(self._connection, self._tooling, motions)
-        self._foresight.examine(motions, when, ceiling)
-        return program.send(
-            self._connection,
-            self._tooling,
-            motions,
-            ceiling=ceiling,
-            mode=self._mode if mode is None else mode,
-            until=self._until(until, breaks),
-            when=when,
-            then=self._then(then, until, breaks),
-            breaks=breaks,
-        )
+    def _send(self, motions: tuple[Motion, ...], terms: ProgramTerms) -> MotionHandle:
+        made = program.checked(self._connection, self._tooling, motions, terms)
+        self._foresight.examine(made)
+        return program.send(self._connection, made)
 
     @overload
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...
