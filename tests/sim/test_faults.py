@@ -156,10 +156,10 @@ def test_the_tick_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> N
     plant.submit(MotionCommand(1, motions.ptp((0.05, *READY[1:])), listener=ear))
     planning, go_on = threading.Event(), threading.Event()
 
-    def slow(*arguments: object) -> Plan:
+    def slow(*arguments: object, **tcp: object) -> Plan:
         planning.set()
         assert go_on.wait(60)
-        return plan(*arguments)  # type: ignore[arg-type]
+        return plan(*arguments, **tcp)  # type: ignore[arg-type]
 
     monkeypatch.setattr(queue_module, "plan", slow)
     other = threading.Thread(target=plant.submit, args=(MotionCommand(2, motions.ptp(READY)),))

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.motion import PlanError, SplineSegment
+from heptarm.planning.motion import PlanError
+from heptarm.planning.targets import SplineSegment
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose

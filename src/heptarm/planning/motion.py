@@ -17,11 +17,6 @@ from heptarm.values.motion.orientation import Orientation
 #: Length of one tick [s].
 TICK = seam.TICK_NS / 1e9
 
-#: To a place, in joint space or along a path of the motion frame: what may stand alone or in a batch.
-JointMotion: TypeAlias = seam.Ptp | seam.PtpPose
-PathMotion: TypeAlias = seam.Lin | seam.LinRel | seam.Circ
-#: What a spline consists of.
-SplineSegment: TypeAlias = seam.Spl | seam.Lin | seam.Circ
 #: Follows targets that arrive while it runs.
 ServoMotion: TypeAlias = seam.ServoSmart | seam.ServoDirect | seam.ServoStraight
 
@@ -35,7 +30,7 @@ FARTHEST = 100.0
 #: A motion frame that is the flange: x y z, quaternion.
 ON_FLANGE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
-_Part = TypeVar("_Part", bound="JointMotion | PathMotion | SplineSegment")
+_Part = TypeVar("_Part", bound=seam.PlantMotion)
 _SETTINGS = (seam.JointDynamics, seam.CartesianDynamics, seam.Blending, seam.Orientation)
 
 
@@ -69,16 +64,15 @@ def fractions(values: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(or_default(value, 1.0) for value in values)
 
 
-def orientation_of(motion: PathMotion | SplineSegment) -> Orientation:
-    """How the orientation changes along its path; what is not given: variable, relative to the base.
+def orientation_of(given: seam.Orientation) -> Orientation:
+    """How the orientation changes along a path; what is not given: variable, relative to the base.
 
     Raises:
         CommandRejected: there is no such combination.
     """
-    type_, reference = motion.orientation.type, motion.orientation.reference
     return Orientation(
-        "variable" if type_ is None else type_.name.lower(),
-        "base" if reference is None else reference.name.lower(),
+        "variable" if given.type is None else given.type.name.lower(),
+        "base" if given.reference is None else given.reference.name.lower(),
     )
 
 

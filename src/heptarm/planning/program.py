@@ -20,8 +20,6 @@ from heptarm.planning.composite_path import (
 )
 from heptarm.planning.geometry import Geometry, Quat, blend_weight, product
 from heptarm.planning.motion import (
-    JointMotion,
-    PathMotion,
     PlanError,
     check_numbers,
     fractions,
@@ -32,6 +30,8 @@ from heptarm.planning.path import CartesianPath, JointLine, JointPath, Sequentia
 from heptarm.planning.plan import Plan, timed
 from heptarm.planning.targets import (
     STILL,
+    JointMotion,
+    PathMotion,
     cartesian_path,
     e1_of,
     joint_target,

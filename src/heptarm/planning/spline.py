@@ -16,9 +16,7 @@ from heptarm.planning.geometry import Arc, Quat, Slerp, Straight
 from heptarm.planning.motion import (
     CARTESIAN_DEFAULT,
     ORIENTATION_DEFAULT,
-    JointMotion,
     PlanError,
-    SplineSegment,
     check_numbers,
     fractions,
     inherited,
@@ -28,7 +26,7 @@ from heptarm.planning.motion import (
 )
 from heptarm.planning.path import CartesianPath, Sequential
 from heptarm.planning.plan import Plan, timed
-from heptarm.planning.targets import joint_target, pose_of, segment_limits
+from heptarm.planning.targets import JointMotion, SplineSegment, joint_target, pose_of, segment_limits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
@@ -299,7 +297,7 @@ def _segments(whole: seam.Spline, origin: Pose) -> tuple[list[_SplineSegment], O
                 "planning", f"Can not plan motion: a spline cannot have a segment of kind {kind_of(part)}"
             )
         one = inherited(part, whole)
-        control = orientation_of(one)
+        control = orientation_of(one.orientation)
         if control.type == "joint" or control.reference == "path":
             raise PlanError(
                 "planning",

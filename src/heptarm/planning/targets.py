@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf, isnan, nan, sqrt
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,10 +21,7 @@ from heptarm.planning.geometry import Arc, Geometry, JointOrientation, Orientati
 from heptarm.planning.motion import (
     CARTESIAN_DEFAULT,
     ORIENTATION_DEFAULT,
-    JointMotion,
-    PathMotion,
     PlanError,
-    SplineSegment,
     fractions,
     or_default,
     orientation_of,
@@ -32,6 +30,12 @@ from heptarm.planning.path import CartesianPath
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
+
+#: To a place in joint space, or along a path of the motion frame: what may be alone or in a batch.
+JointMotion: TypeAlias = seam.Ptp | seam.PtpPose
+PathMotion: TypeAlias = seam.Lin | seam.LinRel | seam.Circ
+#: What a spline consists of.
+SplineSegment: TypeAlias = seam.Spl | seam.Lin | seam.Circ
 
 #: A path shorter than this [m or rad] does not move.
 STILL = 1e-7
@@ -111,7 +115,7 @@ def geometry_of(robot: RobotModel, motion: PathMotion, start: Array, origin: Pos
     Raises:
         PlanError: there is no such arc, or no joint position at its end.
     """
-    target, control = _end(motion, origin), orientation_of(motion)
+    target, control = _end(motion, origin), orientation_of(motion.orientation)
     if control.type == "ignore":
         raise PlanError(
             "planning",
