@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, isnan, nan
 from types import TracebackType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
 from heptarm.values.condition.trigger import Trigger
 from heptarm.values.result import Cause, MotionEvent, Result
+from heptarm.values.sealed import Sealed
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import MEANINGS
 from heptarm.wire.messages import (
@@ -70,14 +71,14 @@ def check_timeout(timeout: float) -> float:
     return within(scalar(timeout, "timeout"), "timeout", 0.0, MAX_TIMEOUT, unit="s")
 
 
-class Block(ABC):
+class Block(Sealed, ABC):
     """Base of what is used in a `with` block: leaving the block closes it.
 
     Attributes:
         what: its name in the log.
     """
 
-    what: str
+    what: ClassVar[str]
 
     @abstractmethod
     def close(self) -> None:
@@ -137,7 +138,7 @@ _ABORTED = {
 }
 
 
-class MotionHandle:
+class MotionHandle(Sealed):
     """A program that was sent to the cabinet; made by `Arm.start`.
 
     It can be awaited in asyncio. Its id is the cabinet's.
