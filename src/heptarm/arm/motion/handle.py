@@ -125,6 +125,8 @@ STREAM_SIZE = 100_000
 LONGEST_STREAM = 1_000_000
 #: States that may overtake the event that a motion has begun.
 _OVERTAKING = 20
+#: Longest wait for the end of a motion whose await was cancelled [s].
+_BRAKING = 10.0
 #: In position control a motion that ends farther from its target than this has not arrived [rad].
 ARRIVAL_TOLERANCE = 0.02
 
@@ -141,7 +143,7 @@ _ABORTED = {
 class MotionHandle(Sealed):
     """A program that was sent to the cabinet; made by `Arm.start`.
 
-    It can be awaited in asyncio. Its id is the cabinet's.
+    It can be awaited in asyncio; a cancelled await stops the arm. Its id is the cabinet's.
     """
 
     def __init__(
@@ -401,11 +403,27 @@ class MotionHandle(Sealed):
         self._future.add_done_callback(lambda _: callback(self))
 
     def __await__(self) -> Generator[Any, None, Result]:
-        """Wait in asyncio; cancelling the wait does not cancel the motion."""
+        """Wait in asyncio, as `wait` does without a timeout.
+
+        If the wait is cancelled or times out, the arm brakes on its path and waiting motions are dropped, as with
+        Ctrl-C; the wait then lasts until the motion has ended. `asyncio.shield(handle)` lets the motion go on.
+        """
         future = asyncio.wrap_future(self._future)
         # nobody else looks at its error when the wait was cancelled
         future.add_done_callback(lambda ended: ended.cancelled() or ended.exception())
-        return asyncio.shield(future).__await__()
+        try:
+            return (yield from asyncio.shield(future).__await__())
+        except (asyncio.CancelledError, GeneratorExit) as error:
+            if not self.done:
+                # in a thread: the event loop must not wait for the cabinet
+                threading.Thread(target=self._brake, name="heptarm-brake", daemon=True).start()
+                if isinstance(error, asyncio.CancelledError):
+                    yield from asyncio.wait((future,), timeout=_BRAKING).__await__()
+            raise
+
+    def _brake(self) -> None:
+        if not self.done:
+            self._connection.brake("a cancelled await")
 
     # ---------------------------------------------------------------------------- from the link
 
