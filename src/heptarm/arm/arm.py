@@ -57,6 +57,7 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
+from heptarm.values.sealed import Sealed
 from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece
@@ -87,7 +88,7 @@ def _checked(check: CollisionCheck) -> CollisionCheck:
     return check
 
 
-class Arm:
+class Arm(Sealed):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.

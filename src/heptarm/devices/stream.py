@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
+from typing import Final, TextIO
 
 import numpy.typing as npt
 
@@ -15,12 +15,13 @@ from heptarm.devices.device import REST, DeviceInput, InputDevice, Roles
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import callback, finite, instance
+from heptarm.values.sealed import Sealed
 
 #: The first line of a file of inputs.
 _FORMAT = "heptarm input 1"
 
 
-class SyntheticDevice:
+class SyntheticDevice(Sealed):
     """A function of time as an input device; it rests when the function returns None.
 
     Args:
@@ -30,6 +31,7 @@ class SyntheticDevice:
     """
 
     name = "synthetic"
+    roles: Roles
 
     def __init__(
         self,
@@ -56,7 +58,7 @@ class SyntheticDevice:
         """Has no effect."""
 
 
-class RecordedDevice:
+class RecordedDevice(Sealed):
     """A recorded stream of inputs; it begins with the first reading, and rests after its end.
 
     Args:
@@ -69,6 +71,7 @@ class RecordedDevice:
     """
 
     name = "recording"
+    roles: Roles
 
     def __init__(
         self,
@@ -110,7 +113,7 @@ class RecordedDevice:
         """Has no effect."""
 
 
-class RecordingDevice:
+class RecordingDevice(Sealed):
     """Another device, whose inputs are written to a file while it is read.
 
     Args:
@@ -121,6 +124,9 @@ class RecordingDevice:
     Raises:
         CommandRejected: the file cannot be written.
     """
+
+    name: Final[str]
+    roles: Roles
 
     def __init__(self, device: InputDevice, path: str | Path, *, clock: Clock | None = None) -> None:
         self.name, self.roles = device.name, device.roles
