@@ -18,6 +18,7 @@ from heptarm.arm.devices.io import Io
 from heptarm.arm.devices.operator import Operator
 from heptarm.arm.devices.smartpad import Pad
 from heptarm.arm.devices.tools import Tooling
+from heptarm.arm.flange_check import flange_warning
 from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection
@@ -128,6 +129,19 @@ class Arm:
         joints = link.build(sample).groups.joints
         if joints is not None and np.isnan(joints.dq).any():
             link.feed.after(sample.number, link.options.timeout)
+        self._check_flange()
+
+    def _check_flange(self) -> None:
+        """Warn of a media flange that the robot model does not have."""
+        newest = self._connection.newest()
+        groups = None if newest is None else newest.groups
+        if groups is None or groups.joints is None or groups.pose is None:
+            return
+        expected = self._tooling.reached(groups.joints.q, TOOL)
+        if expected is not None and (
+            text := flange_warning(self.robot, groups.joints, groups.pose, expected)
+        ):
+            _log.warning("%s", text)
 
     def reconnect(self) -> None:
         """Make a new connection after the old one was lost; a controller takes control again.

@@ -7,6 +7,7 @@ The file is heptarm/targets.toml in the folder of the user's settings, one table
     key_file = "~/keys/lab1"     # otherwise the key is looked up as for any address
     tool = "gripper"             # attached when a client takes control
     speed = 0.3                  # ceiling of the speed
+    flange = "touch"             # media flange of the robot
 
 When a target was last used is the time of a file of its name in the folder beside it.
 """
@@ -24,6 +25,7 @@ from typing import Any
 
 from heptarm.errors import CommandRejected
 from heptarm.io.keys import settings_folder
+from heptarm.values.robot import flange
 
 try:
     import tomllib
@@ -34,7 +36,7 @@ except ModuleNotFoundError:  # Python 3.10
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 #: Names that mean something else.
 _TAKEN = ("localhost", "sim")
-_KEYS = ("address", "key_file", "tool", "speed")
+_KEYS = ("address", "key_file", "tool", "speed", "flange")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ class SavedTarget:
         key_file: file with the key; "": the key is looked up elsewhere.
         tool: attached when a client takes control; "": none.
         speed: ceiling of the speed of all motions, (0, 1].
+        flange: media flange of the robot: "plain", "touch", or its height [m]; "": not stated.
     """
 
     name: str
@@ -54,6 +57,7 @@ class SavedTarget:
     key_file: str = ""
     tool: str = ""
     speed: float = 1.0
+    flange: str = ""
 
     @property
     def last_used(self) -> float | None:
@@ -120,7 +124,10 @@ def _read(name: str, table: Any) -> SavedTarget:
             allowed=", ".join(_KEYS),
             hint=f"it may have {', '.join(_KEYS)}",
         )
-    return check_target(SavedTarget(name, **{key: table[key] for key in _KEYS if key in table}), where)
+    values = {key: table[key] for key in _KEYS if key in table}
+    if isinstance(values.get("flange"), float):  # a height may be a number
+        values["flange"] = f"{values['flange']:g}"
+    return check_target(SavedTarget(name, **values), where)
 
 
 def check_target(target: SavedTarget, where: str) -> SavedTarget:
@@ -141,7 +148,7 @@ def check_target(target: SavedTarget, where: str) -> SavedTarget:
             value=name,
             hint=f"also {' and '.join(_TAKEN)} mean something else; choose a name such as lab1",
         )
-    for key in ("address", "key_file", "tool"):
+    for key in ("address", "key_file", "tool", "flange"):
         if not isinstance(getattr(target, key), str):
             raise CommandRejected(f"{where}: {key} must be a text", parameter=key)
     if isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0:
@@ -152,6 +159,13 @@ def check_target(target: SavedTarget, where: str) -> SavedTarget:
             allowed="(0, 1]",
             hint="it is a fraction of the full speed",
         )
+    if target.flange:
+        try:
+            flange(target.flange)
+        except CommandRejected as error:
+            raise CommandRejected(
+                f"{where}: {error.text}", parameter="flange", value=target.flange, hint=error.hint
+            ) from None
     return target
 
 
@@ -170,7 +184,7 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
         remove_target(target.name)
     lines = [f"[{target.name}]", f"address = {_text(target.address)}"]
     lines += [
-        f"{key} = {_text(getattr(target, key))}" for key in ("key_file", "tool") if getattr(target, key)
+        f"{key} = {_text(getattr(target, key))}" for key in ("key_file", "tool", "flange") if getattr(target, key)
     ]
     if not math.isclose(target.speed, 1.0):
         lines.append(f"speed = {float(target.speed)!r}")

@@ -21,7 +21,7 @@ from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, frozen, instance, shown
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
-from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.text import lines
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class Recording:
     @property
     def robot(self) -> RobotModel | None:
         """The robot, with its limits; None: unknown to this version."""
-        return ROBOTS.get(self.facts.get("robot", ""))
+        return known_robot(self.facts.get("robot", ""))
 
     @property
     def notes(self) -> tuple[RecordedEvent, ...]:

@@ -6,9 +6,9 @@ import os
 from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl, urlsplit
 
-from heptarm.errors import ConnectFailed
+from heptarm.errors import CommandRejected, ConnectFailed
 from heptarm.io.targets import SavedTarget, saved_target
-from heptarm.values.robot import ROBOTS
+from heptarm.values.robot import ROBOTS, Flange, flange
 from heptarm.values.simulator_options import check_target_option
 from heptarm.wire.messages import PORT
 
@@ -48,6 +48,31 @@ class Target:
     def key_file(self) -> str | None:
         """File with the key of the saved target; None: it has none of its own."""
         return None if self.saved is None else self.saved.key_file or None
+
+    @property
+    def flange(self) -> Flange | None:
+        """Media flange of the private virtual cabinet or of the saved target; None: neither names one."""
+        named = dict(self.options).get("flange", "") or ("" if self.saved is None else self.saved.flange)
+        return flange(named) if named else None
+
+    def with_flange(self, given: str | float | None) -> Target:
+        """The target with a media flange; None: as it is.
+
+        Raises:
+            CommandRejected: there is no such flange, or the target has another one.
+        """
+        named, mounted = None if given is None else flange(given), self.flange
+        if named is not None and mounted is not None and named != mounted:
+            raise CommandRejected(
+                f'flange must be "{mounted.name}", which the target {self} has, got "{named.name}"',
+                parameter="flange",
+                value=given,
+                hint="leave out one of them",
+            )
+        chosen = named or mounted
+        if chosen is None or not self.is_private or "flange" in dict(self.options):
+            return self
+        return replace(self, options=(*self.options, ("flange", chosen.name)))
 
     @property
     def is_private(self) -> bool:

@@ -20,7 +20,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.io import Signal, SignalValues
 from heptarm.values.pose import Pose, Redundancy
 from heptarm.values.result import Cause, Result
-from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.robot import ROBOTS, Flange, RobotModel
 from heptarm.wire import messages as wire
 from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.state_groups import StateGroups
@@ -154,8 +154,8 @@ def read_result(message: wire.MotionFinished, state: values.State | None) -> Res
     )
 
 
-def read_robot(message: wire.RobotInfo) -> RobotModel:
-    """The connected robot, with the limits that the cabinet reports.
+def read_robot(message: wire.RobotInfo, flange: Flange) -> RobotModel:
+    """The connected robot with its flange, which no cabinet reports, and with the limits that the cabinet reports.
 
     Raises:
         ConnectFailed: a robot that this version does not know.
@@ -170,7 +170,7 @@ def read_robot(message: wire.RobotInfo) -> RobotModel:
             hint="pip install --upgrade heptarm",
         )
     return replace(
-        known,
+        known.with_flange(flange),
         title=message.title or known.title,
         q_min=_array(message.q_min),
         q_max=_array(message.q_max),

@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 
 from heptarm import _resources
 from heptarm.errors import CommandRejected, MissingExtra
+from heptarm.sim.runtime import station
 from heptarm.sim.runtime.addresses import AddressMap
 
 #: Every address stays.
@@ -58,6 +59,7 @@ class Application:
         main: its class.
         classes: folder with all classes.
         project: the project's `RoboticsAPI.data.xml`; None: there is none.
+        station: the project's `StationSetup.cat`; None: there is none.
         background: classes of its background tasks.
         jars: its own libraries.
         left_out: why a class or a file of the project is missing beside the application.
@@ -66,6 +68,7 @@ class Application:
     main: str
     classes: Path
     project: Path | None
+    station: Path | None = None
     background: tuple[str, ...] = ()
     jars: tuple[Path, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -205,6 +208,8 @@ def compile_application(
     chosen = _chosen(find(folder), main, folder)
     jars, tasks = _libraries(folder), background(folder)
     data = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
+    stations = [file for file in _sources(folder, "cat") if file.name == station.FILE]
+    found = stations[0] if stations else station.find_station(data or folder)
     left_out: list[str] = []
     with TemporaryDirectory(prefix="heptarm-sources-") as place:
         copies = _Copies(Path(place), folder, sources, addresses)
@@ -223,7 +228,7 @@ def compile_application(
                 except CommandRejected as error:
                     tasks = [task for task in tasks if task != name]
                     left_out.append(f"{name} is left out: {error.text}")
-    return Application(chosen, out, data, tuple(tasks), jars, tuple(left_out))
+    return Application(chosen, out, data, found, tuple(tasks), jars, tuple(left_out))
 
 
 def _full_name(source: Path, text: str) -> str:
