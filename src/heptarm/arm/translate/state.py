@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
+from math import isnan
 from operator import attrgetter
 from struct import Struct
 from typing import Any
@@ -18,7 +19,7 @@ from heptarm.errors import ConnectFailed, RemoteProtocolError
 from heptarm.values import state as values
 from heptarm.values.arrays import Array
 from heptarm.values.io import Signal, SignalValues
-from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.result import Cause, Result
 from heptarm.values.robot import ROBOTS, Flange, RobotModel
 from heptarm.wire import messages as wire
@@ -190,8 +191,13 @@ def _cartesian(message: wire.PoseState) -> values.Cartesian:
         message.stamp,
         Pose.of(message.xyz, message.quat),
         Pose.of(message.xyz_cmd, message.quat_cmd),
-        value_of(Redundancy, message.redundancy),
+        _redundancy(message.redundancy),
     )
+
+
+def _redundancy(message: wire.Redundancy) -> Redundancy:
+    """The redundancy of a state; a cabinet reports NaN where it knows no E1."""
+    return Redundancy(NOT_GIVEN if isnan(message.e1) else message.e1, message.status, message.turn)
 
 
 class _Vectors:
