@@ -60,6 +60,8 @@ def test_what_is_no_flange_is_refused() -> None:
             flange(height)
     with pytest.raises(LimitError, match="did you mean 26 mm"):
         flange(26.0)
-    with pytest.raises(CommandRejected, match='flange must be touch, which the robot iiwa14.touch has, got plain'):
+    with pytest.raises(
+        CommandRejected, match="flange must be touch, which the robot iiwa14.touch has, got plain"
+    ):
         robot("iiwa14+touch", flange="plain")
     assert known_robot("iiwa14+inside") is None and known_robot("") is None

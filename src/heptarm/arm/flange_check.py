@@ -1,4 +1,4 @@
-"""Whether the cabinet's flange is where the robot model has it: a media flange that nobody named moves it by centimetres.
+"""Whether the cabinet's flange is where the robot model has it: an unnamed media flange moves it by centimetres.
 
 No interface of the cabinet reports the media flange, but the pose of the motion frame contains its height.
 """
@@ -40,7 +40,9 @@ def flange_warning(robot: RobotModel, joints: Joints, reported: Cartesian, expec
     )
     height = robot.flange.height + float(off[2])
     if float(np.linalg.norm(off[:2])) > allowed or height < -allowed:
-        return f"{text}, and no media flange explains that: check the robot's type, its mastering and the tool"
+        return (
+            f"{text}, and no media flange explains that: check the robot's type, its mastering and the tool"
+        )
     for one in FLANGES.values():
         if abs(one.height - height) <= allowed:
             return f'{text}: it likely is "{one.name}" ({one.title}); connect with flange="{one.name}"'

@@ -44,6 +44,11 @@ KeyFile = Annotated[
 ]
 
 
+Overwrite = Annotated[
+    bool, Parameter(name="--overwrite", negative="", help="Replace a file that exists; otherwise it is kept.")
+]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandTarget:

@@ -27,6 +27,7 @@ from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed, refuse_windows, require_extra
 from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
+from heptarm.values.files import read_text
 from heptarm.values.robot import ROBOTS, robot
 from heptarm.values.simulator_options import RealTime, SimulatorOptions
 
@@ -651,10 +652,7 @@ def _read_answers(file: Path | None) -> list[int]:
     if file is None:
         return []
     found = []
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CommandRejected(f"--answers: {error}", parameter="answers") from None
+    text = read_text(file, name="answers")
     for number, line in enumerate(text.splitlines(), 1):
         said = line.partition("#")[0].strip()
         if said and not said.isdecimal():

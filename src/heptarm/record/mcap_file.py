@@ -75,7 +75,7 @@ class RecordingFile:
     """Writer of a recording; not to be used by several threads at once.
 
     Args:
-        path: the file; it is replaced.
+        path: the file; one that exists is replaced, see `Recorder`.
         facts: texts about robot and connection, by name.
         epoch: nanoseconds since 1970 at our clock's zero.
         chunk: size of a chunk [bytes]: what is lost if the process ends at any time.

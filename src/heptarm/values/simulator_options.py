@@ -84,7 +84,9 @@ class SimulatorOptions:
     )
     station: Path | None = field(
         default=None,
-        metadata=_about("StationSetup.cat with the project's robot; default: the one beside the project's data"),
+        metadata=_about(
+            "StationSetup.cat with the project's robot; default: the one beside the project's data"
+        ),
     )
     box: tuple[str, ...] = field(
         default=(),

@@ -8,12 +8,16 @@ from urllib.parse import parse_qsl, urlsplit
 
 from heptarm.errors import CommandRejected, ConnectFailed
 from heptarm.io.targets import SavedTarget, saved_target
+from heptarm.values.arrays import shown
 from heptarm.values.robot import ROBOTS, Flange, flange
 from heptarm.values.simulator_options import check_target_option
 from heptarm.wire.messages import PORT
 
 #: Environment variable that names the default target.
 VARIABLE = "HEPTARM_TARGET"
+
+#: Longest name of a host, and of a part of it (RFC 1035) [characters].
+_LONGEST_HOST, _LONGEST_LABEL = 253, 63
 
 _EXAMPLES = (
     'examples: "172.31.1.147" or "172.31.1.147:30001" (a cabinet), "sim://iiwa14" or "sim://iiwa7?speed=5" '
@@ -137,7 +141,7 @@ def _parsed(text: str) -> Target:
         return _address(parts.netloc)
     except ValueError as error:
         raise ConnectFailed(
-            f"target must be an address or a simulator, got {text!r}: {error}", hint=_EXAMPLES
+            f"target must be an address or a simulator, got {shown(text)}: {error}", hint=_EXAMPLES
         ) from None
 
 
@@ -146,8 +150,12 @@ def _address(text: str) -> Target:
         raise ValueError("the only scheme is sim://")
     parts = urlsplit(f"//{text}")
     port = parts.port  # raises ValueError unless it is a number in range
-    if not parts.hostname or any(character.isspace() for character in text):
+    if not parts.hostname or any(character.isspace() or not character.isprintable() for character in text):
         raise ValueError("it has no host")
+    if any(not 0 < len(label) <= _LONGEST_LABEL for label in parts.hostname.rstrip(".").split(".")) or (
+        len(parts.hostname) > _LONGEST_HOST
+    ):
+        raise ValueError(f"a host has at most {_LONGEST_HOST} characters, {_LONGEST_LABEL} between two dots")
     if parts.username is not None or parts.query or port == 0:
         raise ValueError("an address is HOST or HOST:PORT with a port of 1 to 65535")
     return Target(host=parts.hostname, port=PORT if port is None else port)

@@ -16,6 +16,7 @@ from heptarm import _resources
 from heptarm.errors import CommandRejected, MissingExtra
 from heptarm.sim.runtime import station
 from heptarm.sim.runtime.addresses import AddressMap
+from heptarm.values.files import read_bytes
 
 #: Every address stays.
 UNMAPPED = AddressMap({})
@@ -112,7 +113,7 @@ def _descendants(sources: list[Path], roots: tuple[str, ...]) -> list[str]:
 
 def read_source(file: Path) -> str:
     """Text of a Java source: UTF-8 with or without a byte order mark, otherwise windows-1252 as Workbench writes it."""
-    data = file.read_bytes()
+    data = read_bytes(file)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

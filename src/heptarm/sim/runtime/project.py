@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 from heptarm.errors import CommandRejected
 from heptarm.values.arrays import shown
+from heptarm.values.files import read_bytes, unreadable
 
 Value = str | int | float | bool
 
@@ -71,26 +72,18 @@ def read_xml(file: Path, what: str) -> ElementTree.Element:
         what: it should be, for the error.
 
     Raises:
-        CommandRejected: it is too large, or not XML; the text has line and column.
-        OSError: the file cannot be read.
+        CommandRejected: it cannot be read, is too large, or not XML; the text has line and column.
     """
+    data = read_bytes(file, largest=_LARGEST, name="project")
     try:
-        with file.open("rb") as raw:
-            data = raw.read(_LARGEST + 1)
-        if len(data) > _LARGEST:
-            raise ValueError(f"it has more than {_LARGEST // 2**20} MiB")
         return ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # an unknown encoding is a LookupError
         raise _unreadable(file, what, str(error)) from None
 
 
 def _unreadable(file: Path, what: str, why: str) -> CommandRejected:
-    return CommandRejected(
-        f"{file} is not {what}: {why}",
-        parameter="project",
-        value=str(file),
-        hint="give the file that Sunrise Workbench has written",
-    )
+    hint = "give the file that Sunrise Workbench has written"
+    return unreadable(file, why, what=what, name="project", hint=hint)
 
 
 def like(old: Value | None, text: str) -> Value:
@@ -107,8 +100,7 @@ def read_process_data(file: Path) -> dict[str, Value]:
     """Read the process data of a project file by their ids; without a value the default counts.
 
     Raises:
-        CommandRejected: the file is not XML, or a value does not fit its type.
-        OSError: the file cannot be read.
+        CommandRejected: the file cannot be read or is not XML, or a value does not fit its type.
     """
     root = read_xml(file, _WHAT)
     found: dict[str, Value] = {}
@@ -181,8 +173,7 @@ def read_project(file: Path) -> Project:
     """Read the templates and frames of a project file.
 
     Raises:
-        CommandRejected: the file is not XML, or a number in it is illegal.
-        OSError: the file cannot be read.
+        CommandRejected: the file cannot be read or is not XML, or a number in it is illegal.
     """
     root = read_xml(file, _WHAT)
     try:

@@ -58,8 +58,7 @@ def read_station(file: Path) -> Station:
     """Read a station setup.
 
     Raises:
-        CommandRejected: the file is not XML.
-        OSError: the file cannot be read.
+        CommandRejected: the file cannot be read, or is not XML.
     """
     for item in read_xml(file, "a station setup").iter("TopologyItem"):
         names = (item.get("itemPath", ""), item.get("name", ""))
