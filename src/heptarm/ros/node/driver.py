@@ -122,6 +122,7 @@ class Driver:
             groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
             watchdog=values["watchdog"],
             datagrams=values["datagrams"],
+            flange=values["flange"] or None,
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = NodeFriSession(self._arm)
