@@ -10,7 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model
-from heptarm.sim.planning.lookahead import FramesOfArm, PlannedProgram, look_ahead
+from heptarm.planning.lookahead import FramesOfArm, PlannedProgram, look_ahead
 from heptarm.values.arrays import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
@@ -127,6 +127,6 @@ def test_a_line_through_a_singularity_is_refused() -> None:
 
 
 def test_it_needs_neither_java_nor_mujoco() -> None:
-    code = "import sys, heptarm.sim.planning.lookahead; print(*({'jpype', 'mujoco'} & set(sys.modules)))"
+    code = "import sys, heptarm.planning.lookahead; print(*({'jpype', 'mujoco'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.sim.planning.command import TICK
+from heptarm.planning.command import TICK
 from heptarm.values.arrays import Array, frozen
 
 #: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's.

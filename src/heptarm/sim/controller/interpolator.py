@@ -10,6 +10,12 @@ from typing import Protocol
 import numpy as np
 
 from heptarm.errors import Unreachable
+from heptarm.planning.command import TICK, Order
+from heptarm.planning.jerk_profile import ProfileLimits, TimeLaw, brake
+from heptarm.planning.path import JointLine, JointPath
+from heptarm.planning.plan import Plan
+from heptarm.planning.seam import OperationMode
+from heptarm.planning.table import MotionTable
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, Superposition
 from heptarm.sim.controller.ahead import SetPointsAhead
@@ -27,12 +33,6 @@ from heptarm.sim.controller.servo import (
 )
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
-from heptarm.sim.planning.command import TICK, Order
-from heptarm.sim.planning.jerk_profile import ProfileLimits, TimeLaw, brake
-from heptarm.sim.planning.path import JointLine, JointPath
-from heptarm.sim.planning.plan import Plan
-from heptarm.sim.planning.table import MotionTable
-from heptarm.sim.seam import OperationMode
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.motion.hand_guiding import HandGuide

@@ -13,10 +13,10 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import DEFAULT_TIMING, TICK, Order
-from heptarm.sim.planning.path import TcpInverseKinematics
-from heptarm.sim.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
-from heptarm.sim.seam import ServoTiming, StraightLimits
+from heptarm.planning.command import DEFAULT_TIMING, TICK, Order
+from heptarm.planning.path import TcpInverseKinematics
+from heptarm.planning.seam import ServoTiming, StraightLimits
+from heptarm.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel

@@ -10,12 +10,12 @@ from itertools import pairwise
 import numpy as np
 
 from heptarm.model.kinematics import Vec, forward
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.composite_path import UNBOUND, CompositePath, Segment, SubPath
-from heptarm.sim.planning.geometry import Arc, Quat, Slerp, Straight
-from heptarm.sim.planning.path import CartesianPath, Sequential
-from heptarm.sim.planning.plan import Plan, timed
-from heptarm.sim.planning.targets import (
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.composite_path import UNBOUND, CompositePath, Segment, SubPath
+from heptarm.planning.geometry import Arc, Quat, Slerp, Straight
+from heptarm.planning.path import CartesianPath, Sequential
+from heptarm.planning.plan import Plan, timed
+from heptarm.planning.targets import (
     CARTESIAN_DEFAULT,
     ORIENTATION_DEFAULT,
     check_numbers,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from heptarm.errors import CommandRejected
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.plan import Plan
-from heptarm.sim.planning.program import plan_motions
-from heptarm.sim.planning.spline import plan_joint_spline, plan_spline
-from heptarm.sim.planning.targets import LINES, check_numbers
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.plan import Plan
+from heptarm.planning.program import plan_motions
+from heptarm.planning.spline import plan_joint_spline, plan_spline
+from heptarm.planning.targets import LINES, check_numbers
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
-from heptarm.sim.seam import TICK_NS, Condition, ServoTiming, StraightLimits
+from heptarm.planning.seam import TICK_NS, Condition, ServoTiming, StraightLimits
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.orientation import VARIABLE, Orientation

@@ -11,8 +11,8 @@ import numpy as np
 
 from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import Vec
-from heptarm.sim.planning.geometry import Geometry, Quat, blend_weight, product
-from heptarm.sim.planning.native_inverse import NativeInverse, inverse_library
+from heptarm.planning.geometry import Geometry, Quat, blend_weight, product
+from heptarm.planning.native_inverse import NativeInverse, inverse_library
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel

@@ -9,12 +9,12 @@ from math import inf, isnan
 
 import numpy as np
 
-from heptarm.sim.planning.command import Order
-from heptarm.sim.planning.composite_path import CompositePath, constraints, sample
-from heptarm.sim.planning.path import JointPath, PathLengths
-from heptarm.sim.planning.table import MotionTable
-from heptarm.sim.planning.targets import check_limits
-from heptarm.sim.planning.time_scaling import PathTiming
+from heptarm.planning.command import Order
+from heptarm.planning.composite_path import CompositePath, constraints, sample
+from heptarm.planning.path import JointPath, PathLengths
+from heptarm.planning.table import MotionTable
+from heptarm.planning.targets import check_limits
+from heptarm.planning.time_scaling import PathTiming
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel

@@ -8,8 +8,8 @@ from math import inf, isnan
 import numpy as np
 
 from heptarm.model.kinematics import Vec
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.composite_path import (
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.composite_path import (
     UNBOUND,
     CompositePath,
     Segment,
@@ -18,10 +18,10 @@ from heptarm.sim.planning.composite_path import (
     sample,
     turns,
 )
-from heptarm.sim.planning.geometry import Geometry, Quat, blend_weight, product
-from heptarm.sim.planning.path import CartesianPath, JointLine, JointPath, Sequential
-from heptarm.sim.planning.plan import Plan, timed
-from heptarm.sim.planning.targets import (
+from heptarm.planning.geometry import Geometry, Quat, blend_weight, product
+from heptarm.planning.path import CartesianPath, JointLine, JointPath, Sequential
+from heptarm.planning.plan import Plan, timed
+from heptarm.planning.targets import (
     LINES,
     STILL,
     cartesian_path,

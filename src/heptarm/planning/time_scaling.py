@@ -15,7 +15,7 @@ from math import sqrt
 import numpy as np
 
 from heptarm.errors import CommandRejected
-from heptarm.sim.planning.jerk_profile import (
+from heptarm.planning.jerk_profile import (
     JerkProfile,
     ProfileLimits,
     ScaledProfile,

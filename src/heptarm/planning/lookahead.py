@@ -14,9 +14,9 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError, Unreachable
 from heptarm.model.inverse_kinematics import redundancy
-from heptarm.sim.planning.command import Order, PlanError, Seven
-from heptarm.sim.planning.plan import Plan
-from heptarm.sim.planning.planner import plan
+from heptarm.planning.command import Order, PlanError, Seven
+from heptarm.planning.plan import Plan
+from heptarm.planning.planner import plan
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.circle import Circ

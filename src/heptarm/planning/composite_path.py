@@ -12,9 +12,9 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.batch import forward_batch
-from heptarm.sim.planning.command import PlanError
-from heptarm.sim.planning.path import JointPath
-from heptarm.sim.planning.time_scaling import PathConstraints
+from heptarm.planning.command import PlanError
+from heptarm.planning.path import JointPath
+from heptarm.planning.time_scaling import PathConstraints
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel

@@ -15,10 +15,10 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.composite_path import SegmentLimits
-from heptarm.sim.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
-from heptarm.sim.planning.path import CartesianPath
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.composite_path import SegmentLimits
+from heptarm.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
+from heptarm.planning.path import CartesianPath
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
