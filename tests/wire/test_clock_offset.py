@@ -119,6 +119,7 @@ def test_a_small_step_after_a_silence_shows_on_a_clock_of_our_rate() -> None:
     cabinet.offset += 20e6  # a drift of 100 ppm over ten seconds is 1 ms
     cabinet.ping(estimate, now + 10e9)
     assert abs(estimate.to_cabinet(round(now + 10e9)) - cabinet.clock(now + 10e9)) < 150e3
+    assert estimate.rate == 1.0  # it stepped, it does not run faster
 
 
 def test_a_rate_that_is_not_ours_is_known_to_a_hundredth_so_that_a_ping_after_a_silence_corrects_it() -> None:
