@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 from tests.long import LONG
 
@@ -47,6 +47,10 @@ _COMPUTING = ("fri", "house", "model", "rl", "schema", "sim", "values", "wire")
 # no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)
 settings.load_profile("heptarm")
+# a mutant is to be noticed, not to be explained
+settings.register_profile(
+    "mutation", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:
