@@ -1,4 +1,4 @@
-"""How long a program may take before waiting for it makes no sense: its own time, the override, the clock, the queue."""
+"""How long a program may take before waiting makes no sense: its own time, the override, the clock, the queue."""
 
 from __future__ import annotations
 
