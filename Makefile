@@ -22,8 +22,8 @@ $(STAMPS)/demo: pyproject.toml scripts/setup.sh $(wildcard scripts/lock/demo.txt
 
 setup: $(STAMPS)/venv native cabinet  ## everything for developers: virtual environment, package, tools, extension, compiled cabinet
 
-$(STAMPS)/venv: $(STAMPS)/demo $(wildcard scripts/lock/all.txt scripts/lock/torch.txt)
-	scripts/setup.sh all
+$(STAMPS)/venv: $(STAMPS)/demo $(wildcard scripts/lock/dev.txt scripts/lock/torch.txt)
+	scripts/setup.sh dev
 	@mkdir -p $(STAMPS) && touch $@
 
 # Its sources are few: the build system knows by itself whether one has changed.
@@ -63,8 +63,9 @@ cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
 
 ##@ To test
 
-lint: $(STAMPS)/venv  ## ruff, mypy, import contract
+lint: $(STAMPS)/venv  ## ruff (rules and format), mypy, import contract
 	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-logo
 
