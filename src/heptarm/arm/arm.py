@@ -745,8 +745,11 @@ class Arm:
         if kind == "joint":
             return JointServo(self._connection, terms)
         moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(self._connection, terms, moving=moving)
+        elbow = request.elbow_task(self._connection.robot)
+        if kind == "lin":
+            return LineServo(self._connection, terms, moving=moving)
+        if kind == "pose":
+            return PoseServo(self._connection, terms, moving=moving, elbow=elbow)
         limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
         if kind == "velocity":
             return VelocityServo(self._connection, terms, limits)
@@ -756,6 +759,7 @@ class Arm:
             limits,
             twist=TwistLimits(*request.line_limits()),
             moving=moving,
+            elbow=elbow,
             axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
+from functools import partial
 from math import nan
 from operator import le
 from typing import Any, Literal, TypedDict, TypeVar
@@ -31,7 +32,7 @@ from heptarm.io.tcp import WarmUpConnection
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
-from heptarm.model.velocity import FREE, Slowdown
+from heptarm.model.velocity import ELBOWS, FREE, Elbow, ElbowTask, Slowdown
 from heptarm.values.arrays import Array, array, instance, shown, within, word
 from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
@@ -40,6 +41,7 @@ from heptarm.values.mode.mode import MODES, Mode
 from heptarm.values.notebook import as_html
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
+from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
 from heptarm.wire import messages as wire
@@ -49,6 +51,7 @@ _Method = TypeVar("_Method", bound=Callable[..., Any])
 #: Kinds of servo motions: of targets, and of velocities.
 KINDS = ("joint", "pose", "lin", "velocity", "twist")
 VELOCITIES = ("velocity", "twist")
+REDUNDANT = ("twist", "pose")
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
 #: The protocol's defaults and ranges; `schema/protocol.toml` is their one place.
 _DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoTiming.RANGES
@@ -88,6 +91,8 @@ class ServoKeywords(TypedDict, total=False):
     moving: str
     frame: str | Pose | None
     timeout: float | None
+    elbow: Elbow | None
+    posture: npt.ArrayLike | None
     keep_clear_of: ClearanceModel | None
     until: Condition | None
 
@@ -123,6 +128,10 @@ class ServoRequest:
             is the velocity of its origin.
         frame: of "twist": its axes: "tool", "flange", "base", a name, or a pose in the base; None: "tool".
         timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
+        elbow: of "twist" and "pose": what the redundant joint does: "keep": the arm angle stays that of the start, the
+            default; "center": the joints stay away from their limits. Where a limit or a singularity would slow the
+            arm down, the elbow yields first.
+        posture: instead of `elbow`: the joints stay as near as they can to these positions, shape (7,) [rad].
         keep_clear_of: model of bodies to keep clear of, such as a `heptarm.CollisionModel`, which has the shapes of the
             attached tool and workpiece as well: velocities brake before them, targets that are nearer than its margin
             are refused; None: none. It is no safety function: it knows only its own model of the scene.
@@ -153,6 +162,8 @@ class ServoRequest:
     moving: str = TOOL
     frame: str | Pose | None = None
     timeout: float | None = None
+    elbow: Elbow | None = None
+    posture: npt.ArrayLike | None = None
     keep_clear_of: ClearanceModel | None = None
     until: Condition | None = None
 
@@ -173,6 +184,8 @@ class ServoRequest:
             )
         if self.until is not None:
             check_condition(self.until)
+        if self.elbow is not None:
+            word(self.elbow, "elbow", ELBOWS)
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
         TARGETS.time(self.watchdog, period=self.period)
@@ -238,6 +251,19 @@ class ServoRequest:
     def silence(self) -> float:
         """Silence after which a stream of velocities comes to rest [s]."""
         return _SILENCE if self.timeout is None else self.timeout
+
+    def elbow_task(self, robot: RobotModel) -> Callable[[Array], ElbowTask]:
+        """What the elbow does, for the joint positions at the start of the stream.
+
+        Raises:
+            ShapeError: the posture has not seven numbers.
+            LimitError: one of them is outside the limits of its joint.
+        """
+        posture = None
+        if self.posture is not None:
+            posture = array(self.posture, 7, "posture")
+            robot.check(posture, "posture")
+        return partial(ElbowTask, robot, elbow=self.elbow or "keep", posture=posture)
 
     @property
     def _kept(self) -> float:
@@ -314,6 +340,19 @@ class ServoRequest:
         if self.frame is not None and self.kind != "twist":
             raise CommandRejected(
                 'frame applies to arm.servo("twist") only', parameter="frame", hint="leave it out"
+            )
+        for name in ("elbow", "posture"):
+            if getattr(self, name) is not None and self.kind not in REDUNDANT:
+                raise CommandRejected(
+                    f'{name} applies to arm.servo("twist") and arm.servo("pose") only',
+                    parameter=name,
+                    hint="leave it out",
+                )
+        if self.elbow is not None and self.posture is not None:
+            raise CommandRejected(
+                f"posture takes the place of elbow, got both: elbow={self.elbow!r}",
+                parameter="posture",
+                hint="leave one of them out",
             )
         if self.speed_timeout is not None and (self.kind, self.engine) != ("joint", "smart"):
             raise CommandRejected(
