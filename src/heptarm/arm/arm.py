@@ -31,6 +31,7 @@ from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
     JointServo,
+    LineServo,
     PoseServo,
     ServoKeywords,
     ServoRequest,
@@ -747,7 +748,7 @@ class Arm:
         moving = self._tooling.on_flange(request.moving)
         elbow = request.elbow_task(self._connection.robot)
         if kind == "lin":
-            return LineServo(self._connection, terms, moving=moving)
+            return LineServo(self._connection, terms, moving=moving, elbow=elbow)
         if kind == "pose":
             return PoseServo(self._connection, terms, moving=moving, elbow=elbow)
         limits = JogLimits(*request.joint_fractions(self._speed), request.silence)

@@ -14,9 +14,11 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from heptarm.model.inverse_kinematics import arm_angle, status_of
+from heptarm.errors import Unreachable
+from heptarm.model.inverse_kinematics import arm_angle, solve, status_of
 from heptarm.model.kinematics import jacobian
 from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
 #: What the elbow does in a stream: see `ElbowTask`.
@@ -32,10 +34,12 @@ _UNDEFINED = 1e-4
 _GAIN, _BACK = 4.0, 1.0
 #: Derivative of the arm angle by a motion of the joints below which it is damped, and the step of difference quotients [rad].
 _FLAT, _STEP = 0.1, 1e-6
+#: Of a pose: most steps of the elbow, the smallest one [rad], and the joint movement per step that shows that it led astray.
+_ROUNDS, _STILL, _ASTRAY = 3, 1e-7, 3.0
 #: Largest place of a joint in its range, -1 to 1, at which the distance to the limits counts.
 _BRINK = 0.999
-#: Distance that is left to a joint limit [rad].
-MARGIN = 0.01
+#: Distance that velocities leave to a joint limit, and straight lines to poses [rad].
+MARGIN, NEAREST = 0.01, 1e-3
 #: Fraction of the acceleration with which braking before a limit is planned; the rest is for following that plan.
 _PLANNED = 0.5
 #: Parts of a joint motion that are this small do not move the joint, and a velocity that is left this part of is none.
@@ -98,18 +102,28 @@ class ElbowTask:
         """
         if self._keeps:
             return self._kept(q, dq, null)
-        return 0.0 if idle else _GAIN * self.step(q, null)
+        return 0.0 if idle else _GAIN * self._left(q, null)
 
-    def step(self, q: Array, null: Array) -> float:
-        """Distance along a joint motion that leaves the flange where it is to where the elbow is to be [rad].
+    def step(self, q: Array, null: Array, *, moved: float, reach: float) -> float:
+        """Distance along a joint motion that leaves the flange where it is, towards where the elbow is to be [rad].
 
-        Arguments as `rate`. To first order, as in Newton's method.
+        Args:
+            q: joint positions, shape (7,) [rad].
+            null: that motion, of length 1, shape (7,).
+            moved: by how much the joints move otherwise [rad]: "keep" goes no farther.
+            reach: the largest distance [rad].
         """
+        if self._keeps:
+            most = min(moved, reach)
+            wanted = -_divided(self._error(q), self._slope(q, null))
+        else:
+            most, wanted = reach, self._left(q, null)
+        return float(np.clip(wanted, -most, most))
+
+    def _left(self, q: Array, null: Array) -> float:
+        """Distance along a motion to the posture, or to the middle of the joints' ranges [rad]: a step of Newton's."""
         if self._posture is not None:
             return float(null @ (self._posture - q))
-        if self._keeps:
-            error = self._error(q)
-            return -_divided(error, self._slope(q, null))
         # sum of 1 / (1 - x²): Chan and Dubey, "A weighted least-norm solution based scheme for avoiding joint limits", 1995
         x = np.clip((q - self._middle) / self._half, -_BRINK, _BRINK)
         room = 1.0 - x * x
@@ -214,6 +228,59 @@ def resolved_twist(
     if least > _UNDEFINED:  # else more motions than one leave the flange where it is
         dq = dq + path.eased(dq, null, elbow.rate(q, dq, null, idle=idle)) * null
     return dq, FREE if achieved > 0.995 else Slowdown("singularity", achieved)
+
+
+def resolved_pose(robot: RobotModel, pose: Pose, near: Array, *, elbow: ElbowTask, reach: float) -> Array:
+    """Joint positions for a pose of the flange: those of a stream's next target.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base.
+        near: those of the last target, shape (7,) [rad].
+        elbow: what the elbow does.
+        reach: largest joint movement of the elbow's own [rad].
+
+    Returns:
+        Shape (7,) [rad], within the limits of the joints.
+
+    Raises:
+        Unreachable: there are none.
+    """
+    q = solve(robot, pose, near=near.tolist())
+    moved = float(np.abs(q - near).max())
+    for _ in range(_ROUNDS):
+        _, null, least = _damped(jacobian(robot, q), np.zeros(6))
+        step = elbow.step(q, null, moved=moved, reach=reach) if least > _UNDEFINED else 0.0
+        if abs(step) < _STILL:
+            break
+        try:
+            there = solve(robot, pose, near=np.clip(q + step * null, robot.q_min, robot.q_max).tolist())
+        except Unreachable:
+            break
+        if float(np.abs(there - q).max()) > _ASTRAY * abs(step):
+            break  # a limit is in the way: the next solution is elsewhere
+        q, reach, moved = there, reach - abs(step), moved - abs(step)
+    return q
+
+
+def blockage(robot: RobotModel, q: Array, twist: Array, *, elbow: ElbowTask) -> Slowdown:
+    """What slows the arm down most if the flange goes on with a twist from here, at the joints' own limits.
+
+    Args:
+        robot: the robot.
+        q: joint positions, shape (7,) [rad].
+        twist: of the flange, base axes, shape (6,) [m/s, rad/s].
+        elbow: what the elbow does.
+    """
+    path = VelocityPath(
+        q,
+        speed=robot.dq_max,
+        acceleration=robot.ddq_max,
+        q_min=robot.q_min + NEAREST,
+        q_max=robot.q_max - NEAREST,
+    )
+    dq, singular = resolved_twist(robot, path, twist, elbow=elbow)
+    return min((singular, *path.slowdowns(dq)), key=lambda one: one.factor)
 
 
 def limited_twist(twist: Array, speed: float, turn_speed: float) -> Array:
@@ -323,7 +390,8 @@ class VelocityPath:
         longest = float(np.max(np.abs(dq + wanted * along) / (_PLANNED * self._acceleration[free])))
         below, above = (
             np.minimum(
-                np.minimum(self._speed, self._fastest(left)), 2.0 * np.maximum(left, 0.0) / max(longest, _TINY)
+                np.minimum(self._speed, self._fastest(left)),
+                2.0 * np.maximum(left, 0.0) / max(longest, _TINY),
             )[free]
             for left in (self.q - self._low, self._high - self.q)
         )

@@ -247,9 +247,7 @@ class JogServo(Servo):
         q, speed = path.target(self._message.timing.min_trajectory_time)
         self._send(now, wire.ServoJointsVelocity, q.tolist() + speed.tolist())
 
-    def _velocity(
-        self, path: VelocityPath, wanted: Array | None, dt: float
-    ) -> tuple[Array, list[Slowdown]]:
+    def _velocity(self, path: VelocityPath, wanted: Array | None, dt: float) -> tuple[Array, list[Slowdown]]:
         """Joint velocities of a command, None: silence [rad/s], and what has slowed them down already."""
         return np.zeros(7) if wanted is None else wanted, []
 
@@ -377,9 +375,7 @@ class TwistServo(JogServo):
         """
         return self._set(twist)
 
-    def _velocity(
-        self, path: VelocityPath, wanted: Array | None, dt: float
-    ) -> tuple[Array, list[Slowdown]]:
+    def _velocity(self, path: VelocityPath, wanted: Array | None, dt: float) -> tuple[Array, list[Slowdown]]:
         limits = self._twist_limits
         goal = np.zeros(6) if wanted is None else limited_twist(wanted, limits.speed, limits.turn)
         if dt > 0.0:
