@@ -32,6 +32,7 @@ from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
     JointServo,
+    LineServo,
     PoseServo,
     ServoKeywords,
     ServoRequest,
@@ -769,8 +770,11 @@ class Arm(Sealed):
         if kind == "joint":
             return JointServo(self._connection, terms)
         moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(self._connection, terms, moving=moving)
+        elbow = request.elbow_task(self._connection.robot)
+        if kind == "lin":
+            return LineServo(self._connection, terms, moving=moving, elbow=elbow)
+        if kind == "pose":
+            return PoseServo(self._connection, terms, moving=moving, elbow=elbow)
         limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
         if kind == "velocity":
             return VelocityServo(self._connection, terms, limits)
@@ -780,6 +784,7 @@ class Arm(Sealed):
             limits,
             twist=TwistLimits(*request.line_limits()),
             moving=moving,
+            elbow=elbow,
             axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 
