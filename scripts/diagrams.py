@@ -44,7 +44,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
     "motion": (
         ("Your program", "Cabinet application (Java 6)", "Doubles (Java 17)", "Simulator (Python)"),
         (
-            Step(0, "Arm.move, Arm.start", f"{PY}/arm/arm.py", "motions, mode, until"),
+            Step(0, "Arm.move, Arm.start", f"{PY}/arm/verbs.py", "ProgramTerms"),
             Step(0, "check and time-limit the program", f"{PY}/arm/motion/program.py", "values"),
             Step(0, "values to messages", f"{PY}/arm/translate/motions.py", "wire.Run"),
             Step(0, "frame, send, await the answer", f"{PY}/arm/link/link.py", "TCP"),
@@ -73,7 +73,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
             Step(3, "read, keep the body", f"{PY}/arm/link/link.py", "bytes"),
             Step(3, "newest sample, queues", f"{PY}/arm/link/state_stream.py", "StateSample"),
             Step(3, "decode when it is used", f"{PY}/arm/translate/state.py", "State"),
-            Step(3, "arm.state, arm.states()", f"{PY}/arm/arm.py"),
+            Step(3, "arm.state, arm.states()", f"{PY}/arm/verbs.py"),
         ),
     ),
     "servo": (
