@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from math import isnan
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import heptarm as ha
-from heptarm.arm.motion.program import is_endless, listed, longest
+from heptarm.arm.motion.program import ProgramTerms, is_endless, listed, longest
 from heptarm.arm.translate.motions import item as item_of
 from heptarm.model.inverse_kinematics import redundancy
 from heptarm.values.motion.line import lin, lin_rel
@@ -182,3 +184,28 @@ def test_arcs_and_splines_reach_the_wire_whole() -> None:
         one(ha.spline_joints([np.zeros(7), deg(0, 121, 0, 0, 0, 0, 0)]))
     assert 15 < longest([curve], ROBOT, 1.0) < longest([curve], ROBOT, 0.01)
     assert 15 < longest([ha.spline_joints([np.zeros(7)] * 3)], ROBOT, 1.0) < 200
+
+
+@pytest.mark.parametrize(
+    ("terms", "error", "text"),
+    [
+        ({"speed": 0.0}, ha.LimitError, r"speed must be in \(0, 1\], got 0"),
+        ({"speed": 1.5}, ha.LimitError, r"speed must be in \(0, 1\], got 1.5"),
+        ({"mode": "position"}, ha.ShapeError, "mode must be"),
+        ({"until": 3.0}, ha.ShapeError, "until must be"),
+        ({"then": "jump"}, ha.HeptarmError, "then must be"),
+        ({"when": "now"}, ha.ShapeError, "when must be one of 'queue', 'replace', 'reject', got 'now'"),
+    ],
+)
+def test_terms_are_checked_where_they_are_made(
+    terms: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error, match=text):
+        ProgramTerms(**terms)
+
+
+def test_terms_are_one_value() -> None:
+    terms = ProgramTerms(speed=0.3, when="replace")
+    assert (terms.mode, terms.until, terms.then, terms.breaks) == (None, None, "stay", ())
+    with pytest.raises(FrozenInstanceError):
+        terms.speed = 1.0  # type: ignore[misc]
