@@ -12,9 +12,9 @@ from math import atan2, cos, sin, sqrt
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
+from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import DEFAULT_TIMING, TICK, Order
-from heptarm.planning.path import TcpInverseKinematics
 from heptarm.planning.seam import ServoTiming, StraightLimits
 from heptarm.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
 from heptarm.values.arrays import Array
@@ -178,7 +178,7 @@ class StraightFollower:
         tcp = Pose.of(order.tcp[:3], order.tcp[3:])
         origin = Pose.from_matrix(forward(robot, here)) @ tcp
         limits = self._limits = StraightServoLimits.of(order)
-        self._inverse = TcpInverseKinematics(robot, here, tcp)
+        self._inverse = PathInverse(robot, tcp)
         self._q = here.copy()
         self._otg = OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
@@ -221,7 +221,7 @@ class StraightFollower:
         place, turn, _, _ = self._state()
         x, y, z = (self._limits.axes @ place).tolist()
         i, j, k, w = self._turned(turn).tolist()
-        self._q = self._inverse.joints((x, y, z), (i, j, k, w), self._inverse.e1, self._q)
+        self._q = self._inverse.joints((x, y, z), (i, j, k, w), self._q)
         return self._q
 
     def brake(self, *, scale: float, rate: float) -> None:
