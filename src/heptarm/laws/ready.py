@@ -18,6 +18,7 @@ from heptarm._library import Unavailable, extension_file
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
+from heptarm.model.dynamics import rigid_bodies
 from heptarm.values.arrays import Array, array, finite, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
@@ -49,15 +50,8 @@ def shared_library() -> Path:
 
 
 def constants(arm: RobotModel, load: Body | None = None) -> Array:
-    """`struct robot` of dynamics.h: the links, the load on the flange, the motors; shape (105,)."""
-    links = arm.links
-    inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
-    body = load or Body(0.0, np.zeros(3))
-    parts = (
-        *(links.origin, links.mass, links.com, inertia, links.flange),
-        *([body.mass], body.com, body.inertia, [ROTOR]),
-    )
-    return np.concatenate([np.ravel(part) for part in parts])
+    """`struct robot` of dynamics.h with the motors' inertia, shape (105,)."""
+    return rigid_bodies(arm, load, rotor=ROTOR)
 
 
 class ReadyLaw(LibraryLaw):
