@@ -22,6 +22,7 @@
 #include "kinematics.h"
 #include "limited_steps.h"
 #include "fri_layout.h"
+#include "torque_guard.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
 /* Place of an array of a state in t_arrays, and its bit in t_known. */
@@ -390,6 +391,12 @@ static void slew(struct loop *l, double *last, const double *target, const doubl
         }
         last[i] = least(most(kept, last[i] - step[i]), last[i] + step[i]);
     }
+}
+
+void hf_start_torque_guard(struct torque_guard *guard) { start_torque_guard(guard); }
+
+int hf_guard_torques(struct torque_guard *guard, const double *q, const double *dq, double dt, int is_braking, double *tau) {
+    return guard_torques(guard, q, dq, dt, is_braking, tau);
 }
 
 /* ----------------------------------------------------------------------------------------------------- fallback */

@@ -18,6 +18,7 @@ from heptarm._library import Unavailable, extension_file
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
+from heptarm.model.dynamics import link_constants
 from heptarm.values.arrays import Array, array, finite, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
@@ -28,8 +29,6 @@ _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
 #: Time constant of the low pass of the velocities [s].
 FILTER = 0.002
-#: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
-ROTOR = 0.1
 #: Fraction of the robot's torques that a law may use.
 TORQUE_FRACTION = 0.3
 
@@ -46,18 +45,6 @@ def shared_library() -> Path:
         raise CommandRejected(
             f"the ready laws are not available: {error}", parameter="law", hint=error.hint
         ) from None
-
-
-def constants(arm: RobotModel, load: Body | None = None) -> Array:
-    """`struct robot` of dynamics.h: the links, the load on the flange, the motors; shape (105,)."""
-    links = arm.links
-    inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
-    body = load or Body(0.0, np.zeros(3))
-    parts = (
-        *(links.origin, links.mass, links.com, inertia, links.flange),
-        *([body.mass], body.com, body.inertia, [ROTOR]),
-    )
-    return np.concatenate([np.ravel(part) for part in parts])
 
 
 class ReadyLaw(LibraryLaw):
@@ -127,7 +114,7 @@ def cartesian_impedance(
     return ReadyLaw(
         "cartesian_impedance",
         {
-            "robot": lambda arm: constants(arm, load),
+            "robot": lambda arm: link_constants(arm, load=load),
             "goal": _ANYWHERE if goal is None else instance(goal, Pose, "goal").array,
             "stiffness": _positive(array(stiffness, 6, "stiffness"), "stiffness"),
             "damping": within(damping, "damping", 0.0, 2.0),
@@ -181,7 +168,7 @@ def joint_impedance(
     return ReadyLaw(
         "joint_impedance",
         {
-            "robot": lambda arm: constants(arm, load),
+            "robot": lambda arm: link_constants(arm, load=load),
             "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
             "stiffness": _positive(array(stiffness, 7, "stiffness"), "stiffness"),
             "damping": within(damping, "damping", 0.0, 2.0),
@@ -247,7 +234,7 @@ def free_guiding(
     return ReadyLaw(
         "free_guiding",
         {
-            "robot": constants,
+            "robot": link_constants,
             "damping": _positive(array(damping, 7, "damping"), "damping"),
             "low": corners[0],
             "high": corners[1],
@@ -298,7 +285,7 @@ def admittance(
     return ReadyLaw(
         "admittance_of_the_flange",
         {
-            "robot": constants,
+            "robot": link_constants,
             "wrench": array(wrench, 6, "wrench"),
             "mass": _positive(array(mass, 6, "mass"), "mass", above=True),
             "damping": _positive(array(damping, 6, "damping"), "damping"),
@@ -366,7 +353,7 @@ def hybrid(
     return ReadyLaw(
         "hybrid_of_the_flange",
         {
-            "robot": constants,
+            "robot": link_constants,
             "goal": _ANYWHERE if goal is None else instance(goal, Pose, "goal").array,
             "turn": np.ravel(turn),
             "force_axes": chosen,

@@ -23,6 +23,8 @@ from heptarm.values.robot import Body, Friction, RobotModel, symmetric
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
 GRAVITY = (0.0, 0.0, -9.81)
+#: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
+ROTOR = 0.1
 
 _Y, _Z = 1, 2
 # axis of each joint in its link, and its sign
@@ -238,3 +240,23 @@ def forward_dynamics(
     bias = _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
     bias = bias + _friction(friction, rates)
     return np.asarray(np.linalg.solve(_mass_matrix(posture), array(tau, 7, "tau") - bias), dtype=np.float64)
+
+
+def link_constants(robot: RobotModel, *, load: Body | None = None) -> Array:
+    """Numbers of a robot for the compiled part, shape (105,): `struct robot` of native/dynamics.h.
+
+    Args:
+        robot: the robot.
+        load: on the flange; None: none.
+
+    Returns:
+        The links, the load, and the inertia of the motors.
+    """
+    links = robot.links
+    inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
+    body = load or Body(0.0, np.zeros(3))
+    parts = (
+        *(links.origin, links.mass, links.com, inertia, links.flange),
+        *([body.mass], body.com, body.inertia, [ROTOR]),
+    )
+    return np.concatenate([np.ravel(part) for part in parts])
