@@ -549,16 +549,30 @@ static int write_command(struct loop *l, const double *q, const double *tau, con
 
 static const double zeros[AXES];
 
+/* Limit target torques by size and rate, then by the motion to which they lead. */
+static void torque(struct loop *l, const double *target, int is_braking) {
+    static const struct { int bit, kind; } parts[] = {
+        {GUARD_SPEED_BIT, LIMITED_VELOCITY}, {GUARD_POSITION_BIT, LIMITED_POSITION}, {GUARD_TORQUE_BIT, LIMITED_TORQUE}};
+    struct torque_guard *guard = (struct torque_guard *)l->torque_guard;
+    slew(l, l->tau, target, l->tau_max, l->tau_step, AXES, LIMITED_TORQUE);
+    memcpy(l->tau_sent, l->tau, sizeof l->tau_sent);
+    if (!guard) return;
+    int found = guard_torques(guard, ARRAY(S_Q), l->dq, l->step, is_braking, l->tau_sent);
+    for (int part = 0; part < 3 && found; part++)
+        for (int i = 0; i < AXES; i++)
+            if (found >> (parts[part].bit + i) & 1) limited(l, parts[part].kind, i, guard->asked[i], guard->allowed[i]);
+}
+
 static int command(struct loop *l, const double *target, const double *tau, const double *wrench) {
     const double *ipo = ARRAY(S_Q_IPO);
     if (!target) l->t_flags |= BRAKING;
     position(l, target, isinf(l->reach) ? NULL : ipo);
-    if (l->mode == TORQUE) slew(l, l->tau, tau, l->tau_max, l->tau_step, AXES, LIMITED_TORQUE);
+    if (l->mode == TORQUE) torque(l, tau, !target);
     if (l->mode == WRENCH) slew(l, l->wrench, wrench, l->wrench_max, l->wrench_step, 6, LIMITED_WRENCH);
     l->header[H_COUNTS + COUNT_LIMITED] += (l->t_flags & LIMITED) != 0;
     l->header[H_COUNTS + COUNT_FILLED] += (l->t_flags & FILLED) != 0;
     l->header[H_COUNTS + COUNT_COMMANDED]++;
-    return write_command(l, l->q, l->mode == TORQUE ? l->tau : NULL, l->mode == WRENCH ? l->wrench : NULL);
+    return write_command(l, l->q, l->mode == TORQUE ? l->tau_sent : NULL, l->mode == WRENCH ? l->wrench : NULL);
 }
 
 /* ----------------------------------------------------------------------------------------------------- a turn */
@@ -599,7 +613,7 @@ static void fill_state(struct loop *l, word *slot) {
     numbers[S_E1] = l->t_e1;
     for (int i = 0; i < AXES; i++) {
         numbers[S_Q_SENT + i] = active && l->t_answer ? l->q[i] : NAN;
-        numbers[S_TAU_SENT + i] = active && l->t_answer && l->mode == TORQUE ? l->tau[i] : NAN;
+        numbers[S_TAU_SENT + i] = active && l->t_answer && l->mode == TORQUE ? l->tau_sent[i] : NAN;
         if (i < 6) numbers[S_WRENCH_SENT + i] = active && l->t_answer && l->mode == WRENCH ? l->wrench[i] : NAN;
     }
     for (int i = S_POSE_IPO; i < S_IO; i++) numbers[i] = NAN; /* Python handles sessions that command poses */

@@ -30,7 +30,7 @@ struct torque_guard {
 };
 
 /* Fraction of the largest speed up to which torques accelerate: the rest is for what the model does not know. */
-#define GUARDED_SPEED 0.88
+#define GUARDED_SPEED 0.85
 /* Distance to the position limit at which an axis comes to rest, beside that of a delay [rad]. */
 #define GUARDED_DISTANCE 0.01
 /* Time constants: approach to a limit, and estimate of the unknown acceleration [s]; a shorter one than four periods is not stable. */
@@ -149,10 +149,15 @@ static inline int guard_torques(struct torque_guard *g, const double *q, const d
             g->allowed[i] = is_position ? (is_high ? g->high[i] : g->low[i]) : (is_high ? full : -full);
         }
     }
-    double braking[N], fraction = 1.0;
+    double braking[N], fraction = 1.0, strength = 1.0;
     for (int i = 0; i < N; i++) {
+        braking[i] = dot(mass[i], rest, N);
+        double bounded = guard_clamp(braking[i], least[i], most[i]);
+        if (bounded != braking[i]) strength = fmin(strength, bounded / braking[i]);
+    }
+    for (int i = 0; i < N; i++) {
+        braking[i] *= strength; /* weaker, and towards the range of every axis */
         tau[i] += dot(mass[i], change, N);
-        braking[i] = guard_clamp(dot(mass[i], rest, N), least[i], most[i]);
         double bounded = guard_clamp(tau[i], least[i], most[i]);
         if (bounded == tau[i]) continue;
         fraction = fmin(fraction, (bounded - braking[i]) / (tau[i] - braking[i]));

@@ -81,12 +81,15 @@ class Trial:
         start = rng.uniform(0.9 * arm.q_min, 0.9 * arm.q_max)
         plant = Plant(model, q=tuple(start.tolist()), errors=errors)
         plant.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # a clash turns an axis by itself
-        load = Body(float(rng.uniform(0.0, 3.0)), (0.0, 0.0, 0.08))
-        if rng.random() < 0.3:
-            plant.set_load_data(load)
-        self.name = f"{self.seed}: {model}, {self.name}, {period} ms, {stiffness:g} Nm/rad, noisy={errors is not None}"
+        load = Body(float(rng.uniform(0.0, 0.3 * float(rng.choice((1.0, 30.0))))), (0.0, 0.0, 0.08))
+        plant.set_load_data(load)
+        known = load if load.mass > 0.3 else None  # a light one that nobody declared
+        self.name = (
+            f"{self.seed}: {model}, {self.name}, {period} ms, {stiffness:g} Nm/rad, {load.mass:.2f} kg, "
+            f"{'ideal' if errors is None else 'noisy'} sensors"
+        )
         limits = Limits.of(arm)
-        joints, guard = JointGuard(limits), TorqueGuard(limits, link_constants(arm))
+        joints, guard = JointGuard(limits), TorqueGuard(limits, link_constants(arm, load=known))
         dt = period * 1e-3
         joints.start(start.tolist(), [0.0] * 7, period=dt)
         guard.start()

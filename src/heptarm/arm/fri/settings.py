@@ -26,6 +26,7 @@ from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.robot import Body
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
@@ -102,6 +103,7 @@ def request(
     connection: Connection,
     kind: str,
     *,
+    load: Body | None = None,
     period_ms: int | None = None,
     multiplier: int = 1,
     mode: Mode | None = None,
@@ -123,6 +125,11 @@ def request(
     timeout: float = 10.0,
 ) -> FriRequest:
     """Check the keywords of `Arm.fri` and turn them into a request.
+
+    Args:
+        connection: to the cabinet.
+        kind: the commanded quantity, or "monitor".
+        load: on the flange, as far as it is known.
 
     Raises:
         CommandRejected: this cabinet does not support such a session.
@@ -182,6 +189,7 @@ def request(
                 host=address,
                 version=version,
                 model=connection.robot,
+                load=load,
                 limits=limits,
                 pose_limits=pose_limits,
                 policy=policy,

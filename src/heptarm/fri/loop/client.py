@@ -36,12 +36,13 @@ from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
+from heptarm.model.dynamics import link_constants
 from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
 from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
-from heptarm.values.robot import RobotModel, robot
+from heptarm.values.robot import Body, RobotModel, robot
 
 #: Default UDP port of FRI.
 PORT = 30200
@@ -120,6 +121,7 @@ class Client(Reader):
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
+        load: on the flange, for the guard of torques, which computes with the robot's inertia; None: none.
         limits: limits of joint commands; None for limits slightly inside the robot's.
         pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
         policy: behaviour without fresh commands.
@@ -157,6 +159,7 @@ class Client(Reader):
         remote: str | None = None,
         version: str | None = None,
         model: str | RobotModel = "iiwa14",
+        load: Body | None = None,
         limits: Limits | None = None,
         pose_limits: PoseLimits | None = None,
         policy: Policy | None = None,
@@ -191,6 +194,8 @@ class Client(Reader):
                 instance(address, str, what)
         within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
+        if load is not None:
+            instance(load, Body, "load")
         self.model = arm
         self._limits = limits or Limits.of(arm)
         name = process.importable(law)
@@ -216,6 +221,7 @@ class Client(Reader):
                     "limits": asdict(self._limits),
                     "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
                     "chain": chain_of(arm),
+                    "links": link_constants(arm, load=load).tolist(),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "collision": None if collision is None else as_numbers(collision),

@@ -94,6 +94,9 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
     ("real", 6, "wrench_max wrench_step"),
     ("real", 1, "reach step"),
+    # guard of torques: `struct torque_guard`, and the torques that it lets through
+    ("pointer", 1, "torque_guard"),
+    ("real", AXES, "tau_sent"),
     # estimate of the wrench: `struct chain`, the posture that counts in this cycle, `struct wrench_map` of a posture
     ("word", 1, "has_chain has_map"),
     ("real", 24, "chain"),
@@ -210,6 +213,8 @@ class Native:
         memory.reach = limits.reach
         memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
         memory.law_fraction = LAW_FRACTION
+        if cycle.torque_guard is not None:
+            memory.torque_guard = cycle.torque_guard.words.ctypes.data
         if cycle.estimator is not None:
             memory.chain[:], memory.has_chain = cycle.estimator.chain, 1
         if cycle.watch is not None:
