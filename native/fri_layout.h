@@ -247,7 +247,7 @@ struct loop {
     double out_wrench[6];
     double out_pose[7];
     double out_e1;
-    word *law, *params, *memory, *memory_written, *law_buffer;
+    word *law, *params, *params_target, *params_rates, *memory, *memory_written, *law_buffer;
     word *params_ring, *memory_ring, *memory_set_ring;
     word params_size, memory_size, params_seen, memory_seen;
     word law_success, law_status, law_code, law_reported, law_late, law_not_finite;

@@ -682,11 +682,24 @@ static int take_slot(const word *ring, word count, word slots, word size, word *
     return 1;
 }
 
-static void take_parameters(struct loop *l) {
+/* Let parameters follow their targets for a cycle of `dt` seconds, each by its largest change in a second; one that is or becomes
+   NaN or infinite changes at once. */
+void hf_follow(double *values, const double *targets, const double *rates, word count, double dt) {
+    for (word i = 0; i < count; i++) {
+        double step = rates[i] * dt, apart = targets[i] - values[i];
+        values[i] = isfinite(apart) && fabs(apart) > step ? values[i] + copysign(step, apart) : targets[i];
+    }
+}
+
+static void take_parameters(struct loop *l, double dt) {
     double *copy = (double *)l->law_buffer;
-    word size = l->params_size, many = l->memory_size;
+    word size = l->params_size, many = l->memory_size, before = l->params_seen;
     word count = __atomic_load_n(&l->header[H_PARAMS], __ATOMIC_ACQUIRE);
-    if (take_slot(l->params_ring, count, PARAM_SLOTS, size, &l->params_seen, copy)) memcpy(l->params, copy, 8 * (size_t)size);
+    if (take_slot(l->params_ring, count, PARAM_SLOTS, size, &l->params_seen, copy)) {
+        memcpy(l->params_target, copy, 8 * (size_t)size);
+        if (!before) memcpy(l->params, copy, 8 * (size_t)size);
+    }
+    hf_follow((double *)l->params, (double *)l->params_target, (double *)l->params_rates, size, dt);
     count = __atomic_load_n(&l->header[H_MEMORY_SET], __ATOMIC_ACQUIRE);
     if (!take_slot(l->memory_set_ring, count, MEMORY_SLOTS, 2 * many, &l->memory_seen, copy)) return;
     for (word i = 0; i < many; i++) {
@@ -752,8 +765,8 @@ static int failed(struct loop *l, int status, word code) {
 int hf_law(struct loop *l, const word *slot) {
     struct heptarm_state state;
     struct itimerspec limit = {.it_value = {.tv_sec = LAW_CUT / 1000000000LL, .tv_nsec = LAW_CUT % 1000000000LL}};
-    take_parameters(l);
     law_state(l, slot, &state);
+    take_parameters(l, state.dt);
     word budget = (word)(l->law_fraction * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
     int number = sigsetjmp(law_exit, 0);
     if (number) return failed(l, number == TIME_IS_UP ? LAW_ENDLESS : LAW_CRASHED, number);
@@ -989,7 +1002,7 @@ int hf_warm_up(struct loop *l, int size) {
     if (copy->law) {
         copy->law = (word *)no_law;
         copy->memory_ring = spare.memory;
-        copy->memory_size = 0;
+        copy->memory_size = copy->params_size = 0;
         copy->params_seen = copy->header[H_PARAMS];
         copy->memory_seen = copy->header[H_MEMORY_SET];
     }

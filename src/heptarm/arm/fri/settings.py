@@ -15,7 +15,8 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop.client import Client, check_settings
 from heptarm.fri.loop.compiled import CompiledLaw
-from heptarm.fri.loop.law_interface import Given, Memory
+from heptarm.fri.loop.law_interface import Given, Initial, Memory
+from heptarm.fri.loop.parameters import merged
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
@@ -65,7 +66,7 @@ class FriKeywords(TypedDict, total=False):
     multiplier: int
     mode: Mode | None
     law: Law | None
-    params: Mapping[str, Given] | None
+    params: Mapping[str, Initial] | None
     memory: Mapping[str, Given] | None
     collision: CollisionGuard | None
     policy: Policy | None
@@ -108,7 +109,7 @@ def request(
     multiplier: int = 1,
     mode: Mode | None = None,
     law: Law | None = None,
-    params: Mapping[str, Given] | None = None,
+    params: Mapping[str, Initial] | None = None,
     memory: Mapping[str, Given] | None = None,
     collision: CollisionGuard | None = None,
     policy: Policy | None = None,
@@ -170,6 +171,8 @@ def request(
         cpu=cpu,
         busy_poll=busy_poll,
     )
+    if isinstance(law, CompiledLaw):
+        merged(law.parameters(connection.robot), params)  # raises for a value outside its range
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,

@@ -28,8 +28,9 @@ from heptarm.fri.loop import process
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import Law
-from heptarm.fri.loop.law_interface import Given, LiveMemory, flat
+from heptarm.fri.loop.law_interface import Given, Initial, LiveMemory, flat
 from heptarm.fri.loop.law_limit import LawWatch
+from heptarm.fri.loop.parameters import merged, rates
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.loop.wrench import chain_of
@@ -62,7 +63,7 @@ def check_settings(
     pose_limits: PoseLimits | None,
     policy: Policy | None,
     law: Law | CompiledLaw | None,
-    params: Mapping[str, Given] | None,
+    params: Mapping[str, Initial] | None,
     memory: Mapping[str, Given] | None,
     collision: CollisionGuard | None,
     history: int,
@@ -128,7 +129,7 @@ class Client(Reader):
         law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in every cycle
             of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the native loop
             calls it. None: commands come from `command`.
-        params: parameters of the law, numbers and arrays by name.
+        params: parameters of the law, numbers and arrays by name, or declarations with `heptarm.param`.
         memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
         collision: bands of the external torques; at a torque outside its band the arm brakes at once, and the client
             commands nothing more: `collision` names the joint. None: no such bands.
@@ -164,7 +165,7 @@ class Client(Reader):
         pose_limits: PoseLimits | None = None,
         policy: Policy | None = None,
         law: Law | CompiledLaw | None = None,
-        params: Mapping[str, Given] | None = None,
+        params: Mapping[str, Initial] | None = None,
         memory: Mapping[str, Given] | None = None,
         collision: CollisionGuard | None = None,
         history: int = 2048,
@@ -200,9 +201,9 @@ class Client(Reader):
         self._limits = limits or Limits.of(arm)
         name = process.importable(law)
         sent = b"" if law is None or name else process.by_value(law)
-        known: Mapping[str, Given] = law.parameters(arm) if isinstance(law, CompiledLaw) else {}
-        values, schema = Params.flat({**known, **(params or {})})
-        known = law.memory if isinstance(law, CompiledLaw) else {}
+        declared = merged(law.parameters(arm) if isinstance(law, CompiledLaw) else {}, params)
+        values, schema = Params.flat(declared)
+        known: Mapping[str, Given] = law.memory if isinstance(law, CompiledLaw) else {}
         remembered, kept = flat({**known, **(memory or {})}, "memory")
         wire = None if version is None else Version.of(version).value
         self._values = values
@@ -227,6 +228,7 @@ class Client(Reader):
                     "collision": None if collision is None else as_numbers(collision),
                     "law": name,
                     "params": schema,
+                    "rates": rates(declared).tolist(),
                     "memory": kept,
                     "remembered": remembered.tolist(),
                     "size": values.size,
@@ -237,7 +239,7 @@ class Client(Reader):
                 }
             )
         )
-        self.params = Params(values, schema, changed=self._send_params)
+        self.params = Params(values, schema, changed=self._send_params, declared=declared)
         self._send_params()
         self.memory = LiveMemory(
             remembered, kept, newest=self._newest_memory, write=self._layout.memory_set.write

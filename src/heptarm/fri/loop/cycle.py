@@ -24,6 +24,7 @@ from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.law_limit import EndlessLaw, LawLimit
+from heptarm.fri.loop.parameters import Follower
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import WrenchEstimator, posture
@@ -392,6 +393,7 @@ class Cycle:
         positions: position limits of the robot [rad], see `Session`.
         estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
         watch: detects collisions, at which the arm brakes; None: nothing does.
+        rates: largest changes of the parameters in a second; None: they change at once.
         links: `link_constants` of the robot, for the guard of torques; None: torques are limited in size and rate only.
 
     Attributes:
@@ -423,6 +425,7 @@ class Cycle:
         positions: Positions | None = None,
         estimator: WrenchEstimator | None = None,
         watch: CollisionWatch | None = None,
+        rates: Floats | None = None,
         links: Sequence[float] | None = None,
     ) -> None:
         self.layout = layout
@@ -442,6 +445,10 @@ class Cycle:
         self.is_ending = False
         self.law = law
         self._params = params
+        self._follower: Follower | None = None
+        if params is not None:
+            most = np.full(len(params.words), np.inf) if rates is None else rates
+            self._follower = Follower(params.words, most)
         self._param_tick = -1
         self._memory = memory
         self.memory_values: Floats = np.zeros(0) if memory_values is None else memory_values
@@ -820,13 +827,9 @@ class Cycle:
 
     def call_law(self, state: State, out: Output, now: int) -> None:
         """Call the law with its newest parameters; brake from now on if it fails."""
-        assert self.law is not None and self._params is not None
-        ring = self.layout.params
-        if ring.count != self._param_tick:
-            words = ring.read(ring.count - 1)
-            if words is not None:
-                self._param_tick = ring.count
-                self._params.replace(words[1:])
+        assert self.law is not None and self._params is not None and self._follower is not None
+        if not self.is_compiled:  # the native part takes those of a compiled law
+            self._take_params(self._follower, state.dt)
         began = time.monotonic_ns()
         try:
             if self.limit is not None:
@@ -846,6 +849,16 @@ class Cycle:
             self.law_failed(str(error) if is_clear else describe(error), now)
         if not self.is_compiled:  # the native part counts those of a compiled law
             self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
+
+    def _take_params(self, follower: Follower, dt: float) -> None:
+        """Let the parameters follow what the user's process has set."""
+        ring = self.layout.params
+        if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
+            if self._param_tick < 0:
+                follower.begin(words[1:])
+            follower.target[:] = words[1:]
+            self._param_tick = ring.count
+        follower.step(dt)
 
     def _take_memory(self) -> None:
         """Take over what the user's process has written to the memory of the law."""

@@ -289,6 +289,7 @@ class Loop:
             positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
             estimator=WrenchEstimator(config["chain"]),
             watch=watch_of(config["collision"]),
+            rates=np.array(config["rates"]),
             links=None if self._why_python else config["links"],
         )
         if in_python is not None:
@@ -302,7 +303,7 @@ class Loop:
         layout.header[at.NATIVE] = self._native is not None
         if compiled is not None and self._native is not None:
             address, kept = compiled.load(schema, memory)
-            self._native.set_law(address, kept, success=compiled.success)
+            self._native.set_law(address, kept, success=compiled.success, rates=config["rates"])
         self._parent: int = config["parent"]
         self._peer: Address | None = None
         self._deadline = 0
