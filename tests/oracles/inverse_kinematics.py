@@ -14,10 +14,10 @@ from math import atan2, cos, hypot, isnan, nan, pi, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
+from heptarm.model.null_space import events
 
 from heptarm.errors import ShapeError, Unreachable
 from heptarm.model.kinematics import Columns, Vec, flange
-from heptarm.model.null_space import events
 from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
 from heptarm.values.pose import Pose, Redundancy
 from heptarm.values.robot import RobotModel

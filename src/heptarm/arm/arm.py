@@ -833,7 +833,7 @@ class Arm(Sealed):
         rule = guarding.in_force(self) if settings.get("collision") is None else None
         if rule is not None:
             settings["collision"] = rule[0]
-        request = fri_settings.request(self._connection, kind, **settings)
+        request = fri_settings.request(self._connection, kind, load=self._tooling.load, **settings)
         return Fri(self._connection, request, on_collision=None if rule is None else rule[1])
 
     # -------------------------------------------------------------------------- stop and recover
