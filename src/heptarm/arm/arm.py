@@ -32,6 +32,7 @@ from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
     JointServo,
+    LineServo,
     PoseServo,
     ServoKeywords,
     ServoRequest,
@@ -59,6 +60,7 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
+from heptarm.values.sealed import Sealed
 from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.text import lines
@@ -92,7 +94,7 @@ def _checked(check: CollisionCheck) -> CollisionCheck:
     return check
 
 
-class Arm:
+class Arm(Sealed):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -790,8 +792,11 @@ class Arm:
         if kind == "joint":
             return JointServo(self._connection, terms)
         moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(self._connection, terms, moving=moving)
+        elbow = request.elbow_task(self._connection.robot)
+        if kind == "lin":
+            return LineServo(self._connection, terms, moving=moving, elbow=elbow)
+        if kind == "pose":
+            return PoseServo(self._connection, terms, moving=moving, elbow=elbow)
         limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
         if kind == "velocity":
             return VelocityServo(self._connection, terms, limits)
@@ -801,6 +806,7 @@ class Arm:
             limits,
             twist=TwistLimits(*request.line_limits()),
             moving=moving,
+            elbow=elbow,
             axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 

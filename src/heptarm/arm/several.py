@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 from heptarm.arm.arm import Arm, camera_feed
 from heptarm.arm.connect import connect
@@ -34,6 +34,7 @@ from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
+from heptarm.values.sealed import Sealed
 from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.arm")
@@ -69,7 +70,7 @@ class StatesOfArms:
         return "\n".join([head, *map(str, self.states)])
 
 
-class Arms:
+class Arms(Sealed):
     """Several connected arms; made by `connect_all`.
 
     A `with` block leaves all of them at rest: however it ends, all are stopped at once, then closed one after the
@@ -241,7 +242,7 @@ def states_together(*arms: Arm) -> StatesOfArms:
     return StatesOfArms(moment * 1e-9, chosen, (max(times) - min(times)) * 1e-9)
 
 
-class MotionOfArms:
+class MotionOfArms(Sealed):
     """Programs of several arms that began together; made by `start_together`.
 
     Attributes:
@@ -249,6 +250,9 @@ class MotionOfArms:
         skew: upper bound of the time between the first and the last arm that was released [s]: from the first request
             that was sent to the last one that was answered.
     """
+
+    handles: Final[Mapping[Arm, MotionHandle]]
+    skew: Final[float]
 
     def __init__(self, handles: Mapping[Arm, MotionHandle], *, skew: float, stops_others: bool) -> None:
         self.handles = dict(handles)

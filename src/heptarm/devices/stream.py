@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
+from typing import Final, TextIO
 
 import numpy.typing as npt
 
@@ -16,12 +16,13 @@ from heptarm.errors import CommandRejected
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import callback, finite, flag, instance
 from heptarm.values.files import path_of, read_text, refuse_existing, unreadable
+from heptarm.values.sealed import Sealed
 
 #: The first line of a file of inputs.
 _FORMAT = "heptarm input 1"
 
 
-class SyntheticDevice:
+class SyntheticDevice(Sealed):
     """A function of time as an input device; it rests when the function returns None.
 
     Args:
@@ -31,6 +32,7 @@ class SyntheticDevice:
     """
 
     name = "synthetic"
+    roles: Roles
 
     def __init__(
         self,
@@ -57,7 +59,7 @@ class SyntheticDevice:
         """Has no effect."""
 
 
-class RecordedDevice:
+class RecordedDevice(Sealed):
     """A recorded stream of inputs; it begins with the first reading, and rests after its end.
 
     Args:
@@ -70,6 +72,7 @@ class RecordedDevice:
     """
 
     name = "recording"
+    roles: Roles
 
     def __init__(
         self,
@@ -111,7 +114,7 @@ class RecordedDevice:
         """Has no effect."""
 
 
-class RecordingDevice:
+class RecordingDevice(Sealed):
     """Another device, whose inputs are written to a file while it is read.
 
     Args:
@@ -122,6 +125,9 @@ class RecordingDevice:
     Raises:
         CommandRejected: the file cannot be written.
     """
+
+    name: Final[str]
+    roles: Roles
 
     def __init__(self, device: InputDevice, path: str | Path, *, clock: Clock | None = None) -> None:
         self.name, self.roles = device.name, device.roles

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.samples import SampleQueue, StateSample, state_rows
 from heptarm.values.arrays import flag, instance, within
 from heptarm.values.files import refuse_existing
+from heptarm.values.sealed import Sealed
 
 _log = logging.getLogger("heptarm.record")
 
@@ -236,7 +237,7 @@ class _Tap:
         self._source.journal.close(self._entries)
 
 
-class Recorder:
+class Recorder(Sealed):
     """Records one arm or several to a file while a `with` block runs; made by `Arm.record` and `Arms.record`.
 
     Args:
@@ -250,12 +251,13 @@ class Recorder:
 
     Attributes:
         path: the file.
-        states: pushed states written so far, of all arms.
 
     Raises:
         LimitError: a rate outside its range.
         CommandRejected: the file exists.
     """
+
+    path: Final[Path]
 
     def __init__(
         self,
@@ -272,7 +274,7 @@ class Recorder:
         self._overwrite = flag(overwrite, "overwrite") or sinks is not None
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
         self.path = refuse_existing(path, overwrite=self._overwrite)
-        self.states = 0
+        self._states = 0
         self._open_sinks = self._open_files if sinks is None else sinks
         self._period = period
         self._cameras = dict(cameras or {})
@@ -328,6 +330,11 @@ class Recorder:
             if name in self._cameras:
                 self._films[name] = _Film(self._cameras[name], one)
         return files
+
+    @property
+    def states(self) -> int:
+        """Pushed states written so far, of all arms."""
+        return self._states
 
     def note(self, text: str) -> None:
         """Put a mark on the time line; `Recording.between` finds it by its text.
@@ -416,7 +423,7 @@ class Recorder:
             while True:
                 is_last = self._ended.wait(self._period)
                 for tap in self._taps:
-                    self.states += tap.write()
+                    self._states += tap.write()
                 file.flush()
                 if is_last:
                     break

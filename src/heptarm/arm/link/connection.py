@@ -634,12 +634,20 @@ class Connection:
         try:
             yield
         except KeyboardInterrupt:
-            if self.in_control and not self.closed.is_set():
-                try:
-                    self.stop(wire.StopKind.PATH)
-                except HeptarmError as error:
-                    _log.error("Ctrl-C: the arm could not be stopped: %s", error)
+            self.brake("Ctrl-C")
             raise
+
+    def brake(self, why: str) -> None:
+        """Stop the arm, if this client controls it; an error is only logged.
+
+        Args:
+            why: for the log.
+        """
+        if self.in_control and not self.closed.is_set():
+            try:
+                self.stop(wire.StopKind.PATH)
+            except HeptarmError as error:
+                _log.error("%s: the arm could not be stopped: %s", why, error)
 
     # ------------------------------------------------------------------------------------ states
 

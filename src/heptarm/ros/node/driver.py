@@ -136,6 +136,7 @@ class Driver:
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
+            elbow=values["servo.elbow"],
         )
         self._destinations = DestinationKeeper(
             self._stream,
