@@ -244,7 +244,7 @@ def test_arrays_are_read_only_and_consistent(arm: Arm) -> None:
 
 
 def test_requests_while_states_stream_and_the_arm_moves(arm: Arm) -> None:
-    arm.subscribe(rate=1000.0)
+    arm.subscribe(rate=500.0)
     handle = arm.start(ptp(HOME + deg(20, 0, 0, 0, 0, 0, 0), speed=0.3))
     for _ in range(300):
         arm.set_override(1.0)
