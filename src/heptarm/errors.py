@@ -16,6 +16,7 @@
     │   │   └── OutsideWorkspace            a command leaves `arm.workspace`
     │   ├── ModeConflict                    conflicts with what is running
     │   ├── CollisionForeseen               a collision model found bodies that would touch
+    │   ├── UnknownSetting (AttributeError) an object has no setting of that name
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result
     │   ├── MotionAborted                   it was stopped early
@@ -169,6 +170,10 @@ class CollisionForeseen(CommandRejected):
         super().__init__(text, **details)
         self.touch = touch
         self.motion = motion
+
+
+class UnknownSetting(CommandRejected, AttributeError):
+    """An object has no setting of this name, or it cannot be set; nothing was set."""
 
 
 class NotInControl(CommandRejected):

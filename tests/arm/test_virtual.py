@@ -111,6 +111,22 @@ def test_motions_can_be_awaited_together(arm: Arm) -> None:
     assert all(result.arrived for result in asyncio.run(program()))
 
 
+def test_an_await_that_times_out_brakes_the_arm(arm: Arm) -> None:
+    async def program() -> ha.MotionHandle:
+        handle, behind = arm.start(FAR), arm.start(ptp(HOME))
+        await asyncio.to_thread(under_way, arm)
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(handle, 0.01)
+        assert handle.done
+        with pytest.raises(ha.MotionAborted):
+            await behind
+        return handle
+
+    handle = asyncio.run(program())
+    assert isinstance(handle.error, ha.MotionAborted) and handle.error.cause is ha.Cause.STOPPED
+    assert arm.wait_for_rest(timeout=30.0).q[0] < np.radians(59)
+
+
 async def _await(handle: ha.MotionHandle) -> ha.Result:
     return await handle
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from types import TracebackType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -42,6 +42,7 @@ from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, robot
+from heptarm.values.sealed import Sealed
 
 #: Default UDP port of FRI.
 PORT = 30200
@@ -109,7 +110,7 @@ def check_settings(
     within(busy_poll, "busy_poll", 0.0, BUSY_POLL, unit="s")
 
 
-class Client(Reader):
+class Client(Sealed, Reader):
     """Client that answers a controller from a separate process; close it, or use it in a `with` block.
 
     It works over any number of sessions: the application of the cabinet may end and start again.
@@ -148,6 +149,11 @@ class Client(Reader):
         ConnectFailed: the port cannot be bound, or the loop did not start.
         CommandRejected: an argument is outside its range, or the law cannot be compiled or loaded.
     """
+
+    params: Final[Params]
+    memory: Final[LiveMemory]
+    port: Final[int]
+    model: Final[RobotModel]
 
     def __init__(
         self,
