@@ -24,6 +24,8 @@ from tests.arm.programs import end, script
 from tests.conftest import RunningCabinet
 from tests.interrupts import ctrl_c_interrupts
 
+SPEED = 1.0  # programs are interrupted and stopped at moments of this machine's time
+
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 #: Takes about three seconds.
 FAR = ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
