@@ -37,15 +37,16 @@ def outputs() -> dict[Path, str]:
         pages / "protocol-messages.md": docs.messages(spec),
         pages / "protocol-types.md": docs.types(spec),
         pages / "errors.md": docs.errors(spec),
-        ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
+        ROOT / "native" / "fri_layout.h": native.header(),
+        ROOT / "native" / "tick_layout.h": native.tick_header(),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "include" / "heptarm_law.h": native.law_header(),
-        ROOT / "src" / "heptarm" / "io" / "frame_layout.h": native.frame_header(spec),
+        ROOT / "native" / "frame_layout.h": native.frame_header(spec),
         ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",
     }
     seam = plant.load()
-    result[ROOT / "src" / "heptarm" / "sim" / "seam.py"] = plant.python_module(seam)
+    result[ROOT / "src" / "heptarm" / "planning" / "seam.py"] = plant.python_module(seam)
     result |= {SEAM / name: text for name, text in plant.java_files(seam).items()}
     return result | {JAVA / name: text for name, text in java.files(spec).items()}
 

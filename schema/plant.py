@@ -116,7 +116,7 @@ def _words(one: Field) -> int:
 
 
 def python_module(seam: Seam) -> str:
-    """Text of src/heptarm/sim/seam.py."""
+    """Text of src/heptarm/planning/seam.py."""
     spec, lines = seam.spec, [PYTHON_HEAD]
     for name, one in seam.constants.items():
         lines += [f"#: {one['doc']}.", f"{name} = {one['value']}"]

@@ -54,7 +54,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
             Step(1, "build Sunrise motions", f"{APP}/MotionBuilder.java", "moveAsync"),
             Step(2, "motion to order", f"{DOUBLES}/motion/MotionTranslator.java", "MotionOrder"),
             Step(3, "Java to Python", f"{PY}/sim/runtime/java_plant.py", "Order"),
-            Step(3, "plan behind the motion before", f"{PY}/sim/planning/planner.py", "Plan"),
+            Step(3, "plan behind the motion before", f"{PY}/planning/planner.py", "Plan"),
             Step(3, "set-point each millisecond", f"{PY}/sim/controller/interpolator.py", "set-points"),
             Step(3, "torque", f"{PY}/sim/control/controller.py", "torque"),
             Step(3, "one step of MuJoCo", f"{PY}/sim/plant/plant.py"),

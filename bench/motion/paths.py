@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose
 

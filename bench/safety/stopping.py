@@ -8,11 +8,11 @@ import numpy as np
 
 from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
+from heptarm.planning.command import TICK, Order
+from heptarm.planning.seam import StraightLimits
+from heptarm.planning.targets import CARTESIAN_DEFAULT
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import TICK, Order
-from heptarm.sim.planning.targets import CARTESIAN_DEFAULT
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import StraightLimits
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.pose import Pose
 from tests.sim.driving import READY

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import mujoco
 
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop

@@ -14,7 +14,7 @@ from bench.measure.blocks import BLOCKS
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
-from heptarm.sim.planning.command import TICK, Order
+from heptarm.planning.command import TICK, Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.realtime_loop import AT_ONCE
 

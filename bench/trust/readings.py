@@ -19,8 +19,8 @@ import heptarm as ha
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
+from heptarm.planning.seam import TICK_NS, SafetyFlags, StateWords
 from heptarm.sim.plant.shared_state import Trace
-from heptarm.sim.seam import TICK_NS, SafetyFlags, StateWords
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS
 

@@ -45,7 +45,7 @@ _JAVA = re.compile(
 _PYTHON = ROOT / "src" / "heptarm"
 _VALUES = "src/heptarm/values/"
 _CABINET = ("core", "app", "doubles")
-_GENERATED_PYTHON = ("/wire/messages.py", "/wire/codes.py", "/sim/seam.py")
+_GENERATED_PYTHON = ("/wire/messages.py", "/wire/codes.py", "/planning/seam.py")
 _GENERATED_JAVA = ("/heptarm/wire/", "/heptarm/doubles/seam/")
 _GENERATED = "generated from a schema"
 

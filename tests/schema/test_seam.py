@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import plant
-from heptarm.sim import seam
+from heptarm.planning import seam
 from heptarm.sim.runtime.java_plant import mode_of, order_of
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire.codec import DecodeError

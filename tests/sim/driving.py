@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.model.kinematics import forward
+from heptarm.planning.command import TICK, Order
 from heptarm.sim.controller.interpolator import FAST_JERK
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import TICK, Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from heptarm.planning.seam import SLOTS, OperationMode
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import HOME, Plant
 from heptarm.sim.plant.sensor_errors import sensor_errors
 from heptarm.sim.plant.world import Box
-from heptarm.sim.seam import SLOTS, OperationMode
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.robot import Body, robot

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.planner import plan
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.planner import plan
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order, PlanError
+from heptarm.planning.command import Order, PlanError
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.motion.circle import arc

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import ConditionWatch, Order
-from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.world import Box
-from heptarm.sim.seam import (
+from heptarm.planning.command import ConditionWatch, Order
+from heptarm.planning.seam import (
     AllOf,
     AnyOf,
     Condition,
@@ -24,6 +22,8 @@ from heptarm.sim.seam import (
     WrenchComponents,
     WrenchOutside,
 )
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.world import Box
 from tests.sim.driving import READY, Ear, ready, run
 
 #: Points and axes of the flange, and the base's axes at the flange.

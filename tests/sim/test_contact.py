@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
+from heptarm.planning.command import ConditionWatch, Order
+from heptarm.planning.seam import MeasuringFrame, WrenchAbove, WrenchComponents
 from heptarm.sim.control.laws import STIFFNESS
-from heptarm.sim.planning.command import ConditionWatch, Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.world import Box
-from heptarm.sim.seam import MeasuringFrame, WrenchAbove, WrenchComponents
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot

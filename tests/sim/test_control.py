@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance

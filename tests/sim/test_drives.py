@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from heptarm.planning.command import Order
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.drive_monitor import BEYOND, LAG, SPEED, TORQUE, TORQUE_TICKS, DriveMonitor
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.mode.impedance import JointImpedance

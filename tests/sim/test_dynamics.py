@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order
-from heptarm.sim.planning.planner import plan
+from heptarm.planning.command import Order
+from heptarm.planning.planner import plan
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
 from tests.sim.driving import READY, numbers

@@ -11,12 +11,12 @@ import pytest
 
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import jacobian
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.jerk_profile import ProfileLimits, brake, change
+from heptarm.planning.path import CartesianPath
+from heptarm.planning.plan import Plan
+from heptarm.planning.planner import plan
 from heptarm.sim.controller import queue as queue_module
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.jerk_profile import ProfileLimits, brake, change
-from heptarm.sim.planning.path import CartesianPath
-from heptarm.sim.planning.plan import Plan
-from heptarm.sim.planning.planner import plan
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from tests.sim.driving import READY, Ear, ready, run

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from tests.sim.driving import ready
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heptarm.io.compiled import Unavailable
+from heptarm._library import Unavailable
+from heptarm.planning.command import Order
+from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.values.arrays import Array
 from tests.sim.driving import READY
 

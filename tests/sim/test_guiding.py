@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import jacobian
+from heptarm.planning.command import Order
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.motion.hand_guiding import HandGuide, hand_guide

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order, PlanError
+from heptarm.planning.command import Order, PlanError
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS

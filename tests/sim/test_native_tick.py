@@ -11,14 +11,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from heptarm.io.compiled import SWITCH, Unavailable
-from heptarm.sim.planning.command import Order
-from heptarm.sim.planning.native_inverse import inverse_library
-from heptarm.sim.planning.table import ahead_library
+from heptarm._library import SWITCH, Unavailable
+from heptarm.planning.command import Order
+from heptarm.planning.native_inverse import inverse_library
+from heptarm.planning.seam import StateWords
+from heptarm.planning.table import ahead_library
 from heptarm.sim.plant import native
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import StateWords
 from tests.sim.driving import READY
 from tests.sim.plant_scripts import PLANT_SCRIPTS
 

@@ -10,9 +10,9 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.planner import plan
-from heptarm.sim.planning.targets import FARTHEST, SLOWEST
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.planner import plan
+from heptarm.planning.targets import FARTHEST, SLOWEST
 from heptarm.values.robot import robot
 from tests.sim.driving import READY as HOME
 

@@ -8,12 +8,12 @@ import time
 import numpy as np
 import pytest
 
-from heptarm.sim import seam
+from heptarm.planning import seam
+from heptarm.planning.command import Order
+from heptarm.planning.seam import OperationMode, SafetyFlags, StateWords
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.operator import WORDS, SimulatedOperator, timed, understood
-from heptarm.sim.seam import OperationMode, SafetyFlags, StateWords
 from tests.sim.driving import Ear, ready
 from tests.sim.ideal import KINDS, begin
 

@@ -8,7 +8,7 @@ import pytest
 
 from heptarm.model import dynamics
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance

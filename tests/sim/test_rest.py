@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from heptarm.fri.protocol.version import Version
-from heptarm.sim import seam
+from heptarm.planning import seam
+from heptarm.planning.command import Order
+from heptarm.planning.seam import SLOTS, HeaderWords, StateWords
 from heptarm.sim.fri.sessions import Sessions
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
 from heptarm.sim.runtime.rest import AWAKE, LONGEST, Rest
-from heptarm.sim.seam import SLOTS, HeaderWords, StateWords
 from heptarm.values.robot import Body
 from tests.sim.driving import ready
 

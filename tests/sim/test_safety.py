@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
+from heptarm.planning.command import Order
+from heptarm.planning.seam import SLOTS, OperationMode, SafetyFlags, StateWords
 from heptarm.sim.controller.interpolator import REDUCED_SPEED
 from heptarm.sim.controller.safety import SafetyController, StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import SLOTS, OperationMode, SafetyFlags, StateWords
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim.driving import READY, Ear, ready, run

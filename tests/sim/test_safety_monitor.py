@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from heptarm.model import dynamics
+from heptarm.planning.command import Order
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.safety_monitor import (
     LASTING,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant import sensor_errors as errors
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors, parse_sensors, sensor_errors

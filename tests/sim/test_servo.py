@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from heptarm.planning.command import Order
+from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import ServoTiming
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim.driving import READY, Ear, ready

@@ -10,9 +10,9 @@ import threading
 import numpy as np
 import pytest
 
+from heptarm.planning.seam import SLOTS, HeaderWords, SafetyFlags, StateWords
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import NEVER
-from heptarm.sim.seam import SLOTS, HeaderWords, SafetyFlags, StateWords
 from tests.sim.driving import ready
 
 
@@ -129,7 +129,7 @@ _EARLY = """
 import sys, time
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
-from heptarm.sim.seam import TICK_NS, HeaderWords
+from heptarm.planning.seam import TICK_NS, HeaderWords
 shared, begun, ended = SharedState(), [], []
 shared.header[HeaderWords.WAKE] = int(sys.argv[1])
 def tick():
@@ -170,7 +170,7 @@ _COLLECTIONS = """
 import gc
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.runtime import realtime_loop
-from heptarm.sim.seam import HeaderWords
+from heptarm.planning.seam import HeaderWords
 realtime_loop.COLLECT_EVERY, realtime_loop.COLLECT_LATEST = 10_000_000, 20_000_000
 shared, found = SharedState(), []
 def tick():

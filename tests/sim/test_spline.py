@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order, PlanError
+from heptarm.planning.command import Order, PlanError
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
+from heptarm.planning.seam import ServoTiming, StraightLimits
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import ServoTiming, StraightLimits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from tests.sim.driving import READY, Ear, numbers, ready

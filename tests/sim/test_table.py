@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from heptarm.io.compiled import SWITCH
-from heptarm.sim.planning.command import TICK, Order
-from heptarm.sim.planning.plan import Plan
-from heptarm.sim.planning.planner import plan
-from heptarm.sim.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
-from heptarm.sim.planning.time_scaling import TabulatedProfile
+from heptarm._library import SWITCH
+from heptarm.planning.command import TICK, Order
+from heptarm.planning.plan import Plan
+from heptarm.planning.planner import plan
+from heptarm.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
+from heptarm.planning.time_scaling import TabulatedProfile
 from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
 from tests.sim.driving import READY

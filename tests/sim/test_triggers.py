@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import ConditionWatch, Order
+from heptarm.planning.command import ConditionWatch, Order
+from heptarm.planning.seam import Condition, PathReached, PathReference, SignalIs
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import Condition, PathReached, PathReference, SignalIs
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from tests.sim.driving import READY, ready, run

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from heptarm.sim.planning.command import Order
+from heptarm.planning.command import Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.scene import Scene, Wiring, names
 from heptarm.sim.plant.shared_state import PositionsFile

@@ -15,11 +15,11 @@ from heptarm.fri.loop.user_api import Params
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
+from heptarm.planning.command import TICK_NS
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
-from heptarm.sim.planning.command import TICK_NS
 from heptarm.sim.plant.plant import Plant, Snapshot
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode, Position

@@ -10,13 +10,13 @@ import numpy as np
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.codec import decode_monitoring, encode_command
 from heptarm.fri.protocol.version import Version
+from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import HeaderWords
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading
 from heptarm.sim.fri.settings import Event, OverlayEnded, Refused, SessionConfiguration, StateChanged
-from heptarm.sim.planning.command import TICK_NS
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.sim.seam import HeaderWords
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode
 from heptarm.values.robot import RobotModel, robot

@@ -11,11 +11,11 @@ import pytest
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
+from heptarm.planning.command import TICK_NS
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
-from heptarm.sim.planning.command import TICK_NS
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance

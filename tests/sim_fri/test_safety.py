@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.fri.protocol import messages as m
+from heptarm.planning.seam import OperationMode
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.seam import OperationMode
 from heptarm.values.mode.mode import Position
 from tests.sim_fri.rig import State, mirror
 from tests.sim_fri.test_plant import World, swing

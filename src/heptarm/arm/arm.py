@@ -18,6 +18,7 @@ from heptarm.arm.devices.io import Io
 from heptarm.arm.devices.operator import Operator
 from heptarm.arm.devices.smartpad import Pad
 from heptarm.arm.devices.tools import Tooling
+from heptarm.arm.flange_check import flange_warning
 from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection
@@ -31,6 +32,7 @@ from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
     JointServo,
+    LineServo,
     PoseServo,
     ServoKeywords,
     ServoRequest,
@@ -51,6 +53,7 @@ from heptarm.values.camera import Camera
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
+from heptarm.values.files import path_of
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
@@ -129,6 +132,19 @@ class Arm(Sealed):
         joints = link.build(sample).groups.joints
         if joints is not None and np.isnan(joints.dq).any():
             link.feed.after(sample.number, link.options.timeout)
+        self._check_flange()
+
+    def _check_flange(self) -> None:
+        """Warn of a media flange that the robot model does not have."""
+        newest = self._connection.newest()
+        groups = None if newest is None else newest.groups
+        if groups is None or groups.joints is None or groups.pose is None:
+            return
+        expected = self._tooling.reached(groups.joints.q, TOOL)
+        if expected is not None and (
+            text := flange_warning(self.robot, groups.joints, groups.pose, expected)
+        ):
+            _log.warning("%s", text)
 
     def reconnect(self) -> None:
         """Make a new connection after the old one was lost; a controller takes control again.
@@ -351,7 +367,12 @@ class Arm(Sealed):
         )
 
     def record(
-        self, path: str | Path, *, rate: float | None = None, camera: Camera | None = None
+        self,
+        path: str | Path,
+        *,
+        rate: float | None = None,
+        camera: Camera | None = None,
+        overwrite: bool = False,
     ) -> Recorder:
         """A recording of everything that happens while the `with` block runs; `heptarm.load` reads it.
 
@@ -359,20 +380,23 @@ class Arm(Sealed):
         The file is complete to its last half second even if this program is killed.
 
         Args:
-            path: the file, MCAP; it is replaced.
+            path: the file, MCAP.
             rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
             camera: a simulated camera whose pictures are in the file, too: of a model of the arm, not of the robot. It
                 needs the group "joints". A process of its own draws them, so that they never hold up the states; when
                 it is too slow it drops pictures, which `Recorder.pictures_dropped` counts. None: no pictures.
+            overwrite: replace a file that exists.
 
         Raises:
             LimitError: a rate outside its range.
-            CommandRejected: the file cannot be written, or this machine cannot draw (when the block begins).
+            CommandRejected: the file exists. Or it cannot be written, or this machine cannot draw (when the block
+                begins).
             MissingExtra: the package mcap is not installed, or those of a camera (when the block begins).
         """
         cameras = {} if camera is None else {"": camera_feed(self, camera)}
-        where = Path(instance(path, (str, Path), "path"))
-        return Recorder({"": self._connection}, where, rate=rate, cameras=cameras)
+        return Recorder(
+            {"": self._connection}, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite
+        )
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -746,8 +770,11 @@ class Arm(Sealed):
         if kind == "joint":
             return JointServo(self._connection, terms)
         moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(self._connection, terms, moving=moving)
+        elbow = request.elbow_task(self._connection.robot)
+        if kind == "lin":
+            return LineServo(self._connection, terms, moving=moving, elbow=elbow)
+        if kind == "pose":
+            return PoseServo(self._connection, terms, moving=moving, elbow=elbow)
         limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
         if kind == "velocity":
             return VelocityServo(self._connection, terms, limits)
@@ -757,6 +784,7 @@ class Arm(Sealed):
             limits,
             twist=TwistLimits(*request.line_limits()),
             moving=moving,
+            elbow=elbow,
             axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 

@@ -30,6 +30,7 @@ from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeErr
 from heptarm.record.recorder import Recorder
 from heptarm.values.arrays import flag, instance, shown, within
 from heptarm.values.camera import Camera
+from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
@@ -113,27 +114,34 @@ class Arms(Sealed):
         return f"<Arms {', '.join(f'{name}: {arm!r}' for name, arm in self._arms.items())}>"
 
     def record(
-        self, path: str | Path, *, rate: float | None = None, camera: Camera | None = None
+        self,
+        path: str | Path,
+        *,
+        rate: float | None = None,
+        camera: Camera | None = None,
+        overwrite: bool = False,
     ) -> Recorder:
         """A recording of all arms in one file, with one time line; see `Arm.record`.
 
         `heptarm.load(path, arm="left")` reads the part of one of them.
 
         Args:
-            path: the file, MCAP; it is replaced.
+            path: the file, MCAP.
             rate: have at least so many states of each pushed per second meanwhile [Hz]; None: as many as are.
             camera: a simulated camera in front of each of them, see `Arm.record`; None: no pictures.
+            overwrite: replace a file that exists.
 
         Raises:
             LimitError: a rate outside its range.
-            CommandRejected: the file cannot be written, or this machine cannot draw (when the block begins).
+            CommandRejected: the file exists. Or it cannot be written, or this machine cannot draw (when the block
+                begins).
             MissingExtra: the package mcap is not installed, or those of a camera (when the block begins).
         """
         sources = {name: arm.connection for name, arm in self._arms.items()}
         cameras = (
             {} if camera is None else {name: camera_feed(arm, camera) for name, arm in self._arms.items()}
         )
-        return Recorder(sources, Path(instance(path, (str, Path), "path")), rate=rate, cameras=cameras)
+        return Recorder(sources, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite)
 
     def close(self) -> None:
         """Stop all arms, then leave each at rest and disconnect it; calling it again has no effect."""

@@ -10,7 +10,7 @@ bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, isnan, nan, pi, sin, sqrt
+from math import atan2, cos, hypot, isnan, pi, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -19,7 +19,7 @@ from heptarm.errors import ShapeError, Unreachable
 from heptarm.model.kinematics import Columns, Vec, flange
 from heptarm.model.null_space import events
 from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
-from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.robot import RobotModel
 
 #: Rows of a rotation matrix.
@@ -318,7 +318,7 @@ def solve(
     Args:
         robot: the robot.
         pose: of the flange in the base frame.
-        e1: arm angle [rad]; None or NaN: not given.
+        e1: arm angle [rad]; None: not given.
         status: bits 0-2; None or -1: not given.
         near: joint positions, shape (7,) [rad].
 
@@ -332,7 +332,7 @@ def solve(
     instance(robot, RobotModel, "robot")
     r, p = rows(pose)
     hint = None if near is None else array(near, 7, "near").tolist()
-    given = Redundancy(nan if e1 is None else e1, -1 if status is None else status)
+    given = Redundancy(NOT_GIVEN if e1 is None else e1, -1 if status is None else status)
     e1 = None if isnan(given.e1) else given.e1
     wanted = status = None if given.status < 0 else given.status
     if hint is not None:

@@ -21,7 +21,8 @@ from heptarm.record.journal import NOTE, Journal, JournalEntry, Record
 from heptarm.record.layout import STATE
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.samples import SampleQueue, StateSample, state_rows
-from heptarm.values.arrays import instance, within
+from heptarm.values.arrays import flag, instance, within
+from heptarm.values.files import refuse_existing
 from heptarm.values.sealed import Sealed
 
 _log = logging.getLogger("heptarm.record")
@@ -246,12 +247,14 @@ class Recorder(Sealed):
         sinks: makes what is written to, one for each arm in their order; None: the file.
         period: time between two looks at what has arrived [s].
         cameras: what draws pictures for the file, by the name of the arm.
+        overwrite: replace a file that exists.
 
     Attributes:
         path: the file.
 
     Raises:
         LimitError: a rate outside its range.
+        CommandRejected: the file exists.
     """
 
     path: Final[Path]
@@ -265,10 +268,12 @@ class Recorder(Sealed):
         sinks: Callable[[Mapping[str, RecordSource]], Sequence[RecordSink]] | None = None,
         period: float = _PERIOD,
         cameras: Mapping[str, CameraFeed] | None = None,
+        overwrite: bool = False,
     ) -> None:
         self._sources = dict(sources)
+        self._overwrite = flag(overwrite, "overwrite") or sinks is not None
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
-        self.path = path
+        self.path = refuse_existing(path, overwrite=self._overwrite)
         self._states = 0
         self._open_sinks = self._open_files if sinks is None else sinks
         self._period = period
@@ -317,6 +322,7 @@ class Recorder(Sealed):
     def _open_files(self, sources: Mapping[str, RecordSource]) -> list[RecordingFile]:
         """The file, and its writer for each arm."""
         (name, first), *others = sources.items()
+        refuse_existing(self.path, overwrite=self._overwrite)  # it may have appeared meanwhile
         size = chunk_size(sum(source.state_rate for source in sources.values()))
         file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
         files = [file, *(file.beside(source.facts, name) for name, source in others)]

@@ -42,7 +42,7 @@ from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.arrays import within
 from heptarm.values.io import Signal
 from heptarm.values.result import Result
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import FLANGES, Flange, RobotModel
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import Message
@@ -69,6 +69,7 @@ class Options:
         watchdog: silence after which the cabinet counts this client as lost [s].
         datagrams: send servo targets and receive states by UDP as far as it gets through.
         black_box: the last 30 s are written to a file after an error.
+        flange: media flange of the robot, which no cabinet reports.
     """
 
     name: str = "heptarm"
@@ -80,6 +81,7 @@ class Options:
     watchdog: float = CONNECTION.default
     datagrams: bool = False
     black_box: bool = True
+    flange: Flange = FLANGES["plain"]
 
 
 #: FRI sessions whose last change is kept.
@@ -388,7 +390,7 @@ class Connection:
         self.events.forget_unclaimed()
         self._link = link
         try:
-            self._robot = read_robot(self._welcome.robot)
+            self._robot = read_robot(self._welcome.robot, self.options.flange)
             self.signals = read_signals(self._welcome.signals)
             if self.options.datagrams:
                 missing = link.open_datagrams(timeout=self.options.timeout)

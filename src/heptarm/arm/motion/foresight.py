@@ -34,7 +34,7 @@ from heptarm.values.tool import unknown
 from heptarm.values.workspace import Workspace
 
 if TYPE_CHECKING:
-    from heptarm.sim.planning.lookahead import PlannedProgram
+    from heptarm.planning.lookahead import PlannedProgram
 
 #: Largest time between two samples of a path that is checked [s].
 _STEP = 0.02
@@ -180,7 +180,7 @@ class Foresight:
     ) -> PlannedProgram:
         """The program as the controller would plan it."""
         require("ruckig", extra="sim")
-        from heptarm.sim.planning.lookahead import FramesOfArm, look_ahead
+        from heptarm.planning.lookahead import FramesOfArm, look_ahead
 
         frames = FramesOfArm(self._tooling.on_flange, self._tooling.in_base)
         limited = [one.limited_to(ceiling) for one in motions]

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from heptarm.planning.command import TICK, Order
 from heptarm.rl.sim.batch import Index
 from heptarm.rl.sim.simulation import GRAVITY, IMPEDANCE_DAMPING
 from heptarm.rl.task import ReachTask
-from heptarm.sim.planning.command import TICK, Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance

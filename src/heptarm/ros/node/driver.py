@@ -122,6 +122,7 @@ class Driver:
             groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
             watchdog=values["watchdog"],
             datagrams=values["datagrams"],
+            flange=values["flange"] or None,
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = NodeFriSession(self._arm)
@@ -134,6 +135,7 @@ class Driver:
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
+            elbow=values["servo.elbow"],
         )
         self._destinations = DestinationKeeper(
             self._stream,

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import joints
+from heptarm.planning.command import TICK
 from heptarm.sim.control.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
-from heptarm.sim.planning.command import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.frames import BASE, TOOL
 from heptarm.values.mode.impedance import CartesianImpedance

@@ -5,10 +5,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from heptarm.planning.command import Order
 from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
 from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
 from heptarm.sim.control.laws import ControlLaw, JointImpedanceLaw, MeasuredState, PositionLaw, Superposition
-from heptarm.sim.planning.command import Order
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode

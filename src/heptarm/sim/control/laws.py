@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.sim.planning.command import TICK
+from heptarm.planning.command import TICK
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.robot import RobotModel
 

@@ -7,8 +7,8 @@ interpolator goes on tick by tick.
 
 from __future__ import annotations
 
+from heptarm.planning.table import MotionTable, SetPointRows
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.sim.planning.table import MotionTable, SetPointRows
 from heptarm.values.arrays import Array
 
 

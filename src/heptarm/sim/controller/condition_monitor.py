@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from heptarm.model.kinematics import flange
-from heptarm.sim import seam
-from heptarm.sim.planning.jerk_profile import TimeLaw
-from heptarm.sim.planning.plan import Plan
+from heptarm.planning import seam
+from heptarm.planning.jerk_profile import TimeLaw
+from heptarm.planning.plan import Plan
 from heptarm.values.arrays import Array
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel

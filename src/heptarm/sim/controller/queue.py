@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heptarm.sim.planning.command import Order, PlanError
-from heptarm.sim.planning.plan import Plan
-from heptarm.sim.planning.planner import plan
+from heptarm.planning.command import Order, PlanError
+from heptarm.planning.plan import Plan
+from heptarm.planning.planner import plan
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

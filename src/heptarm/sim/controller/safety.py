@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from enum import Enum
 
-from heptarm.sim.seam import OperationMode, SafetyFlags
+from heptarm.planning.seam import OperationMode, SafetyFlags
 
 
 class StopRequest(Enum):

@@ -7,9 +7,9 @@ from math import inf
 import numpy as np
 
 from heptarm.model.kinematics import flange, jacobian
+from heptarm.planning.command import TICK
+from heptarm.planning.jerk_profile import JerkProfile, ProfileLimits, change
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.sim.planning.command import TICK
-from heptarm.sim.planning.jerk_profile import JerkProfile, ProfileLimits, change
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
@@ -95,6 +95,15 @@ class SpeedOverride:
         self.factor *= cap
         self.scale *= cap
         self.rate *= cap
+
+    @property
+    def last_factor(self) -> float:
+        """The factor of the tick before."""
+        return self._before
+
+    def keep(self, factor: float) -> None:
+        """Replace the factor of the running tick: an axis cannot follow the change."""
+        self.factor = self.scale = self._free = factor
 
     def rest(self) -> None:
         """Motion time does not advance from now on; the motion begins again from rest."""

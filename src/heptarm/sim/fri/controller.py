@@ -27,6 +27,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.codec import decode_command
 from heptarm.fri.protocol.protobuf import MalformedMessage
 from heptarm.fri.protocol.version import Version, is_framed
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.fri import cartesian
 from heptarm.sim.fri.io import SessionIo
@@ -42,7 +43,6 @@ from heptarm.sim.fri.settings import (
     SessionConfiguration,
     StateChanged,
 )
-from heptarm.sim.seam import TICK_NS
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

@@ -8,8 +8,8 @@ from math import inf, isfinite
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.protocol import messages as m
+from heptarm.planning.seam import FriSignal, SignalType
 from heptarm.sim.fri.settings import Event, FrameProvided, OutputWritten, Refused, SessionConfiguration
-from heptarm.sim.seam import FriSignal, SignalType
 from heptarm.values.arrays import Array
 
 

@@ -11,6 +11,7 @@ from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, IoValue
 from heptarm.fri.protocol.version import Version
+from heptarm.planning.command import MotionListener, Order
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.fri.io import IoImageSync, SessionSignal
@@ -25,7 +26,6 @@ from heptarm.sim.fri.settings import (
     StateChanged,
     describe,
 )
-from heptarm.sim.planning.command import MotionListener, Order
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.mode.mode import Mode, Position

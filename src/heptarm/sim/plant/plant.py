@@ -12,14 +12,15 @@ from math import atan2, cos, inf, nan, sin, sqrt
 import mujoco
 import numpy as np
 
-from heptarm.io.compiled import Unavailable
+from heptarm._library import Unavailable
 from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import flange
+from heptarm.planning.command import TICK
+from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
-from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.carried import CarriedShapes, FlangeShapes
 from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
@@ -32,7 +33,6 @@ from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
-from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import Body, RobotModel, robot

@@ -93,8 +93,22 @@ class Scene:
         """
         if self.path.parent == FOLDER:
             return mujoco.MjSpec.from_file(str(self.path))
+        text = read_text(self.path, name="scene")
+        if (wrong := _NOT_FINITE.search(text)) is not None:
+            line = text.count("\n", 0, wrong.start()) + 1
+            raise unreadable(
+                self.path,
+                f"line {line}: {wrong[1]} has {wrong[2]}, which is no finite number",
+                what=_WHAT,
+                name="scene",
+                hint="correct the number",
+            )
         ready = {path.name: path.read_bytes() for path in FOLDER.glob(f"*{_SUFFIX}")}
-        return mujoco.MjSpec.from_file(str(self.path), include=ready)
+        try:
+            return mujoco.MjSpec.from_file(str(self.path), include=ready)
+        except (ValueError, mujoco.FatalError) as error:
+            why = " ".join(str(error).removeprefix("Error: ").split())
+            raise unreadable(self.path, why, what=_WHAT, name="scene") from None
 
     def attach_to(self, arm: mujoco.MjSpec) -> None:
         """Add the scene to the description of an arm: the tool to its flange, all else to the world.

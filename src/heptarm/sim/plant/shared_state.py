@@ -1,7 +1,7 @@
 """Shared memory of the plant and Java: its last states, the newest servo target, and the IO image.
 
 Java reads states without asking Python. Each state is guarded by a sequence word (odd while it is written), so that a
-reader recognises a torn one; so is the servo target, which Java writes. The layout is that of `heptarm.sim.seam`.
+reader recognises a torn one; so is the servo target, which Java writes. The layout is that of `heptarm.planning.seam`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heptarm.sim.seam import (
+from heptarm.planning.seam import (
     MEMORY_WORDS,
     SLOTS,
     HeaderWords,
@@ -135,7 +135,7 @@ class Trace:
 
     def __init__(self, shared: SharedState, path: Path) -> None:
         self._shared = shared
-        self._file = path.open("wb", buffering=1 << 18)
+        self._file = path.open("wb", buffering=0)  # readers see each tick at once
 
     def append(self) -> None:
         """Write the newest state; called after each tick."""

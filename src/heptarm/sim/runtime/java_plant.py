@@ -3,7 +3,7 @@
 Java reads states from the shared memory without asking Python; only commands cross into Python. Threads of Python take
 them from a queue of Java: JPype makes a type for the Java objects of each thread state of Python, a Java thread has a
 new thread state in each call, and the types are never freed (1.6 kB for each call with JPype 1.7). Orders and
-conditions come as the bytes that `heptarm.sim.seam` decodes.
+conditions come as the bytes that `heptarm.planning.seam` decodes.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, Unreachable
 from heptarm.model.inverse_kinematics import solve
-from heptarm.sim import seam
+from heptarm.planning import seam
+from heptarm.planning.command import ConditionWatch, Order, PlanError, Seven
 from heptarm.sim.fri.io import SessionSignal
 from heptarm.sim.fri.sessions import Sessions
-from heptarm.sim.planning.command import ConditionWatch, Order, PlanError, Seven
 from heptarm.sim.plant.carried import CarriedShapes
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.project import Project
@@ -47,7 +47,7 @@ _CALLS_AT_ONCE = 4
 
 
 class JavaListener:
-    """A Java listener as the plant's; see `heptarm.sim.planning.command.PartListener`."""
+    """A Java listener as the plant's; see `heptarm.planning.command.PartListener`."""
 
     __slots__ = ("_java",)
 

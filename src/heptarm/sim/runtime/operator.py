@@ -16,10 +16,10 @@ from collections.abc import Callable
 from itertools import count
 from typing import TYPE_CHECKING
 
+from heptarm.planning.command import TICK
+from heptarm.planning.seam import OperationMode
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.shared_state import NEVER
-from heptarm.sim.seam import OperationMode
 
 if TYPE_CHECKING:
     from heptarm.sim.plant.plant import Plant

@@ -31,8 +31,8 @@ from typing import Protocol
 
 import numpy as np
 
+from heptarm.planning.seam import TICK_NS, HeaderWords
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.sim.seam import TICK_NS, HeaderWords
 from heptarm.values.simulator_options import RealTime
 
 #: A parameter of glibc's mallopt(3).

@@ -12,11 +12,11 @@ from typing import Protocol
 
 import numpy as np
 
+from heptarm.planning.command import TICK
+from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.fri.sessions import Sessions
-from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.operator import SimulatedOperator
-from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 
 #: Ticks that pass at most before the inputs are looked at again.
 LONGEST = 250

@@ -1,0 +1,242 @@
+/* The arithmetic of a tick of the plant in C. The Python modules are the reference: heptarm.sim.control.laws,
+   heptarm.sim.plant.plant, heptarm.sim.plant.external_load and heptarm.sim.plant.drive_monitor. This file does the same; sums of
+   products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
+
+   tick_layout.h is generated from heptarm.sim.plant.native: the constants, and `struct tick`, whose members all have eight
+   bytes. */
+#include <math.h>
+
+#include "tick_layout.h"
+
+static void copy(double *to, const double *from, word count) {
+    for (word i = 0; i < count; i++) to[i] = from[i];
+}
+
+/* Row of the inertia matrix of the controller's model times a vector. */
+static double row(const struct tick *t, int index, const double *vector) {
+    const double *at = t->mass + index * t->stride;
+    double sum = 0.0;
+    for (int i = 0; i < AXES; i++) sum += at[i] * vector[i];
+    return sum;
+}
+
+word ht_size(void) { return sizeof(struct tick); }
+
+/* A clock for MuJoCo's profiler that stands still: to read a real one twenty times takes a twentieth of a tick. */
+double ht_no_clock(void) { return 0.0; }
+
+/* Accelerations that the set-points ask for, and how much faster than the arm they are. */
+static void aim(const struct tick *t, double *slip, double *acceleration) {
+    const double *before = t->points, *now = before + AXES, *after = now + AXES;
+    for (int i = 0; i < AXES; i++) {
+        slip[i] = (after[i] - before[i]) * 500.0 - t->dq[i];
+        acceleration[i] = (after[i] - 2.0 * now[i] + before[i]) * 1e6 + t->mass_damping * slip[i];
+    }
+}
+
+/* Torques of the motors, to the actuators; inertial: inertia matrix times the accelerations. */
+static void drive(struct tick *t, const double *slip, const double *inertial) {
+    const double *now = t->points + AXES;
+    for (int i = 0; i < AXES; i++) {
+        double torque = inertial[i] + t->bias[i] - t->passive[i];
+        torque += t->stiffness[i] * (now[i] - t->q[i] + t->stiffness_damping * slip[i]);
+        if (torque > t->most[i]) torque = t->most[i];
+        if (torque < -t->most[i]) torque = -t->most[i];
+        t->torque[i] = t->tau_cmd[i] = t->actuators[i] = torque;
+    }
+}
+
+/* Position control: `PositionLaw.torque` without preload. */
+void ht_command(struct tick *t) {
+    double slip[AXES], acceleration[AXES], inertial[AXES];
+    aim(t, slip, acceleration);
+    for (int i = 0; i < AXES; i++) inertial[i] = row(t, i, acceleration);
+    drive(t, slip, inertial);
+}
+
+/* What the torque sensors show and what acts from outside, after the dynamics. Returns LOADED if there is such a load. */
+word ht_sense(struct tick *t) {
+    word explained = !t->is_misjudged, found = 0;
+    for (word i = 0; explained && i < t->pulls; i++) explained = t->pulled[i] == 0.0;
+    for (int i = 0; i < AXES; i++) {
+        double acceleration = t->acceleration[i], passive = t->passive[i];
+        t->tau[i] = t->torque[i] - t->armature[i] * acceleration + passive;
+        double load = explained ? t->applied[i] + t->constraint[i]
+                                : row(t, i, t->acceleration) + t->bias[i] - passive - t->torque[i];
+        t->load[i] = load;
+        if (load != 0.0) found = LOADED;
+    }
+    return found;
+}
+
+/* Whether a drive is outside of a range that it supervises; stiff: the arm shall be where its set-point is. */
+word ht_strained(const struct tick *t, word stiff) {
+    const double *after = t->points + 2 * AXES, *speed = t->ranges, *place = speed + AXES, *load = place + AXES,
+                 *distance = load + AXES;
+    for (int i = 0; i < AXES; i++) {
+        double q = t->q[i];
+        if (!(fabs(t->dq[i] * speed[i]) <= 1.0 && fabs(q * place[i]) <= 1.0 && fabs(t->tau[i] * load[i]) <= 1.0))
+            return 1;
+        if (stiff && !(fabs((after[i] - q) * distance[i]) <= 1.0)) return 1;
+    }
+    return 0;
+}
+
+struct frame {
+    double x[3], y[3], z[3];
+};
+
+static void mix(double *u, double *v, double c, double s) {
+    for (int i = 0; i < 3; i++) {
+        double a = u[i], b = v[i];
+        u[i] = c * a + s * b;
+        v[i] = c * b + -s * a;
+    }
+}
+
+static void turn_z(struct frame *f, double angle) { mix(f->x, f->y, cos(angle), sin(angle)); }
+
+static void turn_y(struct frame *f, double angle) { mix(f->x, f->z, cos(angle), -sin(angle)); }
+
+static void along(double *p, const double *direction, double length) {
+    for (int i = 0; i < 3; i++) p[i] = p[i] + length * direction[i];
+}
+
+/* Position and quaternion of the flange: `heptarm.model.kinematics.flange`. */
+static void flange(const struct tick *t, const double *q, double *pose) {
+    struct frame f = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    double p[3] = {0.0, 0.0, t->d_bs}, n[4];
+    turn_z(&f, q[0]);
+    turn_y(&f, q[1]);
+    along(p, f.z, t->d_se);
+    turn_z(&f, q[2]);
+    turn_y(&f, -q[3]);
+    along(p, f.z, t->d_ew);
+    turn_z(&f, q[4]);
+    turn_y(&f, q[5]);
+    along(p, f.z, t->d_wf);
+    turn_z(&f, q[6]);
+    copy(pose, p, 3);
+    const double *x = f.x, *y = f.y, *z = f.z;
+    double xx = x[0], yy = y[1], zz = z[2], w = xx + yy + zz;
+    if (w >= xx && w >= yy && w >= zz) {
+        n[0] = y[2] - z[1], n[1] = z[0] - x[2], n[2] = x[1] - y[0], n[3] = 1.0 + w;
+    } else if (xx >= yy && xx >= zz) {
+        n[0] = 1.0 + xx - yy - zz, n[1] = x[1] + y[0], n[2] = x[2] + z[0], n[3] = y[2] - z[1];
+    } else if (yy >= zz) {
+        n[0] = x[1] + y[0], n[1] = 1.0 + yy - xx - zz, n[2] = y[2] + z[1], n[3] = z[0] - x[2];
+    } else {
+        n[0] = x[2] + z[0], n[1] = y[2] + z[1], n[2] = 1.0 + zz - xx - yy, n[3] = x[1] - y[0];
+    }
+    double scale = pow(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3], -0.5);
+    if (n[3] < 0.0) scale = -scale;
+    for (int i = 0; i < 4; i++) pose[3 + i] = n[i] * scale;
+}
+
+/* Arm angle and Status: `heptarm.sim.plant.plant.posture`. Returns 0 where the elbow does not determine the arm angle well. */
+static int posture(const struct tick *t, const double *q, double *e1, word *status) {
+    double q4 = q[3], s2 = sin(q[1]), c2 = cos(q[1]), s4 = sin(q4), c4 = cos(q4), d_se = t->d_se, d_ew = t->d_ew;
+    double x = -d_ew * s4 * cos(q[2]), y = -d_ew * s4 * sin(q[2]), z = d_se + d_ew * c4, turned = c2 * x + s2 * z;
+    z = c2 * z - s2 * x;
+    x = turned;
+    word behind = x < -t->on_axis;
+    *status = behind | (word)(q4 < 0.0) << 1 | (word)(q[5] <= 0.0) << 2;
+    double radius = sqrt(x * x + y * y);
+    if (fabs(s4) < t->straight || radius < t->on_axis) return 0;
+    double side = behind ? -radius : radius, a2 = atan2(side, z) - atan2(-d_ew * s4, d_se + d_ew * c4);
+    double sa = sin(a2), ca = cos(a2), ux = (x / side) * sa, uy = (y / side) * sa;
+    double length = sqrt(x * x + y * y + z * z);
+    double across = (x * uy * c2 + y * (ca * s2 - ux * c2) - z * uy * s2) / length;
+    double with_w = (x * ux + y * uy + z * ca) * (x * s2 + z * c2) / (length * length);
+    *e1 = atan2(across, ux * s2 + ca * c2 - with_w);
+    return 1;
+}
+
+/* Write a state into its slot of the shared memory; `ht_publish` has to follow. Returns ASK if the arm angle has to be
+   computed elsewhere: then nothing is written before the next call with that angle in `e1` and `has_e1` set. */
+word ht_write(struct tick *t, word tick, double progress, double remaining) {
+    const double *q = t->shown;
+    word *words = t->memory + STATES + tick % SLOTS * SIZE;
+    double *reals = (double *)words, angle;
+    word status, turns = 0;
+    if (!posture(t, q, &angle, &status)) {
+        if (!t->has_e1) return ASK;
+        angle = t->e1;
+        t->has_e1 = 0;
+    }
+    __atomic_store_n(words + SEQ, 2 * tick + 1, __ATOMIC_RELAXED);
+    __atomic_thread_fence(__ATOMIC_SEQ_CST);
+    words[TIME] = tick * TICK_NS;
+    copy(reals + Q, q, AXES);
+    copy(reals + Q_CMD, t->points + 2 * AXES, AXES);
+    copy(reals + DQ, t->dq, AXES);
+    copy(reals + TAU, t->tau, AXES);
+    copy(reals + TAU_EXT, t->load, AXES);
+    copy(reals + TAU_CMD, t->tau_cmd, AXES);
+    copy(reals + WRENCH, t->wrench, 6);
+    flange(t, q, reals + POSE);
+    words[FLAGS] = t->flags;
+    words[MODE] = t->mode;
+    words[ORDER] = t->order;
+    reals[PROGRESS] = progress;
+    reals[REMAINING] = remaining;
+    reals[E1] = angle;
+    words[STATUS] = status;
+    for (int i = 0; i < AXES; i++) turns |= (word)(q[i] < 0.0) << i;
+    words[TURN] = turns;
+    return DONE;
+}
+
+/* A tick in position control of an arm that nothing pushes, whose load data are true: `Plant.compute` after its set-point.
+   Returns DONE, or what is left: ELSEWHERE: all of it; LOADED: from the wrench on; STRAINED: from the supervision of the
+   drives on; ASK: the state. */
+word ht_tick(struct tick *t, word tick, double progress, double remaining) {
+    double slip[AXES];
+    for (word i = 0; i < t->pulls; i++)
+        if (t->pulled[i] != 0.0) return ELSEWHERE;
+    t->step1(t->model, t->data);
+    aim(t, slip, t->vector);
+    t->multiply(t->model, t->data, t->product, t->vector);
+    drive(t, slip, t->product);
+    t->step2(t->model, t->data);
+    if (ht_sense(t)) return LOADED;
+    for (int i = 0; i < 6; i++) t->wrench[i] = 0.0;
+    if (t->ranges && ht_strained(t, 1)) return STRAINED;
+    return ht_write(t, tick, progress, remaining);
+}
+
+/* Position in a motion, 0 to 1, at a place on its path: `Plan.progress`. */
+static double progress(const struct tick *t, double place) {
+    double part = (place - t->part_begin) / (t->part_end - t->part_begin);
+    return part < 0.0 ? 0.0 : part > 1.0 ? 1.0 : part;
+}
+
+/* Let readers see the state that was written last. Returns whether one of them waits for it. */
+word ht_publish(struct tick *t, word tick) {
+    word *words = t->memory + STATES + tick % SLOTS * SIZE, *header = t->memory + HEADER;
+    __atomic_store_n(words + SEQ, 2 * tick + 2, __ATOMIC_RELEASE);
+    __atomic_store_n(header + NEWEST, tick, __ATOMIC_SEQ_CST);
+    return tick * TICK_NS >= __atomic_load_n(header + WAKE_AT, __ATOMIC_SEQ_CST);
+}
+
+/* Puts the motion at its time, before `ht_follow`. */
+void ht_put(struct tick *t, double time) { ha_put(t->table, &t->cursor, time); }
+
+/* Ticks of a motion whose table decides about its set-points: until one of them has none or belongs to another part, one is not done
+   in C, somebody waits for the state of one, or `count` are done. Returns how many are done and published; `left` is what is left of
+   the next one, DONE if that has not begun. */
+word ht_follow(struct tick *t, word tick, word count) {
+    word done = 0;
+    for (t->left = DONE, t->is_awaited = 0; done < count && !t->is_awaited; done++) {
+        double there[AXES], *points = t->points;
+        struct cursor next = t->cursor;
+        if (!ha_next(t->table, &next, t->step, points + 2 * AXES, t->leap, there) || next.place >= t->mark) break;
+        t->cursor = next;
+        copy(points, points + AXES, 2 * AXES);
+        copy(points + 2 * AXES, there, AXES);
+        t->left = ht_tick(t, tick + done, progress(t, next.place), t->table->end - next.time);
+        if (t->left != DONE) break;
+        t->is_awaited = ht_publish(t, tick + done);
+    }
+    return done;
+}

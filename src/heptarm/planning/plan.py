@@ -1,0 +1,106 @@
+"""A planned motion, and how one is made of a composite path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf, isnan
+
+import numpy as np
+
+from heptarm.planning.command import Order
+from heptarm.planning.composite_path import CompositePath, constraints, sample
+from heptarm.planning.path import JointPath, PathLengths
+from heptarm.planning.table import MotionTable
+from heptarm.planning.time_scaling import PathTiming
+from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
+
+_NEVER = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A motion that can be executed.
+
+    Attributes:
+        order: its command.
+        start: joint positions at its start, shape (7,) [rad].
+        end: joint positions at its end, shape (7,) [rad].
+        path: joint positions over s; None: it follows no path.
+        timing: s over time, and stops on the path; None: it follows no path.
+        lengths: distances of the tool frame along the path; None: it follows no path.
+        marks: s at which the parts of a batch or a spline begin, without the first.
+        table: computes many set-points at once; None: they have to be computed one by one.
+    """
+
+    order: Order
+    start: Array
+    end: Array
+    path: JointPath | None = None
+    timing: PathTiming | None = None
+    lengths: PathLengths | None = None
+    marks: tuple[float, ...] = ()
+    table: MotionTable | None = None
+
+    @property
+    def duration(self) -> float:
+        """Time at full speed [s]; infinite for an endless hold."""
+        if self.timing is not None:
+            return self.timing.profile.duration
+        return _NEVER if isnan(self.order.duration) else self.order.duration
+
+    def span(self, part: int) -> tuple[float, float]:
+        """Path parameter at which a part begins and ends; -1: the whole."""
+        marks = (0.0, *self.marks, 1.0)
+        return (0.0, 1.0) if part < 0 else (marks[part], marks[part + 1])
+
+    def end_of(self, part: int) -> float:
+        """Path parameter at which the next part begins; infinite: there is none."""
+        return self.marks[part] if part < len(self.marks) else inf
+
+    def measured(self, part: int) -> tuple[float, float]:
+        """Path parameters between which progress is measured: of the motion of a batch, or of the whole."""
+        return self.span(part if self.marks and self.order.kind == "batch" else -1)
+
+    def progress(self, s: float, part: int) -> float:
+        """Progress of the running motion of a batch at s in [0, 1]; any other motion is its only part."""
+        if not self.marks:
+            return s
+        low, high = self.measured(part)
+        return min(1.0, max(0.0, (s - low) / (high - low))) if high > low else 1.0
+
+
+def timed(
+    robot: RobotModel,
+    order: Order,
+    start: Array,
+    path: CompositePath,
+    rests: Sequence[int],
+    marks: Sequence[float],
+) -> Plan:
+    """The fastest motion along a path.
+
+    Args:
+        robot: the robot.
+        order: the command.
+        start: joint positions, shape (7,) [rad].
+        path: the path.
+        rests: segments behind which the arm rests, ascending; the last segment is the last of them.
+        marks: s at which the parts begin, without the first.
+
+    Raises:
+        PlanError: the path leaves the workspace or the joint limits, or passes a singularity.
+    """
+    samples = sample(robot, path, start, Pose.of(order.tcp[:3], order.tcp[3:]))
+    edges = [0, *(index + 1 for index in rests)]
+    sections = tuple(constraints(robot, path, samples, a, b) for a, b in pairwise(edges))
+    timing = PathTiming(tuple(path.marks[edge] for edge in edges[1:]), sections)
+    fractions = [
+        np.linspace(low, high, len(q)) for q, (low, high) in zip(samples.q, pairwise(path.marks), strict=True)
+    ]
+    lengths = PathLengths.through(np.concatenate(fractions), np.concatenate(samples.positions))
+    table = MotionTable.of(path, timing.profile)
+    return Plan(order, start, samples.q[-1][-1], path, timing, lengths, tuple(marks), table)
