@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import heptarm as ha
 from heptarm.arm.motion.program import ProgramTerms, is_endless, listed, longest
 from heptarm.arm.translate.motions import item as item_of
+from heptarm.errors import inside
 from heptarm.model.inverse_kinematics import redundancy
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import Motion, hold
@@ -209,3 +210,21 @@ def test_terms_are_one_value() -> None:
     assert (terms.mode, terms.until, terms.then, terms.breaks) == (None, None, "stay", ())
     with pytest.raises(FrozenInstanceError):
         terms.speed = 1.0  # type: ignore[misc]
+
+
+def test_a_refused_element_is_named_in_text_and_parameter() -> None:
+    far = Pose.at(9.0, 0.0, 0.5)
+    line = ha.spline([ha.spl(POSE)] * 30 + [ha.spl(far)] + [ha.spl(POSE)])
+    with pytest.raises(ha.LimitError, match=r"^segments\[30\]: target\.x must") as error:
+        one(line)
+    assert error.value.parameter == "segments[30].target.x"
+    with (
+        pytest.raises(ha.LimitError, match=r"^motions\[1\]\.segments\[30\]: target\.x must") as error,
+        inside("motions[1]"),
+    ):
+        one(line)
+    assert error.value.parameter == "motions[1].segments[30].target.x"
+    joints = ha.spline_joints([np.zeros(7)] * 3 + [deg(0, 0, 0, 121, 0, 0, 0)])
+    with pytest.raises(ha.LimitError, match=r"^points\[3\]: .*A4") as error:
+        one(joints)
+    assert error.value.parameter.startswith("points[3].q")

@@ -13,7 +13,6 @@ from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
 from heptarm.planning.time_scaling import TabulatedProfile
-from heptarm.sim.controller.command import MotionCommand
 from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
 from tests.sim import motions

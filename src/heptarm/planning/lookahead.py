@@ -183,26 +183,27 @@ def _planned(
 ) -> Plan:
     """The plan of some of the items, which the controller executes together."""
     tcp = frames.tip(items[which[0]].frame or TOOL)
+    place = _place(which, items)
     try:
         motions = tuple(_motion(items[index], tcp, frames) for index in which)
     except CommandRejected as error:
-        raise _named(error, which, items) from None
+        if place:
+            error.parameter = ""  # it is the whole motion
+        raise error.inside(place) from None
     motion = motions[0] if len(motions) == 1 else seam.Batch(motions=motions)
     try:
         return plan(robot, motion, start, tcp=tuple(tcp.array.tolist()))
     except PlanError as error:
         kind = _ERRORS.get(error.kind, CommandRejected)
-        raise _named(kind(str(error), parameter="motion", hint=_REMEDIES[kind]), which, items) from None
+        parameter = "" if place else "motion"
+        raise kind(str(error), parameter=parameter, hint=_REMEDIES[kind]).inside(place) from None
 
 
-def _named(error: CommandRejected, which: range, items: Sequence[wire.Item]) -> CommandRejected:
-    """The same error, naming the motion of a program of several."""
-    if len(items) > 1:
-        name = f"motions[{which[0]}]" if len(which) == 1 else f"motions[{which[0]}:{which[-1] + 1}]"
-        error.text = f"{name}: {error.text}"
-        error.args = (error.text,)
-        error.parameter = name
-    return error
+def _place(which: range, items: Sequence[wire.Item]) -> str:
+    """The motions of a program of several; "": it has only one."""
+    if len(items) == 1:
+        return ""
+    return f"motions[{which[0]}]" if len(which) == 1 else f"motions[{which[0]}:{which[-1] + 1}]"
 
 
 def _motion(item: wire.Item, tcp: Pose, frames: FramesOfArm) -> seam.PlantMotion:

@@ -499,7 +499,7 @@ class CartesianImpedance:
     #: NaN: off [N, Nm]
     max_force: tuple[float, ...] = (nan,) * 6
     max_force_stops: bool = False
-    #: exceeding it stops; NaN: off [m/s, rad/s]
+    #: exceeding it stops; NaN: off, but 0.3125 m/s and 1.25 rad/s in a direction of less than 10 N/m or 0.5 Nm/rad, which a hand can guide [m/s, rad/s]
     max_velocity: tuple[float, ...] = (nan,) * 6
     #: exceeding it stops; NaN: off [m, rad]
     max_deviation: tuple[float, ...] = (nan,) * 6
@@ -1534,9 +1534,9 @@ class HandGuide:
     q_min: tuple[float, ...] = (nan,) * 7
     #: [rad]
     q_max: tuple[float, ...] = (nan,) * 7
-    #: limit of every axis; NaN keeps the cabinet's limit, also in the next field [rad/s]
+    #: limit of every axis; NaN: half of the slowest axis' maximum [rad/s]
     joint_velocity: float = nan
-    #: of the motion frame [m/s]
+    #: of the motion frame; NaN: 0.25 m/s [m/s]
     cartesian_velocity: float = nan
     #: at a limit every axis stops until the switch is released; otherwise only the axis at its limit, outwards
     freezes_all: bool = False

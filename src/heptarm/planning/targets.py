@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model import inverse_kinematics
+from heptarm.model.inverse_kinematics import PathInverse, solve
 from heptarm.model.kinematics import forward
 from heptarm.planning import seam
 from heptarm.planning.composite_path import SegmentLimits, check_limits
@@ -57,7 +57,7 @@ def joint_target(robot: RobotModel, motion: JointMotion, start: Array, tcp: Pose
     else:
         given = motion.redundancy
         try:
-            target = inverse_kinematics.solve(
+            target = solve(
                 robot,
                 pose_of(motion.target) @ tcp.inverse(),
                 e1=None if isnan(given.e1) else given.e1,
@@ -123,15 +123,12 @@ def _joint_orientation(
     robot: RobotModel, e1: float, start: Array, target: Pose, tcp: Pose
 ) -> JointOrientation:
     """The orientation as a PTP to the target would turn it."""
-    own = inverse_kinematics.redundancy(robot, start.tolist())
-    r, p = inverse_kinematics.rows(target @ tcp.inverse())
+    place = target @ tcp.inverse()
     try:
-        end = inverse_kinematics.raw(
-            robot, r, p, own.e1 if isnan(e1) else e1, own.status, start.tolist(), continuous=True
-        )
+        end = PathInverse(robot, Pose()).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
-    return JointOrientation(robot, start, np.array(end), tcp.quat)
+    return JointOrientation(robot, start, end, tcp.quat)
 
 
 def cartesian_path(robot: RobotModel, motion: PathMotion, start: Array, tcp: Pose) -> CartesianPath:

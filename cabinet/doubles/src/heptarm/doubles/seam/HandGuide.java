@@ -9,9 +9,9 @@ public final class HandGuide extends PlantMotion {
     public double[] qMin = Seam.missing(7);
     /** [rad] */
     public double[] qMax = Seam.missing(7);
-    /** limit of every axis; NaN keeps the cabinet's limit, also in the next field [rad/s] */
+    /** limit of every axis; NaN: half of the slowest axis' maximum [rad/s] */
     public double jointVelocity = Double.NaN;
-    /** of the motion frame [m/s] */
+    /** of the motion frame; NaN: 0.25 m/s [m/s] */
     public double cartesianVelocity = Double.NaN;
     /** at a limit every axis stops until the switch is released; otherwise only the axis at its limit, outwards */
     public boolean freezesAll = false;
