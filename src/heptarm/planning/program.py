@@ -288,7 +288,7 @@ def _blend(before: _Motion, after: _Motion) -> Segment:
     assert one is not None and other is not None
     length, limits = 2 * before.finish * before.time, before.limits.least(after.limits)
     speed_limit = (min(before.speed_limit, after.speed_limit),) * 2
-    if isinstance(one, CartesianPath) and isinstance(other, CartesianPath) and one.status == other.status:
+    if isinstance(one, CartesianPath) and isinstance(other, CartesianPath):
         geometry = GeometryBlend(one.geometry, other.geometry, before.finish, after.begin)
         path: JointPath = one.joined(other, geometry, before.finish, after.begin)
     else:
