@@ -149,7 +149,7 @@ def _joint_orientation(robot: RobotModel, order: Order, start: Array, target: Po
     e1, _, _ = order.redundancy
     place = target @ tcp.inverse()
     try:
-        end = PathInverse(robot, Pose()).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
+        end = PathInverse(robot, Pose.of((0.0, 0.0, 0.0))).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
     return JointOrientation(robot, start, end, tcp.quat)
