@@ -16,7 +16,8 @@
 static const double TOLERANCE = 5e-10;
 /* Squares of distances this far outside the reach are rounding errors [m2]. */
 static const double ON_REACH = 1e-9;
-/* Joints this far beyond a limit are on it; if nothing else reaches the pose, also at this distance: the noise of a measured pose. */
+/* Joints this far beyond a limit are on it; where the postures inside are far away, also at this distance: the noise of a measured
+   pose. */
 static const double ON_LIMIT = 1e-9, NEAR_LIMIT = 2e-5;
 /* Joints this far from 0, and the wrist this far from the plane of A1 [m], have both signs for Status: next to a posture, where a
    measured pose has noise, and alone. */
@@ -184,8 +185,9 @@ int hi_status(const struct arm *arm, const double *q) {
     return (ahead_of(arm, q) < -IN_PLANE) | (q[3] < 0.0) << 1 | (q[5] <= 0.0) << 2;
 }
 
-/* Arm angle [rad]: the turn of the elbow about the shoulder-wrist line, from the arm with A3 = 0 in the same Status. */
-double hi_arm_angle(const struct arm *arm, const double *q) {
+/* Arm angle [rad]: the turn of the elbow about the shoulder-wrist line, from the arm with A3 = 0 whose wrist is behind A1 or before
+   it; -1: on the side of this posture. */
+double hi_arm_angle(const struct arm *arm, const double *q, int is_behind) {
     struct frames f;
     struct target t;
     double start[9], r03[9], u[3], between[9], c = cos(q[2]), s = sin(q[2]), spin[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
@@ -194,7 +196,7 @@ double hi_arm_angle(const struct arm *arm, const double *q) {
     t.wrist[2] -= arm->d_bs;
     t.radius = sqrt(t.wrist[0] * t.wrist[0] + t.wrist[1] * t.wrist[1]);
     t.square = dot(t.wrist, t.wrist, 3);
-    reference(arm, &t, q[3], ahead_of(arm, q) < -IN_PLANE, start);
+    reference(arm, &t, q[3], is_behind < 0 ? ahead_of(arm, q) < -IN_PLANE : is_behind, start);
     zy(q[0], q[1], between);
     times(between, spin, r03);
     for (int i = 0; i < 3; i++)
@@ -542,8 +544,8 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
         if (!request->is_fixed) offer_settled(&s, loose, 0);
     }
     if (!request->is_fixed && (!(s.least < INFINITY) || largest_move(s.q[choose(&s)], near) > LONG_WAY)) offer_sweep(&s);
-    if (s.least < INFINITY) return take(&s, s.q[choose(&s)], q);
-    return s.beyond_distance < INFINITY ? take(&s, s.beyond, q) : NO_POSTURE;
+    if (!(fmin(s.least, s.beyond_distance) < INFINITY)) return NO_POSTURE;
+    return take(&s, s.least <= PREFERENCE * s.beyond_distance + SAME ? s.q[choose(&s)] : s.beyond, q);
 }
 
 /* ---------------------------------------------------------------------------------------------------------- for Python */

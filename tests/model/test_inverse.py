@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import nan, pi
+from math import pi
 
 import numpy as np
 import pytest
@@ -77,7 +77,7 @@ def test_taught_postures_stay(robot: RobotModel, noise: float) -> None:
 @each_robot
 def test_many_round_postures_in_one_call(robot: RobotModel) -> None:
     rng = np.random.default_rng(22)
-    most = np.floor(np.degrees(robot.q_max) / 15)
+    most = np.floor(np.degrees(robot.q_max) / 15 + 1e-9)
     for size in (0.0, 1e-12, 1e-9, 1e-7, 1e-5):
         q = np.radians(15 * rng.integers(-most, most + 1, (4000, 7)))
         q[rng.random(q.shape) < 0.3] = 0.0
@@ -386,7 +386,6 @@ def test_what_is_not_given_may_be_said(robot: RobotModel) -> None:
     assert np.array_equal(
         model.solve(robot, wanted, e1=nothing.e1, status=nothing.status), model.solve(robot, wanted)
     )
-    assert np.array_equal(model.solve(robot, wanted, e1=nan), model.solve(robot, wanted))
     with pytest.raises(LimitError, match="status must be .* got 8"):
         model.solve(robot, wanted, status=8)
     with pytest.raises(ShapeError, match="near must have shape"):

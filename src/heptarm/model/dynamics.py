@@ -20,6 +20,8 @@ from heptarm.values.robot import Body, Friction, RobotModel
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
 GRAVITY = (0.0, 0.0, -9.81)
+#: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
+ROTOR = 0.1
 
 _STILL = Joints()
 _WEIGHTLESS = Vector()

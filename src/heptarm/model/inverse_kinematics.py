@@ -18,7 +18,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, ShapeError, Unreachable
 from heptarm.model.native import Joints, Matrix, Reals, Spans, constants, one
 from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
-from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.robot import RobotModel
 
 #: Outcomes of a solution in C.
@@ -88,7 +88,7 @@ def status_of(robot: RobotModel, q: Sequence[float]) -> int:
     return int(one().hi_status(constants(robot), Joints(*q)))
 
 
-def arm_angle(robot: RobotModel, q: npt.ArrayLike) -> float:
+def arm_angle(robot: RobotModel, q: npt.ArrayLike, *, behind: bool | None = None) -> float:
     """Arm angle of a joint position: the elbow's turn about the shoulder-wrist line.
 
     It is measured from the arm that reaches the wrist with A3 = 0 in the same Status (Shimizu et al. 2008). It is not
@@ -98,11 +98,14 @@ def arm_angle(robot: RobotModel, q: npt.ArrayLike) -> float:
     Args:
         robot: the robot.
         q: joint positions, shape (7,) [rad].
+        behind: whether the wrist of the arm with A3 = 0 is behind A1's x axis; None: as in these joint positions, which
+            may change along a motion.
 
     Returns:
         In (-pi, pi] [rad].
     """
-    return float(one().hi_arm_angle(constants(_robot(robot)), Joints(*array(q, 7, "q").tolist())))
+    given = Joints(*array(q, 7, "q").tolist())
+    return float(one().hi_arm_angle(constants(_robot(robot)), given, -1 if behind is None else behind))
 
 
 def redundancy(robot: RobotModel, q: npt.ArrayLike) -> Redundancy:
@@ -157,7 +160,7 @@ def solve(
     Args:
         robot: the robot.
         pose: of the flange in the base frame.
-        e1: angle of A3 [rad]; None or NaN: not given.
+        e1: angle of A3 [rad]; None: not given.
         status: bits 0-2; None or -1: not given.
         near: joint positions, shape (7,) [rad].
         arm_angle: see `model.arm_angle` [rad]; None: not given.
@@ -173,7 +176,7 @@ def solve(
     _robot(robot)
     matrix = _matrix(pose)
     hint = None if near is None else Joints(*array(near, 7, "near").tolist())
-    given = Redundancy(nan if e1 is None else e1, -1 if status is None else status)
+    given = Redundancy(NOT_GIVEN if e1 is None else e1, -1 if status is None else status)
     if arm_angle is not None:
         if not isnan(given.e1):
             raise CommandRejected(

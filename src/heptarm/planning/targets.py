@@ -16,7 +16,7 @@ from heptarm.errors import Unreachable
 from heptarm.model.inverse_kinematics import PathInverse, solve
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import Order, PlanError
-from heptarm.planning.composite_path import SegmentLimits
+from heptarm.planning.composite_path import SegmentLimits, check_limits
 from heptarm.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
 from heptarm.planning.path import CartesianPath
 from heptarm.values.arrays import Array
@@ -87,21 +87,6 @@ def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
             ) from None
     check_limits(robot, target)
     return target
-
-
-def check_limits(robot: RobotModel, q: Array, where: str = "") -> None:
-    """Refuse joint positions that the robot cannot have; `where` goes into the error's text."""
-    outside = [i for i in range(7) if not robot.q_min[i] - 1e-9 <= q[i] <= robot.q_max[i] + 1e-9]
-    if outside:
-        axes = " ".join(f"A{i + 1}" for i in outside)
-        values = ", ".join(
-            f"A{i + 1} = {value:.2f} deg of [{low:.0f}, {high:.0f}]"
-            for i in outside
-            for value, low, high in [np.degrees([q[i], robot.q_min[i], robot.q_max[i]])]
-        )
-        raise PlanError(
-            "joint_limit", f"Can not plan motion: Command Position violates limit {axes}{where} ({values})"
-        )
 
 
 def _target(order: Order, origin: Pose) -> Pose:
