@@ -13,10 +13,10 @@ from typing import NoReturn
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model.inverse_kinematics import PathInverse, solve
+from heptarm.model.inverse_kinematics import PathInverse, inside, solve
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import Order, PlanError
-from heptarm.planning.composite_path import SegmentLimits, check_limits
+from heptarm.planning.composite_path import LARGEST_STEP, SegmentLimits, check_limits
 from heptarm.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
 from heptarm.planning.path import CartesianPath
 from heptarm.values.arrays import Array
@@ -33,6 +33,10 @@ LINES = ("lin", "lin_rel", "circ")
 STILL = 1e-7
 #: Smallest speed, acceleration or jerk: a fraction of the axes' maxima, or along a path in SI units.
 SLOWEST = 1e-6
+#: Cosine of half the angle between two orientations above which they are the same.
+_SAME_TURN = 0.99
+#: Samples of a path that tell whether the arm can follow it.
+_LOOKS = 101
 #: Farthest position of a target or of a tool frame [m].
 FARTHEST = 100.0
 
@@ -102,8 +106,10 @@ def _target(order: Order, origin: Pose) -> Pose:
     return Pose(origin.xyz + rotation(axes) @ offset.xyz, multiply(turn, origin.quat))
 
 
-def geometry_of(robot: RobotModel, order: Order, start: Array, origin: Pose) -> Geometry:
-    """Path of the tool frame of a lin, lin_rel or circ that begins at a pose.
+def geometry_of(
+    robot: RobotModel, order: Order, start: Array, origin: Pose, *, is_other: bool = False
+) -> Geometry:
+    """Path of the tool frame of a lin, lin_rel or circ that begins at a pose; `is_other`: see `Slerp`.
 
     Raises:
         PlanError: there is no such arc, or no joint position at its end.
@@ -121,10 +127,11 @@ def geometry_of(robot: RobotModel, order: Order, start: Array, origin: Pose) -> 
         assert order.via is not None
         arc = Arc(origin.xyz, _pose(order.via).xyz, target.xyz)
         if turn is None:
-            return arc.oriented(origin.quat, target.quat, control)
+            return arc.oriented(origin.quat, target.quat, control, is_other=is_other)
         return arc.turning(turn, follows=False)
     if turn is None:
-        turn = Slerp(origin.quat, origin.quat if control.type == "constant" else target.quat)
+        end = origin.quat if control.type == "constant" else target.quat
+        turn = Slerp(origin.quat, end, is_other=is_other)
     return Straight(origin.xyz, target.xyz, turn)
 
 
@@ -141,16 +148,36 @@ def _joint_orientation(robot: RobotModel, order: Order, start: Array, target: Po
 
 
 def cartesian_path(robot: RobotModel, order: Order, start: Array) -> CartesianPath:
-    """Path of a lin, lin_rel or circ.
+    """Path of a lin, lin_rel or circ; half a turn goes in the direction in which the arm can follow.
 
     Raises:
         PlanError: see `geometry_of`.
     """
-    tcp = _pose(order.tcp)
-    geometry = geometry_of(robot, order, start, Pose.from_matrix(forward(robot, start)) @ tcp)
-    return CartesianPath(
-        robot, start, geometry, tcp, None if isnan(order.redundancy[0]) else order.redundancy[0]
+    tcp, e1 = _pose(order.tcp), None if isnan(order.redundancy[0]) else order.redundancy[0]
+    origin = Pose.from_matrix(forward(robot, start)) @ tcp
+    path, other = (
+        CartesianPath(
+            robot, start, geometry_of(robot, order, start, origin, is_other=is_other), tcp, e1
+        )
+        for is_other in (False, True)
     )
+    middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))
+    is_free = abs(float(middle @ middle_of_other)) < _SAME_TURN
+    return other if is_free and not _leads_on(robot, path, start) and _leads_on(robot, other, start) else path
+
+
+def _leads_on(robot: RobotModel, path: CartesianPath, start: Array) -> bool:
+    """Whether the arm can follow a path within its joint limits, by samples."""
+    near = start
+    for s in np.linspace(0.0, 1.0, _LOOKS)[1:].tolist():
+        try:
+            q = path.at(s, near)
+        except Unreachable:
+            return False
+        if float(np.abs(q - near).max()) > LARGEST_STEP or not inside(robot, q.tolist()):
+            return False
+        near = q
+    return True
 
 
 def or_default(value: float, default: float) -> float:

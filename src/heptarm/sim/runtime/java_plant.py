@@ -294,7 +294,7 @@ class JavaPlant:
             found = solve(
                 self._plant.robot,
                 Pose.of(place[:3], place[3:]),
-                e1=float(e1),
+                e1=None if isnan(e1) else float(e1),
                 status=int(status),
                 near=_numbers(near),
             )
