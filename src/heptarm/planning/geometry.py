@@ -194,9 +194,7 @@ class Arc:
         self.angle = turn.angle + (self.sweep if follows else 0.0)
         return self
 
-    def oriented(
-        self, start: Array, end: Array, control: Orientation, *, is_other: bool = False
-    ) -> Arc:
+    def oriented(self, start: Array, end: Array, control: Orientation, *, is_other: bool = False) -> Arc:
         """This arc with an orientation from one quaternion to another, relative to base or path; see `Slerp`."""
         follows = control.reference == "path"
         if control.type == "constant":

@@ -141,7 +141,9 @@ def _joint_orientation(robot: RobotModel, order: Order, start: Array, target: Po
     e1, _, _ = order.redundancy
     place = target @ tcp.inverse()
     try:
-        end = PathInverse(robot, Pose.of((0.0, 0.0, 0.0))).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
+        end = PathInverse(robot, Pose.of((0.0, 0.0, 0.0))).joints(
+            place.xyz.tolist(), place.quat.tolist(), start, a3=e1
+        )
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
     return JointOrientation(robot, start, end, tcp.quat)
@@ -156,9 +158,7 @@ def cartesian_path(robot: RobotModel, order: Order, start: Array) -> CartesianPa
     tcp, e1 = _pose(order.tcp), None if isnan(order.redundancy[0]) else order.redundancy[0]
     origin = Pose.from_matrix(forward(robot, start)) @ tcp
     path, other = (
-        CartesianPath(
-            robot, start, geometry_of(robot, order, start, origin, is_other=is_other), tcp, e1
-        )
+        CartesianPath(robot, start, geometry_of(robot, order, start, origin, is_other=is_other), tcp, e1)
         for is_other in (False, True)
     )
     middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))

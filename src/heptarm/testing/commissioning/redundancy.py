@@ -26,7 +26,9 @@ _SAME = 0.2
 
 @step(
     movement=Movement(
-        "The elbow and the joints", "each axis by at most 60 deg, the flange by 50 mm", "a tenth of every axis' speed"
+        "The elbow and the joints",
+        "each axis by at most 60 deg, the flange by 50 mm",
+        "a tenth of every axis' speed",
     ),
     needs=("ptp", "lin"),
 )
