@@ -111,6 +111,20 @@ def test_motions_can_be_awaited_together(arm: Arm) -> None:
     assert all(result.arrived for result in asyncio.run(program()))
 
 
+def test_a_stop_names_its_author(arm: Arm, cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target, control=False, name="bystander") as other:
+        handle = arm.start(FAR)
+        under_way(arm)
+        other.stop()
+        with pytest.raises(ha.MotionAborted, match=r"was stopped by bystander at 127\.0\.0\.1"):
+            handle.wait(timeout=30.0)
+    handle = arm.start(FAR)
+    under_way(arm)
+    arm.stop()
+    with pytest.raises(ha.MotionAborted, match=r"was stopped by .+ at 127\.0\.0\.1"):
+        handle.wait(timeout=30.0)
+
+
 def test_an_await_that_times_out_brakes_the_arm(arm: Arm) -> None:
     async def program() -> ha.MotionHandle:
         handle, behind = arm.start(FAR), arm.start(ptp(HOME))

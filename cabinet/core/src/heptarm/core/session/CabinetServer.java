@@ -123,7 +123,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
 
     public void halt(StopKind kind, String who) {
         log.info(who + " stops the arm, without a session");
-        service.executor.stop(kind);
+        service.commands.stop(kind, "from " + who + ", without a session", true);
     }
 
     /** Sends an event to every open session. */
