@@ -42,13 +42,13 @@ def test_folders_are_made_private_also_those_that_were_open(folder: Callable[[],
     place = folder()
     assert folders.private_folder(place) == place and mode(place) == 0o700
     for one in (place, place.parent):
-        one.chmod(0o777)
+        one.chmod(0o775)
     folders.private_folder(place)
     assert mode(place) == 0o700
     if place != folders.settings_folder():
         assert mode(place.parent) == 0o700  # heptarm's own, too
     else:
-        assert mode(place.parent) == 0o777  # the user's
+        assert mode(place.parent) == 0o775  # the user's
 
 
 def test_a_folder_that_the_user_names_is_left_as_it_is(tmp_path: Path) -> None:
@@ -64,10 +64,18 @@ def test_a_folder_of_another_user_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(PermissionError, match="another user's"):
         folders.private_folder(folders.settings_folder())
     with pytest.raises(ha.CommandRejected, match="another user's: remove it, or make it yours"):
-        targets.save_target(targets.SavedTarget("cell", "172.31.1.147"))
+        targets.add_target(targets.SavedTarget("cell", "172.31.1.147"))
     with pytest.raises(ha.CommandRejected, match="another user's"):
         keys.write_key_file(keys.key_folder() / "cell.key", "k" * 32)
     assert list(folders.settings_folder().iterdir()) == []
+
+
+def test_a_folder_to_which_anybody_can_write_is_not_used() -> None:
+    place = folders.private_folder(keys.key_folder())
+    place.chmod(0o777)
+    with pytest.raises(PermissionError, match="chmod 700"):
+        folders.private_folder(place)
+    assert mode(place) == 0o777
 
 
 def test_a_file_in_place_of_the_folder_is_refused() -> None:

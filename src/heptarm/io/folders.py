@@ -40,13 +40,13 @@ def runtime_folder() -> Path:
 
 
 def private_folder(place: Path) -> Path:
-    """Make a folder that only this user may enter; one that others may enter is closed to them.
+    """Make a folder that only this user may enter; one that others may read is closed to them.
 
     Args:
         place: one of the folders above, or a folder in one of them. Those between are made private, too.
 
     Raises:
-        OSError: it cannot be made; PermissionError: one of them is another user's, or no folder.
+        OSError: it cannot be made; PermissionError: one of them is another user's, or anybody may write to it.
     """
     known = (settings_folder(), state_folder(), runtime_folder())
     root = next((one for one in known if one == place or one in place.parents), place)
@@ -58,6 +58,9 @@ def private_folder(place: Path) -> Path:
             continue
         if not _is_ours(one):
             text = "its folder is another user's: remove it, or make it yours with chown"
+            raise PermissionError(errno.EACCES, text, str(one))
+        if one.stat().st_mode & stat.S_IWOTH:
+            text = "anybody can write to its folder: look what is in it, then chmod 700"
             raise PermissionError(errno.EACCES, text, str(one))
         one.chmod(stat.S_IMODE(one.stat().st_mode) & ~_OTHERS)
     return place

@@ -274,8 +274,8 @@ _CATCH_UP = 0.3
 class StopWatch:
     """Ends a wait when a safety stop keeps the arm from what is waited for.
 
-    It leaves time for what a stop itself brings about, such as the end of a motion. A wait that begins during a stop may
-    be for its end, so it goes on.
+    It leaves time for what a stop itself brings about, such as the end of a motion. A wait that begins during a stop
+    may be for its end, so it goes on.
 
     Args:
         waits_for_rest: the wait is for the arm, so that a stop before it counts as well.
