@@ -27,6 +27,8 @@ from tests.arm.programs import end, script
 from tests.conftest import RunningCabinet
 from tests.interrupts import ctrl_c_interrupts
 
+SPEED = 1.0  # programs are interrupted and stopped at moments of this machine's time
+
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 #: Takes about three seconds.
 FAR = ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
@@ -261,7 +263,7 @@ def test_arrays_are_read_only_and_consistent(arm: Arm) -> None:
 
 
 def test_requests_while_states_stream_and_the_arm_moves(arm: Arm) -> None:
-    arm.subscribe(rate=1000.0)
+    arm.subscribe(rate=500.0)
     handle = arm.start(ptp(HOME + deg(20, 0, 0, 0, 0, 0, 0), speed=0.3))
     for _ in range(300):
         arm.set_override(1.0)

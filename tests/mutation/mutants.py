@@ -40,8 +40,10 @@ _OPERATIONS: dict[type[ast.operator], type[ast.operator]] = {
 }
 _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any", "floor": "ceil", "ceil": "floor"}
 _NAMES |= {"minimum": "maximum", "maximum": "minimum", "sin": "cos", "cos": "sin", "argmin": "argmax"}
-#: Functions whose result is a text for people.
-_TEXTS = {"__repr__", "__str__", "_repr_html_", "__format__"}
+#: Functions whose result is a text or a figure for people.
+_TEXTS = {"__repr__", "__str__", "_repr_html_", "__format__", "markdown", "plot"}
+#: Keyword arguments that change nothing where the program is right: `zip` checks lengths that are equal anyway.
+_IDLE = {"strict", "slots", "frozen"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +134,8 @@ def _expressions(node: ast.AST, function: str) -> Iterator[tuple[str, ast.expr]]
         inside = list(ast.iter_child_nodes(node))
     if isinstance(node, ast.expr):
         yield function, node
+    if isinstance(node, ast.keyword) and node.arg in _IDLE:
+        return
     for one in inside:
         yield from _expressions(one, function)
 

@@ -63,6 +63,7 @@ from heptarm.values.robot import RobotModel
 from heptarm.values.sealed import Sealed
 from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
+from heptarm.values.text import lines
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.values.workspace import Workspace
 from heptarm.wire import messages as wire
@@ -76,6 +77,8 @@ _log = logging.getLogger("heptarm.arm")
 _STREAM_SIZE = 2000
 #: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
 _TOOL_PATIENCE = 5.0
+#: `Arm.speed` of a real robot until a program or its saved target sets another.
+REAL_SPEED = 0.25
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 
 
@@ -103,7 +106,7 @@ class Arm(Sealed):
         self._foresight = Foresight(connection, self._tooling)
         self._io = Io(connection)
         self._pad = Pad(connection)
-        self._speed = 1.0
+        self._speed, self._is_speed_set = 1.0, False
         self._mode: Mode | None = None
         self._breaks: tuple[BreakRule, ...] = ()
         self._name = ""
@@ -115,6 +118,8 @@ class Arm(Sealed):
         atexit.register(self.close)
         link = self._connection
         link.open()
+        if not self._is_speed_set and not self.is_virtual:
+            self._speed = REAL_SPEED
         if control:
             link.take_control()
         if link.options.rate > 0:
@@ -214,6 +219,22 @@ class Arm(Sealed):
         state = "closed" if link.closed.is_set() else "connected" if link.is_connected else "lost"
         name = f"{self._name}: " if self._name else ""
         return f"<Arm {name}{link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
+
+    def __str__(self) -> str:
+        """A few lines: the robot, its connection, and the ceiling of its speed."""
+        link = self._connection
+        if link.closed.is_set() or not link.is_connected:
+            return repr(self)
+        other = f"observing; {self.controller or 'nobody'} is in control"
+        begun = "" if self._is_speed_set or self.is_virtual else ", as every real robot begins"
+        rows = {
+            "name": self._name,
+            "cabinet": f"{self.cabinet}, {'simulated' if self.is_virtual else 'real'}",
+            "robot": self.robot.name,
+            "control": "in control" if link.in_control else other,
+            "speed": f"at most {self._speed:.0%} of each axis' maximum{begun}: arm.speed",
+        }
+        return lines(self.robot.title, rows)
 
     @property
     def name(self) -> str:
@@ -439,13 +460,14 @@ class Arm(Sealed):
     def speed(self) -> float:
         """Ceiling of the speed of all motions sent, a fraction of each axis' maximum in (0, 1].
 
-        A motion's own speed can only be lower.
+        A motion's own speed can only be lower. It begins at that of the saved target, otherwise at 0.25 on a real robot
+        and at 1 on a simulator.
         """
         return self._speed
 
     @speed.setter
     def speed(self, value: float) -> None:
-        self._speed = within(value, "speed", 0.0, 1.0, above=True)
+        self._speed, self._is_speed_set = within(value, "speed", 0.0, 1.0, above=True), True
 
     @property
     def collision_check(self) -> CollisionCheck | None:
@@ -834,7 +856,7 @@ class Arm(Sealed):
         rule = guarding.in_force(self) if settings.get("collision") is None else None
         if rule is not None:
             settings["collision"] = rule[0]
-        request = fri_settings.request(self._connection, kind, **settings)
+        request = fri_settings.request(self._connection, kind, load=self._tooling.load, **settings)
         return Fri(self._connection, request, on_collision=None if rule is None else rule[1])
 
     # -------------------------------------------------------------------------- stop and recover

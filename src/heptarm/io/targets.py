@@ -6,7 +6,7 @@ The file is heptarm/targets.toml in the folder of the user's settings, one table
     address = "172.31.1.147"
     key_file = "~/keys/lab1"     # otherwise the key is looked up as for any address
     tool = "gripper"             # attached when a client takes control
-    speed = 0.3                  # ceiling of the speed
+    speed = 0.3                  # ceiling of the speed; otherwise 0.25 of a real robot, 1 of a simulator
     flange = "touch"             # media flange of the robot
 
 When a target was last used is the time of a file of its name in the folder beside it.
@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import re
 from dataclasses import dataclass
@@ -52,7 +51,7 @@ class SavedTarget:
         address: what to connect to, as in `heptarm.connect`.
         key_file: file with the key; "": the key is looked up elsewhere.
         tool: attached when a client takes control; "": none.
-        speed: ceiling of the speed of all motions, (0, 1].
+        speed: ceiling of the speed of all motions, (0, 1]; None: 0.25 of a real robot, 1 of a simulator.
         flange: media flange of the robot: "plain", "touch", or its height [m]; "": not stated.
     """
 
@@ -60,7 +59,7 @@ class SavedTarget:
     address: str
     key_file: str = ""
     tool: str = ""
-    speed: float = 1.0
+    speed: float | None = None
     flange: str = ""
 
     @property
@@ -162,7 +161,9 @@ def check_target(target: SavedTarget, where: str) -> SavedTarget:
             raise CommandRejected(
                 f"{where}: {key} must have no NUL, got {shown(getattr(target, key))}", parameter=key
             )
-    if isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0:
+    if speed is not None and (
+        isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0
+    ):
         raise CommandRejected(
             f"{where}: speed must be in (0, 1], got {speed!r}",
             parameter="speed",
@@ -199,7 +200,7 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
         for key in ("key_file", "tool", "flange")
         if getattr(target, key)
     ]
-    if not math.isclose(target.speed, 1.0):
+    if target.speed is not None:
         lines.append(f"speed = {float(target.speed)!r}")
     before = _content().rstrip("\n")
     _write((f"{before}\n\n" if before else "") + "\n".join(lines) + "\n")

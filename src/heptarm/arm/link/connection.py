@@ -27,6 +27,7 @@ from heptarm.errors import (
     ConnectFailed,
     ConnectionLost,
     HeptarmError,
+    LimitError,
     LocalProtocolError,
     ModeConflict,
     NotInControl,
@@ -567,10 +568,22 @@ class Connection:
     def subscribe(self, rate: float, groups: Sequence[str]) -> None:
         """Choose what is pushed, now and after a reconnection."""
         chosen = groups_of(groups, self.welcome.groups)
-        within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
+        self._check_rate(rate)
         self.request(wire.Subscribe(groups=chosen, rate=rate))
         self.link.expect_states(rate * self.real_time_factor)
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
+
+    def _check_rate(self, rate: float) -> None:
+        """Refuse a rate of states that the cabinet does not push; raises LimitError."""
+        try:
+            within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
+        except LimitError as error:
+            if error.code == 2 and rate > 0:
+                error.hint = (
+                    "the cabinet's process data heptarm.max_rate is the most that it pushes; for more, up to 1000 Hz, "
+                    'use FRI: arm.fri("monitor")'
+                )
+            raise
 
     def run(self, message: wire.Run | wire.ServoOpen | wire.FriOpen, program: SentProgram) -> None:
         """Send a program, a servo motion or an FRI overlay; from its acceptance on `program` receives its events."""
