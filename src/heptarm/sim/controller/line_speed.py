@@ -162,7 +162,10 @@ class AxisLimits:
         for k in range(len(steps) - 1, -1, -1):
             step, last = steps[k], most[k + 1]
             inverse, then = 1.0 / step, last / step
-            most[k] = min(most[k], last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)))
+            most[k] = min(
+                most[k],
+                last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)),
+            )
             for a, b in zip(rows[k], turns[k], strict=True):
                 if inverse > b:
                     most[k] = min(most[k], (then + a) / (inverse - b))
