@@ -220,11 +220,13 @@ class StraightFollower:
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
         self._inverse = TcpInverseKinematics(robot, here, tcp)
         self._q = here.copy()
+        self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
         self._centre: Quat = tuple(origin.quat.tolist())  # orientation at rest
         self._followed: _Trajectory | None = None
         self._goal: Array | None = None  # that no trajectory leads to yet
-        self._waited = 0.0
+        self._elapsed = 0.0  # since the profile began [s]
+        self._waited = 0.0  # since the last target [s]
         self._stopping = False
         self.resting = 0.0
 
@@ -253,11 +255,14 @@ class StraightFollower:
             self.resting += dt
             return self._q
         otg = one.otg
-        otg.time = one.profile.advanced(otg.time, dt)
+        self._elapsed += dt
+        otg.time = one.profile.at(self._elapsed)[0]
         self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        self._q = self._joints(otg, one.centre, otg.time, self._q)
-        if not (one.profile.is_whole or self._stopping) and otg.time > one.profile.next_look:
-            self._look(one)
+        before, self._q = self._q, self._joints(otg, one.centre, otg.time, self._q)
+        if dt > 0.0:
+            self._speed = (self._q - before) / dt
+        if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
+            self._go_on(one, rate=one.profile.at(self._elapsed)[1])
         return self._q
 
     def brake(self, *, scale: float, rate: float) -> None:
@@ -279,14 +284,12 @@ class StraightFollower:
         otg = self._new_trajectory()
         otg.limit(acceleration, jerk)
         centre = self._turned(turn)
-        if otg.halt((_unrotated(place), along, by)) and self._follow(otg, centre):
+        if otg.halt((_unrotated(place), along, by)) and self._follow(otg, centre, scale=scale):
             return
         # the axes cannot brake that hard: as soon as they can, on the trajectory they follow
-        now = one.profile.at(one.otg.time)[0] * scale
+        now = one.profile.at(self._elapsed)[1] * scale
         for horizon in _STOPS:
-            profile = self._profile(one.otg, one.centre, rate=now, horizon=horizon)
-            if profile is not None:
-                self._followed = replace(one, profile=profile)
+            if self._go_on(one, rate=now, horizon=horizon):
                 return
 
     @property
@@ -314,19 +317,26 @@ class StraightFollower:
         minimum = self._limits.timing.min_trajectory_time
         return otg.aim(start, target, speed=np.zeros(6), minimum=minimum) and self._follow(otg, centre)
 
-    def _follow(self, otg: OnlineTrajectory, centre: Quat) -> bool:
-        """Follow a trajectory from its start; False: the axes could not brake on it."""
+    def _follow(self, otg: OnlineTrajectory, centre: Quat, *, scale: float = 1.0) -> bool:
+        """Follow a trajectory from its start; False: the axes could not brake on it, or not get on to it."""
         profile = self._profile(otg, centre, rate=1.0)
         if profile is None:
             return False
-        self._followed, self.resting = _Trajectory(otg, centre, profile), 0.0
+        ahead = [self._q]
+        for elapsed in profile.first_ticks:
+            ahead.append(self._joints(otg, centre, profile.at(elapsed)[0], ahead[-1]))
+        if not self._axes.joins(scale * self._speed, *ahead):
+            return False
+        self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
         return True
 
-    def _look(self, one: _Trajectory) -> None:
-        """Look farther ahead; where that shows nothing better, the arm comes to rest where it was to."""
-        profile = self._profile(one.otg, one.centre, rate=one.profile.at(one.otg.time)[0])
-        if profile is not None:
-            self._followed = replace(one, profile=profile)
+    def _go_on(self, one: _Trajectory, *, rate: float, horizon: float = HORIZON) -> bool:
+        """Look farther ahead; False: that shows nothing better, so the arm comes to rest where it was to."""
+        profile = self._profile(one.otg, one.centre, rate=rate, horizon=horizon)
+        if profile is None:
+            return False
+        self._followed, self._elapsed = replace(one, profile=profile), 0.0
+        return True
 
     def _profile(
         self, otg: OnlineTrajectory, centre: Quat, *, rate: float, horizon: float = HORIZON
@@ -373,7 +383,7 @@ class StraightFollower:
         else:
             low, high = max(0.0, time - _STEP), time + _STEP
             change = (_spin(otg, high) - _spin(otg, low)) / (high - low)
-        rate, growth = one.profile.at(time)
+        rate, growth = one.profile.at(self._elapsed)[1], one.profile.change(self._elapsed)
         speed = np.concatenate([v[:3], _spin(otg, time)])
         change = rate * rate * np.concatenate([a[:3], change]) + growth * speed
         speed = rate * speed
