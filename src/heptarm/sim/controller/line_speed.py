@@ -82,7 +82,7 @@ class RateProfile:
     @property
     def first_ticks(self) -> list[float]:
         """Moments at which the set-points show whether the axes can get on to the trajectory [s]: more where it is slowed."""
-        slowed = self.at(_CHECKED * TICK)[1] < 1.0
+        slowed = any(abs(self.at(moment)[1] - 1.0) > _TINY for moment in (TICK, _CHECKED * TICK))
         return [TICK * (1 + k) for k in range(_CHECKED if slowed else 2)]
 
     def change(self, elapsed: float) -> float:
@@ -108,7 +108,7 @@ class AxisLimits:
 
     def __init__(self, robot: RobotModel) -> None:
         self._velocity, self._acceleration = _SPEED * robot.dq_max, _GRIP * robot.ddq_max
-        self._hardest = robot.ddq_max
+        self._fastest, self._hardest = robot.dq_max, robot.ddq_max
         self._low, self._high = robot.q_min + NEAREST, robot.q_max - NEAREST
 
     def joins(self, speed: Array, *q: Array) -> bool:
@@ -120,7 +120,7 @@ class AxisLimits:
         """
         speeds = np.diff(np.array(q), axis=0) / TICK
         changes = np.diff(np.vstack([speed, speeds]), axis=0) / TICK
-        return bool((np.abs(changes) <= self._hardest).all())
+        return bool((np.abs(changes) <= self._hardest).all() and (np.abs(speeds) <= self._fastest).all())
 
     def profile(
         self,
@@ -160,10 +160,10 @@ class AxisLimits:
         first[0] = slopes[0] - 0.5 * gaps[0] * second[0]
         first[-1] = slopes[-1] + 0.5 * gaps[-1] * second[-1]
         rests = samples.is_open or samples.is_blocked
-        squares = self._fastest(first, second, gaps, rate * rate, 0.0 if rests else 1.0)
+        squares = self._greatest(first, second, gaps, rate * rate, 0.0 if rests else 1.0)
         return None if squares is None else RateProfile(samples.times, squares, is_whole=not samples.is_open)
 
-    def _fastest(
+    def _greatest(
         self, first: Array, second: Array, gaps: Array, begin: float, end: float
     ) -> list[float] | None:
         """Squares of the rate at the samples; None: there is no profile from the first one.
@@ -205,8 +205,11 @@ class AxisLimits:
             for a, b in zip(rows[k + 1], turns[k + 1], strict=True):
                 if (share := 1.0 + b * step) > 0.0:
                     gain, loss = min(gain, (a - b * z) / share), max(loss, (-a - b * z) / share)
-            squares.append(max(0.0, z + step * loss, min(most[k + 1], z + step * gain)))
-        return squares if squares[-1] <= end + _AT_REST else None
+            then = max(0.0, z + step * loss, min(most[k + 1], z + step * gain))
+            if then > most[k + 1] * _ROUNDING + _AT_REST:
+                return None
+            squares.append(then)
+        return squares
 
     # ---------------------------------------------------------------------------------- sampling
 
