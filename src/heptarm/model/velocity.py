@@ -1,8 +1,9 @@
 """Joint velocities of a stream of velocities: twists to joints, and every limit on the way to positions.
 
-Twists become joint velocities by damped least squares, and an `ElbowTask` uses the redundant joint. `VelocityPath` integrates velocities to positions, so that no
-joint is too fast, accelerates too hard, or cannot brake before its limit; where it has to be slower than commanded, the
-direction stays and a `Slowdown` has the reason. Without arm, loop or clock.
+Twists become joint velocities by damped least squares, and an `ElbowTask` uses the redundant joint. `VelocityPath`
+integrates velocities to positions, so that no joint is too fast, accelerates too hard, or cannot brake before its
+limit; where it has to be slower than commanded, the direction stays and a `Slowdown` has the reason. Poses become joint
+positions in the same manner. Without arm, loop or clock.
 """
 
 from __future__ import annotations
@@ -29,12 +30,14 @@ ELBOWS: tuple[Elbow, ...] = ("keep", "center")
 _SINGULAR, _DAMPING = 0.08, 0.1
 #: Below it the motion of the elbow is not determined.
 _UNDEFINED = 1e-4
-#: The elbow comes to where it is to be by this fraction of what is left per time [1/s], with "keep" at most so many times
-#: as fast as the fastest joint.
+#: The elbow comes to where it is to be by this fraction of what is left per time [1/s], with "keep" at most so many
+#: times as fast as the fastest joint.
 _GAIN, _BACK = 4.0, 1.0
-#: Derivative of the arm angle by a motion of the joints below which it is damped, and the step of difference quotients [rad].
+#: Derivative of the arm angle by a motion of the joints below which it is damped, and the step of difference quotients
+#: [rad].
 _FLAT, _STEP = 0.1, 1e-6
-#: Of a pose: most steps of the elbow, the smallest one [rad], and the joint movement per step that shows that it led astray.
+#: Of a pose: most steps of the elbow, the smallest one [rad], and the joint movement per step that shows that it led
+#: astray.
 _ROUNDS, _STILL, _ASTRAY = 3, 1e-7, 3.0
 #: Largest place of a joint in its range, -1 to 1, at which the distance to the limits counts.
 _BRINK = 0.999
@@ -78,8 +81,8 @@ class ElbowTask:
         robot: the robot.
         q: joint positions at the start of the stream, shape (7,) [rad].
         elbow: "keep": the arm angle stays that of the start; "center": the joints stay away from their limits.
-        posture: the joints stay as near as they can to these positions, shape (7,) [rad]; None: no posture. It takes the
-            place of `elbow`.
+        posture: the joints stay as near as they can to these positions, shape (7,) [rad]; None: no posture. It takes
+            the place of `elbow`.
     """
 
     def __init__(
@@ -124,7 +127,8 @@ class ElbowTask:
         """Distance along a motion to the posture, or to the middle of the joints' ranges [rad]: a step of Newton's."""
         if self._posture is not None:
             return float(null @ (self._posture - q))
-        # sum of 1 / (1 - x²): Chan and Dubey, "A weighted least-norm solution based scheme for avoiding joint limits", 1995
+        # sum of 1 / (1 - x²): Chan and Dubey, "A weighted least-norm solution based scheme for avoiding joint limits
+        # for redundant joint manipulators", 1995
         x = np.clip((q - self._middle) / self._half, -_BRINK, _BRINK)
         room = 1.0 - x * x
         slope = 2.0 * x / (room**2 * self._half)
@@ -205,9 +209,9 @@ def resolved_twist(
     """Joint velocities for a twist at the end of a path, and how much of the twist they achieve.
 
     Those of `joint_velocity`, and a motion in the null space of the Jacobian: the elbow follows its task as far as no
-    joint slows the twist down, and helps where one would, near a limit of its position or of its speed (after Flacco, De
-    Luca and Khatib, "Control of redundant robots under hard joint constraints: saturation in the null space", 2015, with
-    one redundant joint).
+    joint slows the twist down, and helps where one would, near a limit of its position or of its speed (after Flacco,
+    De Luca and Khatib, "Control of redundant robots under hard joint constraints: saturation in the null space", 2015,
+    with one redundant joint).
 
     Args:
         robot: the robot.

@@ -1,8 +1,8 @@
 """How fast a trajectory of the tool frame may be followed, so that every axis stays within its limits.
 
 A trajectory over its own time is sampled ahead. The largest rate of that time, 1 at most, is found by reachability
-analysis (Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", 2018): it
-brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before the path ends.
+analysis (Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", 2018):
+it brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before the path ends.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import sqrt, tau
+from math import tau
 from operator import le
 
 import numpy as np
@@ -21,16 +21,16 @@ from heptarm.planning.command import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
-#: How far ahead a trajectory is looked at, in its own time, and the time between two samples where it is straight [s]; and
-#: the part of what was seen after which it is looked at again.
+#: How far ahead a trajectory is looked at, in its own time, and the time between two samples where it is straight [s];
+#: and the part of what was seen after which it is looked at again.
 HORIZON, _APART, _LOOK = 0.35, 0.07, 0.3
 #: Most samples: where more are needed, an axis is so slow that it needs to look less far ahead.
 _MOST = 80
 #: The same at the start, where the arm moves already.
 _FIRST = 1e-3
-#: Samples are so dense that the joints between two are near to the line between them: squares of twice the distance [rad²],
-#: and of its ratio to the step, which does not count below a smallest distance ...
-_BENT, _SLANT, _STILL = 1e-3**2, 0.05**2, 2e-5**2
+#: Samples are so dense that the joints between two are near to the line between them: squares of twice the distance
+#: [rad²], and of its ratio to the step, which does not count below a smallest distance ...
+_BENT, _SLANT, _STILL = 1e-3**2, 0.05**2, 3e-6**2
 #: ... unless they would be nearer than this [s]: there the joints jump.
 _LEAST = 1e-6
 #: Fractions of an axis' speed and acceleration that are planned with; the rest is for what is between two samples.
@@ -81,7 +81,7 @@ class RateProfile:
 
     @property
     def first_ticks(self) -> list[float]:
-        """Moments at which the set-points show whether the axes can get on to the trajectory [s]: more where it is slowed."""
+        """Moments at which set-points show whether the axes can get on to the trajectory [s]: more where it is slowed."""
         slowed = any(abs(self.at(moment)[1] - 1.0) > _TINY for moment in (TICK, _CHECKED * TICK))
         return [TICK * (1 + k) for k in range(_CHECKED if slowed else 2)]
 
@@ -188,7 +188,10 @@ class AxisLimits:
         for k in range(len(steps) - 1, -1, -1):
             step, last = steps[k], most[k + 1]
             inverse, then = 1.0 / step, last / step
-            most[k] = min(most[k], last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)))
+            most[k] = min(
+                most[k],
+                last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)),
+            )
             for a, b in zip(rows[k], turns[k], strict=True):
                 if inverse > b:
                     most[k] = min(most[k], (then + a) / (inverse - b))

@@ -200,8 +200,8 @@ class _Trajectory:
 class StraightFollower:
     """Follows poses of the tool frame on straight lines, as fast as the axes can.
 
-    A trajectory is taken up only if all axes can brake on it before a limit; until then the last one goes on, which ends
-    at rest.
+    A trajectory is taken up only if all axes can brake on it before a limit; until then the last one goes on, which
+    ends at rest.
 
     Args:
         robot: the robot.
@@ -296,9 +296,7 @@ class StraightFollower:
     def is_still(self) -> bool:
         """Whether a braked motion has come to rest."""
         one = self._followed
-        return self._stopping and (
-            one is None or one.otg.over >= 0.0 or one.otg.time >= one.profile.times[-1]
-        )
+        return self._stopping and (one is None or self._elapsed >= one.profile.duration)
 
     # ------------------------------------------------------------------------- trajectories ahead
 
@@ -468,13 +466,32 @@ class ServoLimits:
         velocity: largest speed of each axis, shape (7,) [rad/s].
         acceleration: shape (7,) [rad/s²].
         jerk: shape (7,) [rad/s³].
+        lowest: positions, shape (7,) [rad].
+        highest: likewise.
         timing: times of the motion.
     """
 
     velocity: Array
     acceleration: Array
     jerk: Array
+    lowest: Array
+    highest: Array
     timing: ServoTiming
+
+    def bounded(self, q: Array, dq: Array, later: float) -> Array:
+        """Velocities with which every axis comes to rest before the limits of its position, shape (7,) [rad/s].
+
+        Args:
+            q: positions, shape (7,) [rad].
+            dq: wanted velocities, shape (7,) [rad/s].
+            later: time after which it brakes [s].
+        """
+        # from v at no acceleration it takes at most v² / 2 a + v a / 2 j
+        late = self.acceleration * later + self.acceleration**2 / (2.0 * self.jerk)
+        room = np.maximum(np.where(dq > 0.0, self.highest - q, q - self.lowest), 0.0)
+        most = np.minimum(MARGIN * self.velocity, np.sqrt(late**2 + 2.0 * self.acceleration * room) - late)
+        bounded: Array = np.clip(dq, -most, most)
+        return bounded
 
     @staticmethod
     def of(
@@ -489,6 +506,8 @@ class ServoLimits:
             np.array(velocity) * robot.dq_max,
             np.array(acceleration) * robot.ddq_max,
             np.array(acceleration) * robot.dddq_max,
+            robot.q_min,
+            robot.q_max,
             timing,
         )
 
@@ -530,11 +549,7 @@ class SmartFollower:
         if self._stopping:
             return
         self._goal = q, dq
-        pass_at = (
-            np.zeros(7)
-            if dq is None
-            else np.clip(dq, -MARGIN * self._limits.velocity, MARGIN * self._limits.velocity)
-        )
+        pass_at = np.zeros(7) if dq is None else self._limits.bounded(q, dq, 4.0 * TICK)
         if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._limits.timing.min_trajectory_time):
             self._passes = bool(pass_at.any())
             self.resting = 0.0
@@ -547,7 +562,7 @@ class SmartFollower:
         self._otg.time += dt
         over = self._otg.over
         if over >= 0.0:
-            if self._passes and over > self._limits.timing.speed_timeout:
+            if self._passes and (over > self._limits.timing.speed_timeout or self._nears_limit()):
                 self._halt(self._state())
             elif not self._passes:
                 self.resting = over
@@ -579,6 +594,11 @@ class SmartFollower:
         otg = OnlineTrajectory(7, synchronization=Synchronization.Time, halting=Synchronization.No)
         otg.limit(self._limits.acceleration, self._limits.jerk, velocity=self._limits.velocity)
         return otg
+
+    def _nears_limit(self) -> bool:
+        """Whether an axis has to brake now, since it passed its target with a velocity."""
+        q, dq, _ = self._state()
+        return bool((np.abs(self._limits.bounded(q, dq, 2.0 * TICK)) < np.abs(dq) - _TINY).any())
 
     def _halt(self, state: OtgState) -> None:
         self._passes = False
@@ -663,7 +683,9 @@ class AxisStop:
     """
 
     def __init__(self, robot: RobotModel, here: Array, speed: Array, *, jerk: float) -> None:
-        limits = ServoLimits(robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, DEFAULT_TIMING)
+        limits = ServoLimits(
+            robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, DEFAULT_TIMING
+        )
         self._stop = SmartFollower(limits, here)
         self._stop.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
 
