@@ -230,6 +230,8 @@ struct loop {
     double low[7], high[7], top_v[7], top_a[7], top_j[7], near[7], dq_max[7], ddq_max[7], dddq_max[7], tau_max[7], tau_step[7];
     double wrench_max[6], wrench_step[6];
     double reach, step;
+    word *torque_guard;
+    double tau_sent[7];
     word has_chain, has_map;
     double chain[24];
     double posture[7];
@@ -245,7 +247,7 @@ struct loop {
     double out_wrench[6];
     double out_pose[7];
     double out_e1;
-    word *law, *params, *memory, *memory_written, *law_buffer;
+    word *law, *params, *params_target, *params_rates, *memory, *memory_written, *law_buffer;
     word *params_ring, *memory_ring, *memory_set_ring;
     word params_size, memory_size, params_seen, memory_seen;
     word law_success, law_status, law_code, law_reported, law_late, law_not_finite;

@@ -22,6 +22,7 @@
 #include "kinematics.h"
 #include "limited_steps.h"
 #include "fri_layout.h"
+#include "torque_guard.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
 /* Place of an array of a state in t_arrays, and its bit in t_known. */
@@ -392,6 +393,12 @@ static void slew(struct loop *l, double *last, const double *target, const doubl
     }
 }
 
+void hf_start_torque_guard(struct torque_guard *guard) { start_torque_guard(guard); }
+
+int hf_guard_torques(struct torque_guard *guard, const double *q, const double *dq, double dt, int is_braking, double *tau) {
+    return guard_torques(guard, q, dq, dt, is_braking, tau);
+}
+
 /* ----------------------------------------------------------------------------------------------------- fallback */
 
 static void take_command(struct loop *l) {
@@ -542,16 +549,30 @@ static int write_command(struct loop *l, const double *q, const double *tau, con
 
 static const double zeros[AXES];
 
+/* Limit target torques by size and rate, then by the motion to which they lead. */
+static void torque(struct loop *l, const double *target, int is_braking) {
+    static const struct { int bit, kind; } parts[] = {
+        {GUARD_SPEED_BIT, LIMITED_VELOCITY}, {GUARD_POSITION_BIT, LIMITED_POSITION}, {GUARD_TORQUE_BIT, LIMITED_TORQUE}};
+    struct torque_guard *guard = (struct torque_guard *)l->torque_guard;
+    slew(l, l->tau, target, l->tau_max, l->tau_step, AXES, LIMITED_TORQUE);
+    memcpy(l->tau_sent, l->tau, sizeof l->tau_sent);
+    if (!guard) return;
+    int found = guard_torques(guard, ARRAY(S_Q), l->dq, l->step, is_braking, l->tau_sent);
+    for (int part = 0; part < 3 && found; part++)
+        for (int i = 0; i < AXES; i++)
+            if (found >> (parts[part].bit + i) & 1) limited(l, parts[part].kind, i, guard->asked[i], guard->allowed[i]);
+}
+
 static int command(struct loop *l, const double *target, const double *tau, const double *wrench) {
     const double *ipo = ARRAY(S_Q_IPO);
     if (!target) l->t_flags |= BRAKING;
     position(l, target, isinf(l->reach) ? NULL : ipo);
-    if (l->mode == TORQUE) slew(l, l->tau, tau, l->tau_max, l->tau_step, AXES, LIMITED_TORQUE);
+    if (l->mode == TORQUE) torque(l, tau, !target);
     if (l->mode == WRENCH) slew(l, l->wrench, wrench, l->wrench_max, l->wrench_step, 6, LIMITED_WRENCH);
     l->header[H_COUNTS + COUNT_LIMITED] += (l->t_flags & LIMITED) != 0;
     l->header[H_COUNTS + COUNT_FILLED] += (l->t_flags & FILLED) != 0;
     l->header[H_COUNTS + COUNT_COMMANDED]++;
-    return write_command(l, l->q, l->mode == TORQUE ? l->tau : NULL, l->mode == WRENCH ? l->wrench : NULL);
+    return write_command(l, l->q, l->mode == TORQUE ? l->tau_sent : NULL, l->mode == WRENCH ? l->wrench : NULL);
 }
 
 /* ----------------------------------------------------------------------------------------------------- a turn */
@@ -592,7 +613,7 @@ static void fill_state(struct loop *l, word *slot) {
     numbers[S_E1] = l->t_e1;
     for (int i = 0; i < AXES; i++) {
         numbers[S_Q_SENT + i] = active && l->t_answer ? l->q[i] : NAN;
-        numbers[S_TAU_SENT + i] = active && l->t_answer && l->mode == TORQUE ? l->tau[i] : NAN;
+        numbers[S_TAU_SENT + i] = active && l->t_answer && l->mode == TORQUE ? l->tau_sent[i] : NAN;
         if (i < 6) numbers[S_WRENCH_SENT + i] = active && l->t_answer && l->mode == WRENCH ? l->wrench[i] : NAN;
     }
     for (int i = S_POSE_IPO; i < S_IO; i++) numbers[i] = NAN; /* Python handles sessions that command poses */
@@ -661,11 +682,24 @@ static int take_slot(const word *ring, word count, word slots, word size, word *
     return 1;
 }
 
-static void take_parameters(struct loop *l) {
+/* Let parameters follow their targets for a cycle of `dt` seconds, each by its largest change in a second; one that is or becomes
+   NaN or infinite changes at once. */
+void hf_follow(double *values, const double *targets, const double *rates, word count, double dt) {
+    for (word i = 0; i < count; i++) {
+        double step = rates[i] * dt, apart = targets[i] - values[i];
+        values[i] = isfinite(apart) && fabs(apart) > step ? values[i] + copysign(step, apart) : targets[i];
+    }
+}
+
+static void take_parameters(struct loop *l, double dt) {
     double *copy = (double *)l->law_buffer;
-    word size = l->params_size, many = l->memory_size;
+    word size = l->params_size, many = l->memory_size, before = l->params_seen;
     word count = __atomic_load_n(&l->header[H_PARAMS], __ATOMIC_ACQUIRE);
-    if (take_slot(l->params_ring, count, PARAM_SLOTS, size, &l->params_seen, copy)) memcpy(l->params, copy, 8 * (size_t)size);
+    if (take_slot(l->params_ring, count, PARAM_SLOTS, size, &l->params_seen, copy)) {
+        memcpy(l->params_target, copy, 8 * (size_t)size);
+        if (!before) memcpy(l->params, copy, 8 * (size_t)size);
+    }
+    hf_follow((double *)l->params, (double *)l->params_target, (double *)l->params_rates, size, dt);
     count = __atomic_load_n(&l->header[H_MEMORY_SET], __ATOMIC_ACQUIRE);
     if (!take_slot(l->memory_set_ring, count, MEMORY_SLOTS, 2 * many, &l->memory_seen, copy)) return;
     for (word i = 0; i < many; i++) {
@@ -731,8 +765,8 @@ static int failed(struct loop *l, int status, word code) {
 int hf_law(struct loop *l, const word *slot) {
     struct heptarm_state state;
     struct itimerspec limit = {.it_value = {.tv_sec = LAW_CUT / 1000000000LL, .tv_nsec = LAW_CUT % 1000000000LL}};
-    take_parameters(l);
     law_state(l, slot, &state);
+    take_parameters(l, state.dt);
     word budget = (word)(l->law_fraction * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
     int number = sigsetjmp(law_exit, 0);
     if (number) return failed(l, number == TIME_IS_UP ? LAW_ENDLESS : LAW_CRASHED, number);
@@ -968,7 +1002,7 @@ int hf_warm_up(struct loop *l, int size) {
     if (copy->law) {
         copy->law = (word *)no_law;
         copy->memory_ring = spare.memory;
-        copy->memory_size = 0;
+        copy->memory_size = copy->params_size = 0;
         copy->params_seen = copy->header[H_PARAMS];
         copy->memory_seen = copy->header[H_MEMORY_SET];
     }

@@ -126,7 +126,7 @@ def _bench(law: object, params: dict[str, object], memory: dict[str, object]) ->
         native = Native(twins.pure.cycle)
         address, kept = law.load({}, schema)
         for one in (native, twins.native):
-            one.set_law(address, kept, success=law.success)
+            one.set_law(address, kept, success=law.success, rates=np.inf)
     else:
         twins.native = Native(twins.other.cycle)
         memory_of = twins.native.memory

@@ -13,7 +13,7 @@ from typing import NoReturn
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model import inverse_kinematics
+from heptarm.model.inverse_kinematics import PathInverse, solve
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import Order, PlanError
 from heptarm.planning.composite_path import SegmentLimits, check_limits
@@ -74,7 +74,7 @@ def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
         assert order.pose is not None
         e1, status, _ = order.redundancy
         try:
-            target = inverse_kinematics.solve(
+            target = solve(
                 robot,
                 _pose(order.pose) @ _pose(order.tcp).inverse(),
                 e1=None if isnan(e1) else e1,
@@ -132,15 +132,12 @@ def _joint_orientation(robot: RobotModel, order: Order, start: Array, target: Po
     """The orientation as a PTP to the target would turn it."""
     tcp = _pose(order.tcp)
     e1, _, _ = order.redundancy
-    own = inverse_kinematics.redundancy(robot, start.tolist())
-    r, p = inverse_kinematics.rows(target @ tcp.inverse())
+    place = target @ tcp.inverse()
     try:
-        end = inverse_kinematics.raw(
-            robot, r, p, own.e1 if isnan(e1) else e1, own.status, start.tolist(), continuous=True
-        )
+        end = PathInverse(robot, Pose()).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
-    return JointOrientation(robot, start, np.array(end), tcp.quat)
+    return JointOrientation(robot, start, end, tcp.quat)
 
 
 def cartesian_path(robot: RobotModel, order: Order, start: Array) -> CartesianPath:

@@ -15,7 +15,8 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop.client import Client, check_settings
 from heptarm.fri.loop.compiled import CompiledLaw
-from heptarm.fri.loop.law_interface import Given, Memory
+from heptarm.fri.loop.law_interface import Given, Initial, Memory
+from heptarm.fri.loop.parameters import merged
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
@@ -26,6 +27,7 @@ from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.robot import Body
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
@@ -64,7 +66,7 @@ class FriKeywords(TypedDict, total=False):
     multiplier: int
     mode: Mode | None
     law: Law | None
-    params: Mapping[str, Given] | None
+    params: Mapping[str, Initial] | None
     memory: Mapping[str, Given] | None
     collision: CollisionGuard | None
     policy: Policy | None
@@ -102,11 +104,12 @@ def request(
     connection: Connection,
     kind: str,
     *,
+    load: Body | None = None,
     period_ms: int | None = None,
     multiplier: int = 1,
     mode: Mode | None = None,
     law: Law | None = None,
-    params: Mapping[str, Given] | None = None,
+    params: Mapping[str, Initial] | None = None,
     memory: Mapping[str, Given] | None = None,
     collision: CollisionGuard | None = None,
     policy: Policy | None = None,
@@ -123,6 +126,11 @@ def request(
     timeout: float = 10.0,
 ) -> FriRequest:
     """Check the keywords of `Arm.fri` and turn them into a request.
+
+    Args:
+        connection: to the cabinet.
+        kind: the commanded quantity, or "monitor".
+        load: on the flange, as far as it is known.
 
     Raises:
         CommandRejected: this cabinet does not support such a session.
@@ -163,6 +171,8 @@ def request(
         cpu=cpu,
         busy_poll=busy_poll,
     )
+    if isinstance(law, CompiledLaw):
+        merged(law.parameters(connection.robot), params)  # raises for a value outside its range
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,
@@ -182,6 +192,7 @@ def request(
                 host=address,
                 version=version,
                 model=connection.robot,
+                load=load,
                 limits=limits,
                 pose_limits=pose_limits,
                 policy=policy,

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -118,6 +119,7 @@ class JogServo(Servo):
     #: Numbers of a command, and the name of its parameter.
     size = 7
     name = "dq"
+    timeout: Final[float]
 
     def __init__(self, connection: Connection, terms: StreamTerms, limits: JogLimits) -> None:
         super().__init__(connection, terms)

@@ -9,7 +9,7 @@ from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from math import nan
 from operator import le
-from typing import Any, Literal, TypedDict, TypeVar
+from typing import Any, Final, Literal, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -491,6 +491,8 @@ class Servo(Block):
     """
 
     what = "servo motion"
+    period: Final[float]
+    watchdog: Final[float]
 
     def __init__(self, connection: Connection, terms: StreamTerms) -> None:
         self.period = terms.period

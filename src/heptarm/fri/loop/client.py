@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from types import TracebackType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,20 +28,23 @@ from heptarm.fri.loop import process
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.cycle import Law
-from heptarm.fri.loop.law_interface import Given, LiveMemory, flat
+from heptarm.fri.loop.law_interface import Given, Initial, LiveMemory, flat
 from heptarm.fri.loop.law_limit import LawWatch
+from heptarm.fri.loop.parameters import merged, rates
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
 from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
-from heptarm.values.robot import RobotModel, robot
+from heptarm.values.robot import Body, RobotModel, robot
+from heptarm.values.sealed import Sealed
 
 #: Default UDP port of FRI.
 PORT = 30200
@@ -61,7 +64,7 @@ def check_settings(
     pose_limits: PoseLimits | None,
     policy: Policy | None,
     law: Law | CompiledLaw | None,
-    params: Mapping[str, Given] | None,
+    params: Mapping[str, Initial] | None,
     memory: Mapping[str, Given] | None,
     collision: CollisionGuard | None,
     history: int,
@@ -109,7 +112,7 @@ def check_settings(
     within(busy_poll, "busy_poll", 0.0, BUSY_POLL, unit="s")
 
 
-class Client(Reader):
+class Client(Sealed, Reader):
     """Client that answers a controller from a separate process; close it, or use it in a `with` block.
 
     It works over any number of sessions: the application of the cabinet may end and start again.
@@ -120,13 +123,14 @@ class Client(Reader):
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
+        load: on the flange, for the guard of torques, which computes with the robot's inertia; None: none.
         limits: limits of joint commands; None for limits slightly inside the robot's.
         pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
         policy: behaviour without fresh commands.
         law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in every cycle
             of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the native loop
             calls it. None: commands come from `command`.
-        params: parameters of the law, numbers and arrays by name.
+        params: parameters of the law, numbers and arrays by name, or declarations with `heptarm.param`.
         memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
         collision: bands of the external torques; at a torque outside its band the arm brakes at once, and the client
             commands nothing more: `collision` names the joint. None: no such bands.
@@ -149,6 +153,11 @@ class Client(Reader):
         CommandRejected: an argument is outside its range, or the law cannot be compiled or loaded.
     """
 
+    params: Final[Params]
+    memory: Final[LiveMemory]
+    port: Final[int]
+    model: Final[RobotModel]
+
     def __init__(
         self,
         port: int = PORT,
@@ -157,11 +166,12 @@ class Client(Reader):
         remote: str | None = None,
         version: str | None = None,
         model: str | RobotModel = "iiwa14",
+        load: Body | None = None,
         limits: Limits | None = None,
         pose_limits: PoseLimits | None = None,
         policy: Policy | None = None,
         law: Law | CompiledLaw | None = None,
-        params: Mapping[str, Given] | None = None,
+        params: Mapping[str, Initial] | None = None,
         memory: Mapping[str, Given] | None = None,
         collision: CollisionGuard | None = None,
         history: int = 2048,
@@ -191,13 +201,15 @@ class Client(Reader):
                 instance(address, str, what)
         within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
+        if load is not None:
+            instance(load, Body, "load")
         self.model = arm
         self._limits = limits or Limits.of(arm)
         name = process.importable(law)
         sent = b"" if law is None or name else process.by_value(law)
-        known: Mapping[str, Given] = law.parameters(arm) if isinstance(law, CompiledLaw) else {}
-        values, schema = Params.flat({**known, **(params or {})})
-        known = law.memory if isinstance(law, CompiledLaw) else {}
+        declared = merged(law.parameters(arm) if isinstance(law, CompiledLaw) else {}, params)
+        values, schema = Params.flat(declared)
+        known: Mapping[str, Given] = law.memory if isinstance(law, CompiledLaw) else {}
         remembered, kept = flat({**known, **(memory or {})}, "memory")
         wire = None if version is None else Version.of(version).value
         self._values = values
@@ -216,11 +228,13 @@ class Client(Reader):
                     "limits": asdict(self._limits),
                     "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
                     "chain": chain_of(arm),
+                    "links": rigid_bodies(arm, load, rotor=ROTOR).tolist(),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "collision": None if collision is None else as_numbers(collision),
                     "law": name,
                     "params": schema,
+                    "rates": rates(declared).tolist(),
                     "memory": kept,
                     "remembered": remembered.tolist(),
                     "size": values.size,
@@ -231,7 +245,7 @@ class Client(Reader):
                 }
             )
         )
-        self.params = Params(values, schema, changed=self._send_params)
+        self.params = Params(values, schema, changed=self._send_params, declared=declared)
         self._send_params()
         self.memory = LiveMemory(
             remembered, kept, newest=self._newest_memory, write=self._layout.memory_set.write

@@ -20,9 +20,11 @@ from heptarm.fri.guard.fallback import CommandFallback, Policy
 from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
 from heptarm.fri.guard.joint_guard import JointGuard, Limits
 from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
+from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.law_limit import EndlessLaw, LawLimit
+from heptarm.fri.loop.parameters import Follower
 from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import WrenchEstimator, posture
@@ -391,13 +393,15 @@ class Cycle:
         positions: position limits of the robot [rad], see `Session`.
         estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
         watch: detects collisions, at which the arm brakes; None: nothing does.
+        rates: largest changes of the parameters in a second; None: they change at once.
+        links: `rigid_bodies` of the robot, for the guard of torques; None: torques are limited in size and rate only.
 
     Attributes:
         memory_values: words of the law's memory.
         is_compiled: whether the native part calls the law.
         limit: interrupts a law in Python that does not return; None: nothing does.
         q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, pose_commander, fallback, exchange, record, law, estimator, watch: its parts.
+        layout, session, guard, torque_guard, pose_commander, fallback, exchange, record, law, estimator, watch: its parts.
         failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
         mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
@@ -421,6 +425,8 @@ class Cycle:
         positions: Positions | None = None,
         estimator: WrenchEstimator | None = None,
         watch: CollisionWatch | None = None,
+        rates: Floats | None = None,
+        links: Sequence[float] | None = None,
     ) -> None:
         self.layout = layout
         self.failure = ""
@@ -431,11 +437,18 @@ class Cycle:
             positions=positions,
         )
         self.guard = JointGuard(limits)
+        self.torque_guard: TorqueGuard | None = None
+        if links is not None:
+            self.torque_guard = TorqueGuard(limits, links, report=self.guard.report)
         self.pose_commander = PoseCommander(pose_limits or PoseLimits())
         self.fallback = CommandFallback(policy)
         self.is_ending = False
         self.law = law
         self._params = params
+        self._follower: Follower | None = None
+        if params is not None:
+            most = np.full(len(params.words), np.inf) if rates is None else rates
+            self._follower = Follower(params.words, most)
         self._param_tick = -1
         self._memory = memory
         self.memory_values: Floats = np.zeros(0) if memory_values is None else memory_values
@@ -652,6 +665,8 @@ class Cycle:
                     guard.start(self.mirrored[0], self.slope, period=period)
                 elif sample.q_ipo is not None:  # the client connected after commanding had started
                     guard.start(sample.q_ipo, _ZEROS7, period=period)
+                if self.torque_guard is not None:
+                    self.torque_guard.start()
                 self.fallback.start()
                 record.ticks = -1
                 # a command given just before the start counts, an older one does not
@@ -729,11 +744,22 @@ class Cycle:
         q = tuple(guard.position(target, reach))
         mode = self.session.mode
         limited |= guard.was_limited
-        sent_tau = tuple(guard.torque(tau or _ZEROS7)) if mode is m.CommandMode.TORQUE else None
+        sent_tau = self._torques(sample, tau or _ZEROS7) if mode is m.CommandMode.TORQUE else None
         sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
         guard.was_limited |= limited
         self.record.sent = Sent(q, sent_tau or NAN7, sent_wrench or NAN6)
         return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
+
+    def _torques(self, sample: Sample, target: Sequence[float]) -> tuple[float, ...]:
+        """Limit target torques; while the arm brakes, they bring it to rest."""
+        guard, by_motion = self.guard, self.torque_guard
+        tau: Sequence[float] = guard.torque(target)
+        if by_motion is not None:
+            is_braking = bool(self.record.flags & at.BRAKING)
+            dq = self.record.dq
+            tau = by_motion.limit(tau, q=sample.q or NAN7, dq=dq, period=guard.period, is_braking=is_braking)
+            guard.was_limited |= by_motion.was_limited
+        return tuple(tau)
 
     def _pose_setpoint(self, sample: Sample, now: int) -> Setpoint:
         """Make the setpoint of a session that commands poses."""
@@ -801,13 +827,9 @@ class Cycle:
 
     def call_law(self, state: State, out: Output, now: int) -> None:
         """Call the law with its newest parameters; brake from now on if it fails."""
-        assert self.law is not None and self._params is not None
-        ring = self.layout.params
-        if ring.count != self._param_tick:
-            words = ring.read(ring.count - 1)
-            if words is not None:
-                self._param_tick = ring.count
-                self._params.replace(words[1:])
+        assert self.law is not None and self._params is not None and self._follower is not None
+        if not self.is_compiled:  # the native part takes those of a compiled law
+            self._take_params(self._follower, state.dt)
         began = time.monotonic_ns()
         try:
             if self.limit is not None:
@@ -827,6 +849,16 @@ class Cycle:
             self.law_failed(str(error) if is_clear else describe(error), now)
         if not self.is_compiled:  # the native part counts those of a compiled law
             self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
+
+    def _take_params(self, follower: Follower, dt: float) -> None:
+        """Let the parameters follow what the user's process has set."""
+        ring = self.layout.params
+        if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
+            if self._param_tick < 0:
+                follower.begin(words[1:])
+            follower.target[:] = words[1:]
+            self._param_tick = ring.count
+        follower.step(dt)
 
     def _take_memory(self) -> None:
         """Take over what the user's process has written to the memory of the law."""

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from heptarm import _library
 from heptarm._library import Unavailable
@@ -94,6 +95,9 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
     ("real", 6, "wrench_max wrench_step"),
     ("real", 1, "reach step"),
+    # guard of torques: `struct torque_guard`, and the torques that it lets through
+    ("pointer", 1, "torque_guard"),
+    ("real", AXES, "tau_sent"),
     # estimate of the wrench: `struct chain`, the posture that counts in this cycle, `struct wrench_map` of a posture
     ("word", 1, "has_chain has_map"),
     ("real", 24, "chain"),
@@ -115,7 +119,7 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "out_pose"),
     ("real", 1, "out_e1"),
     # compiled law: function, parameters, memory, counts of what the user's process has written to it, a buffer
-    ("pointer", 1, "law params memory memory_written law_buffer"),
+    ("pointer", 1, "law params params_target params_rates memory memory_written law_buffer"),
     ("pointer", 1, "params_ring memory_ring memory_set_ring"),
     ("word", 1, "params_size memory_size params_seen memory_seen"),
     ("word", 1, "law_success law_status law_code law_reported law_late law_not_finite"),
@@ -210,6 +214,8 @@ class Native:
         memory.reach = limits.reach
         memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
         memory.law_fraction = LAW_FRACTION
+        if cycle.torque_guard is not None:
+            memory.torque_guard = cycle.torque_guard.words.ctypes.data
         if cycle.estimator is not None:
             memory.chain[:], memory.has_chain = cycle.estimator.chain, 1
         if cycle.watch is not None:
@@ -220,23 +226,26 @@ class Native:
         memory.busy_poll = busy_poll
         memory.patience, memory.over = policy.patience, policy.over
 
-    def set_law(self, address: int, kept: object, *, success: int) -> None:
+    def set_law(self, address: int, kept: object, *, success: int, rates: npt.ArrayLike) -> None:
         """Set the compiled law that the native part calls; the Python cycle calls it through `call_law`.
 
         Args:
             address: of its function, in this process.
             kept: what has to live as long as the function.
             success: what the function returns unless it has failed.
+            rates: largest changes of its parameters in a second.
         """
         cycle, memory, layout = self._cycle, self.memory, self._cycle.layout
         base = layout.block.ints.ctypes.data
         values = cycle.memory_values
         params = layout.params.ints.shape[1] - 1
-        # params, memory, counts of writes, buffer of the larger of both rings
-        self._law_words = words = np.zeros(params + 2 * len(values) + max(params, 2 * len(values)) + 1)
-        words[params : params + len(values)] = values
+        # params, their targets and rates, memory, counts of writes, buffer of the larger of both rings
+        self._law_words = words = np.zeros(3 * params + 2 * len(values) + max(params, 2 * len(values)) + 1)
+        words[2 * params : 3 * params] = rates
+        words[3 * params : 3 * params + len(values)] = values
         start = words.ctypes.data
-        memory.params, memory.memory = start, start + 8 * params
+        memory.params, memory.params_target = start, start + 8 * params
+        memory.params_rates, memory.memory = start + 16 * params, start + 24 * params
         memory.memory_written = memory.memory + 8 * len(values)
         memory.law_buffer = memory.memory_written + 8 * len(values)
         memory.params_ring = base + 8 * layout.params_at

@@ -20,6 +20,7 @@ import sys
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from importlib.machinery import PathFinder
 from typing import Any
 
@@ -64,6 +65,8 @@ SILENT = 1_000_000_000
 SILENT_PERIODS, SILENT_PORT = 3, 100_000_000
 #: Longest wait for the arm to come to rest before the loop ends [s].
 BRAKING = 3.0
+#: Largest superposed torque where nothing guards the motion that torques lead to [Nm]: none in effect.
+NO_TORQUE = 1e-9
 #: The loop checks every so many datagrams whether the user's process is alive.
 _CHECK_EVERY = 256
 _PR_SET_TIMERSLACK = 29
@@ -270,11 +273,11 @@ class Loop:
         else:
             compiled, in_python = law, None
         values = np.array(config["remembered"], dtype=np.float64)
-        version = config["version"]
+        version, limits = config["version"], _limits(config["limits"])
         self.cycle = Cycle(
             layout,
             version=None if version is None else Version(version),
-            limits=_limits(config["limits"]),
+            limits=limits if not self._why_python else replace(limits, tau_max=(NO_TORQUE,) * 7),
             pose_limits=PoseLimits(**config["pose_limits"]),
             policy=Policy(
                 Missing(config["policy"]["missing"]), config["policy"]["patience"], config["policy"]["over"]
@@ -286,6 +289,8 @@ class Loop:
             positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
             estimator=WrenchEstimator(config["chain"]),
             watch=watch_of(config["collision"]),
+            rates=np.array(config["rates"]),
+            links=None if self._why_python else config["links"],
         )
         if in_python is not None:
             self.cycle.limit = LawLimit(layout.header)
@@ -298,7 +303,7 @@ class Loop:
         layout.header[at.NATIVE] = self._native is not None
         if compiled is not None and self._native is not None:
             address, kept = compiled.load(schema, memory)
-            self._native.set_law(address, kept, success=compiled.success)
+            self._native.set_law(address, kept, success=compiled.success, rates=config["rates"])
         self._parent: int = config["parent"]
         self._peer: Address | None = None
         self._deadline = 0
@@ -311,7 +316,7 @@ class Loop:
             ConnectionLost: the port or the loop itself has failed; the text gives the cause.
         """
         if self._native is None:
-            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python: {self._why_python}")
+            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python and commands no torques: {self._why_python}")
             self._run_in_python()
         else:
             self._run_native(self._native)

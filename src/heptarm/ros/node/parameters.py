@@ -80,6 +80,12 @@ PARAMETERS = (
         'target of the connection, as in heptarm.connect; "": the environment variable HEPTARM_TARGET',
     ),
     Parameter(
+        "flange",
+        "",
+        'media flange of the robot: "plain", "touch", or its height above a plain one [m]; "": that of the target, or '
+        "plain",
+    ),
+    Parameter(
         "key_file",
         "",
         'file with the pre-shared key of the cabinet; "": HEPTARM_KEY, or the key stored for the target',

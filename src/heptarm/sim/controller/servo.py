@@ -14,10 +14,10 @@ from math import atan2, cos, sin, sqrt
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
+from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import DEFAULT_TIMING, TICK, Order
 from heptarm.planning.geometry import Quat, product
-from heptarm.planning.path import TcpInverseKinematics
 from heptarm.planning.seam import ServoTiming, StraightLimits
 from heptarm.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
@@ -218,7 +218,7 @@ class StraightFollower:
         limits = self._limits = StraightServoLimits.of(order)
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
-        self._inverse = TcpInverseKinematics(robot, here, tcp)
+        self._inverse = PathInverse(robot, tcp)
         self._q = here.copy()
         self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
@@ -362,7 +362,7 @@ class StraightFollower:
             x, y, z = (self._turned_axes @ (x, y, z)).tolist()
             turn = (self._turned_axes @ turn).tolist()
         i, j, k, w = _rotated(centre, turn)
-        return self._inverse.joints((x, y, z), (i, j, k, w), self._inverse.e1, near)
+        return self._inverse.joints((x, y, z), (i, j, k, w), near)
 
     def _turned(self, turn: Array) -> Quat:
         """Orientation at a rotation from the centre, quaternion."""
