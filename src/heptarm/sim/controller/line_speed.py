@@ -2,7 +2,7 @@
 
 A trajectory over its own time is sampled ahead. The largest rate of that time, 1 at most, is found by reachability
 analysis (Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", 2018):
-it brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before the path ends.
+it brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before its end.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class RateProfile:
 
     @property
     def first_ticks(self) -> list[float]:
-        """Moments at which set-points show whether the axes can get on to the trajectory [s]: more where it is slowed."""
+        """Moments at which set-points show whether the axes can get on to it [s]: more where it is slowed."""
         slowed = any(abs(self.at(moment)[1] - 1.0) > _TINY for moment in (TICK, _CHECKED * TICK))
         return [TICK * (1 + k) for k in range(_CHECKED if slowed else 2)]
 
