@@ -80,9 +80,9 @@ def header() -> str:
     ):
         lines += [f"#define {name} {_number(getattr(module, name))}" for name in names]
     lines += ["", "struct loop {"]
-    for kind, size, names in native.STRUCT:
+    for kind, size, listed in native.STRUCT:
         array = "" if size == 1 else f"[{size}]"
-        declared = (f"{'*' if kind == 'pointer' else ''}{name}{array}" for name in names.split())
+        declared = (f"{'*' if kind == 'pointer' else ''}{name}{array}" for name in listed.split())
         lines.append(f"    {TYPES[kind].rstrip(' *')} {', '.join(declared)};")
     return "\n".join([*lines, "};", "", "#endif", ""])
 

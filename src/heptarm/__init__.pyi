@@ -147,6 +147,9 @@ from .errors import (
     Timeout as Timeout,
 )
 from .errors import (
+    UnknownSetting as UnknownSetting,
+)
+from .errors import (
     Unreachable as Unreachable,
 )
 from .errors import (

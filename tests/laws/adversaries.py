@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from heptarm.fri.guard.joint_guard import JointGuard, Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
-from heptarm.model.dynamics import link_constants
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.planning.command import Order
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.controller.safety import StopRequest
@@ -93,7 +93,7 @@ class Trial:
             f"{'ideal' if errors is None else 'noisy'} sensors"
         )
         limits = Limits.of(arm)
-        joints, guard = JointGuard(limits), TorqueGuard(limits, link_constants(arm, load=known))
+        joints, guard = JointGuard(limits), TorqueGuard(limits, rigid_bodies(arm, known, rotor=ROTOR))
         dt = period * 1e-3
         joints.start(start.tolist(), [0.0] * 7, period=dt)
         guard.start()

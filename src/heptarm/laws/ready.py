@@ -19,7 +19,7 @@ from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.fri.loop.parameters import Param
-from heptarm.model.dynamics import link_constants
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.arrays import Array, array, frozen, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
@@ -125,7 +125,7 @@ def cartesian_impedance(
     return ReadyLaw(
         "cartesian_impedance",
         {
-            "robot": lambda arm: Param(link_constants(arm, load=load), live=False),
+            "robot": lambda arm: Param(rigid_bodies(arm, load, rotor=ROTOR), live=False),
             "goal": _pose(goal),
             "stiffness": _vector(stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS),
             "damping": _number(damping, "damping", high=2.0, rate=10.0),
@@ -181,7 +181,7 @@ def joint_impedance(
     return ReadyLaw(
         "joint_impedance",
         {
-            "robot": lambda arm: Param(link_constants(arm, load=load), live=False),
+            "robot": lambda arm: Param(rigid_bodies(arm, load, rotor=ROTOR), live=False),
             "goal": _joints(goal, "goal"),
             "stiffness": _vector(
                 stiffness, "stiffness", high=(JOINT_STIFFNESS,) * 7, unit="Nm/rad", rate=2.0 * JOINT_STIFFNESS
@@ -240,7 +240,7 @@ def free_guiding(
     return ReadyLaw(
         "free_guiding",
         {
-            "robot": lambda arm: Param(link_constants(arm), live=False),
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
             "damping": _vector(damping, "damping", high=(100.0,) * 7, unit="Nm s/rad", rate=200.0),
             "box": Param(
                 given, low=-FAR, high=FAR, unit="m", rate=0.5, check=_check_box, name="box"
@@ -296,7 +296,7 @@ def admittance(
     return ReadyLaw(
         "admittance_of_the_flange",
         {
-            "robot": lambda arm: Param(link_constants(arm), live=False),
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
             "wrench": _vector(wrench, "wrench", low=-WRENCH, high=WRENCH, unit="N or Nm", rate=5.0 * WRENCH),
             "mass": _vector(mass, "mass", high=MASS, above=True, unit="kg or kg m²", rate=MASS),
             "damping": _vector(damping, "damping", high=DAMPING, unit="N s/m or Nm s/rad", rate=DAMPING),
@@ -364,7 +364,7 @@ def hybrid(
     return ReadyLaw(
         "hybrid_of_the_flange",
         {
-            "robot": lambda arm: Param(link_constants(arm), live=False),
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
             "goal": _pose(goal),
             "turn": Param(np.ravel(turn), live=False),
             "force_axes": Param(chosen, live=False),

@@ -52,7 +52,7 @@ class TorqueGuard:
     Args:
         limits: the limits; positions, speeds and torques hold for the measured motion, and `ddq_max` is the planned
             deceleration.
-        robot: link data, see `heptarm.model.dynamics.link_constants`.
+        robot: link data, see `heptarm.model.dynamics.rigid_bodies`.
         report: receives what was limited; None creates one.
 
     Attributes:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict
 from types import TracebackType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -37,13 +37,14 @@ from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
-from heptarm.model.dynamics import link_constants
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
 from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel, robot
+from heptarm.values.sealed import Sealed
 
 #: Default UDP port of FRI.
 PORT = 30200
@@ -111,7 +112,7 @@ def check_settings(
     within(busy_poll, "busy_poll", 0.0, BUSY_POLL, unit="s")
 
 
-class Client(Reader):
+class Client(Sealed, Reader):
     """Client that answers a controller from a separate process; close it, or use it in a `with` block.
 
     It works over any number of sessions: the application of the cabinet may end and start again.
@@ -151,6 +152,11 @@ class Client(Reader):
         ConnectFailed: the port cannot be bound, or the loop did not start.
         CommandRejected: an argument is outside its range, or the law cannot be compiled or loaded.
     """
+
+    params: Final[Params]
+    memory: Final[LiveMemory]
+    port: Final[int]
+    model: Final[RobotModel]
 
     def __init__(
         self,
@@ -222,7 +228,7 @@ class Client(Reader):
                     "limits": asdict(self._limits),
                     "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
                     "chain": chain_of(arm),
-                    "links": link_constants(arm, load=load).tolist(),
+                    "links": rigid_bodies(arm, load, rotor=ROTOR).tolist(),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "collision": None if collision is None else as_numbers(collision),

@@ -11,7 +11,7 @@ import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from heptarm.fri.loop.user_api import Params
 from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
 from heptarm.values.arrays import callback, instance, within
 from heptarm.values.robot import RobotModel, robot
+from heptarm.values.sealed import Sealed
 
 #: Number of arguments of a law with memory: state, output, parameters, memory.
 WITH_MEMORY = 4
@@ -35,7 +36,7 @@ def include_dir() -> Path:
     return Path(__file__).resolve().with_name("include")
 
 
-class CompiledLaw:
+class CompiledLaw(Sealed):
     """A law that the native loop calls.
 
     Args:
@@ -49,11 +50,13 @@ class CompiledLaw:
 
     success = 0
     kind: str = ""
+    params: Final[dict[str, Any]]
+    memory: Final[dict[str, Any]]
 
     def __init__(self, params: _Initial | None = None, memory: _Numbers | None = None) -> None:
         _check(params, memory)
-        self.params: dict[str, Any] = dict(params or {})
-        self.memory: dict[str, Any] = dict(memory or {})
+        self.params = dict(params or {})
+        self.memory = dict(memory or {})
 
     def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
         """Parameters and their initial values for a robot."""
@@ -190,6 +193,9 @@ class LibraryLaw(CompiledLaw):
         memory: see `CompiledLaw`.
     """
 
+    path: Path
+    name: Final[str]
+
     def __init__(
         self, path: Path, name: str, params: _Initial | None = None, memory: _Numbers | None = None
     ) -> None:
@@ -268,7 +274,7 @@ def law_from(
     return LibraryLaw(file, name, params, memory)
 
 
-class LawTrial:
+class LawTrial(Sealed):
     """A compiled law in this process, called with states of your own: for tests, simulations and plots.
 
     A law that crashes ends this process; in a session it does not.
@@ -288,6 +294,10 @@ class LawTrial:
     Raises:
         CommandRejected: the law cannot be compiled or loaded.
     """
+
+    params: Final[interface.Memory]
+    memory: Final[interface.Memory]
+    t: float
 
     def __init__(
         self,

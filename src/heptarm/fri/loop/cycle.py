@@ -394,7 +394,7 @@ class Cycle:
         estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
         watch: detects collisions, at which the arm brakes; None: nothing does.
         rates: largest changes of the parameters in a second; None: they change at once.
-        links: `link_constants` of the robot, for the guard of torques; None: torques are limited in size and rate only.
+        links: `rigid_bodies` of the robot, for the guard of torques; None: torques are limited in size and rate only.
 
     Attributes:
         memory_values: words of the law's memory.

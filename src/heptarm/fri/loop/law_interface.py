@@ -13,11 +13,12 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import ShapeError
+from heptarm.errors import ShapeError, UnknownSetting
 from heptarm.fri.loop.parameters import Param
 from heptarm.fri.protocol.messages import JOINTS
 from heptarm.values.arrays import finite_entries, numbers, shown
 from heptarm.values.pose import Pose
+from heptarm.values.sealed import meant
 
 Floats = npt.NDArray[np.float64]
 #: What a member of the memory is given; a pose is x y z [m] and its quaternion x y z w, shape (7,).
@@ -135,8 +136,14 @@ class Fields:
             return float(self._values[start])
         return self._values[start : start + prod(shape)].reshape(shape)
 
-    def _unknown(self, name: str) -> AttributeError:
-        return AttributeError(f"no {self._what} {name!r}; there are {', '.join(self._schema) or 'none'}")
+    def _unknown(self, name: str) -> UnknownSetting:
+        known = ", ".join(self._schema) or "none"
+        return UnknownSetting(
+            f"no {self._what} {name!r}; there are {known}",
+            parameter=name,
+            allowed=known,
+            hint=meant(name, self._schema),
+        )
 
     def _checked(self, values: Mapping[str, Given]) -> list[tuple[int, Floats]]:
         """First word and numbers of each value, checked."""
