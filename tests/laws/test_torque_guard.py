@@ -7,7 +7,7 @@ import pytest
 
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
-from heptarm.model.dynamics import link_constants, mass_matrix
+from heptarm.model.dynamics import ROTOR, mass_matrix, rigid_bodies
 from heptarm.values.robot import robot
 from tests.long import longer
 
@@ -20,7 +20,7 @@ PERIOD = 1e-3
 
 
 def guard() -> TorqueGuard:
-    made = TorqueGuard(Limits.of(ARM), link_constants(ARM))
+    made = TorqueGuard(Limits.of(ARM), rigid_bodies(ARM, rotor=ROTOR))
     made.start()
     return made
 
