@@ -165,7 +165,7 @@ def test_a_step_reaches_the_law_as_a_ramp() -> None:
 
 def test_a_step_of_the_stiffness_does_not_jerk_the_arm() -> None:
     """The torque of a stretched spring rises as fast as its stiffness may."""
-    trial = LawTrial(laws.joint_impedance(smoothing=0.5, stiffness=[50.0] * 7), dt=DT)
+    trial = LawTrial(laws.joint_impedance(smoothing=0.1, stiffness=[50.0] * 7), dt=DT)
     trial(HOME)
     trial.params.goal = HOME + 0.05
     for _ in range(3000):
