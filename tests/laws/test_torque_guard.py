@@ -25,10 +25,10 @@ def guard() -> TorqueGuard:
     return made
 
 
-@pytest.mark.parametrize("block", range(8))
+@pytest.mark.parametrize("block", range(longer(8, 100)))
 def test_no_law_brings_an_axis_beyond_its_speed_or_to_a_limit(block: int) -> None:
     """Random gains, wrong signs, noise, 1e12, NaN; loads, periods, stiffness and noise of the sensors."""
-    size = longer(4, 125)
+    size = longer(4, 10)
     for seed in range(block * size, (block + 1) * size):
         trial = Trial(seed).run(longer(0.8, 1.5))
         assert not trial.error, f"{trial.name}: {trial.error}"
