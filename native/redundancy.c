@@ -185,9 +185,8 @@ int hi_status(const struct arm *arm, const double *q) {
     return (ahead_of(arm, q) < -IN_PLANE) | (q[3] < 0.0) << 1 | (q[5] <= 0.0) << 2;
 }
 
-/* Arm angle [rad]: the turn of the elbow about the shoulder-wrist line, from the arm with A3 = 0 whose wrist is behind A1 or before
-   it; -1: on the side of this posture. */
-double hi_arm_angle(const struct arm *arm, const double *q, int is_behind) {
+/* Arm angle [rad]: the turn of the elbow about the shoulder-wrist line, from the arm with A3 = 0 in the same Status. */
+double hi_arm_angle(const struct arm *arm, const double *q) {
     struct frames f;
     struct target t;
     double start[9], r03[9], u[3], between[9], c = cos(q[2]), s = sin(q[2]), spin[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
@@ -196,7 +195,7 @@ double hi_arm_angle(const struct arm *arm, const double *q, int is_behind) {
     t.wrist[2] -= arm->d_bs;
     t.radius = sqrt(t.wrist[0] * t.wrist[0] + t.wrist[1] * t.wrist[1]);
     t.square = dot(t.wrist, t.wrist, 3);
-    reference(arm, &t, q[3], is_behind < 0 ? ahead_of(arm, q) < -IN_PLANE : is_behind, start);
+    reference(arm, &t, q[3], ahead_of(arm, q) < -IN_PLANE, start);
     zy(q[0], q[1], between);
     times(between, spin, r03);
     for (int i = 0; i < 3; i++)

@@ -22,7 +22,7 @@ struct request {
 enum { FOUND = 1, TOO_FAR = 0, NO_POSTURE = -1 };
 
 int hi_status(const struct arm *arm, const double *q);
-double hi_arm_angle(const struct arm *arm, const double *q, int is_behind);
+double hi_arm_angle(const struct arm *arm, const double *q);
 int find_joints(const struct arm *arm, const double *turn, const double *place, const struct request *request, double *q);
 
 #endif

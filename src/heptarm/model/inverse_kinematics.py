@@ -88,7 +88,7 @@ def status_of(robot: RobotModel, q: Sequence[float]) -> int:
     return int(one().hi_status(constants(robot), Joints(*q)))
 
 
-def arm_angle(robot: RobotModel, q: npt.ArrayLike, *, behind: bool | None = None) -> float:
+def arm_angle(robot: RobotModel, q: npt.ArrayLike) -> float:
     """Arm angle of a joint position: the elbow's turn about the shoulder-wrist line.
 
     It is measured from the arm that reaches the wrist with A3 = 0 in the same Status (Shimizu et al. 2008). It is not
@@ -98,14 +98,11 @@ def arm_angle(robot: RobotModel, q: npt.ArrayLike, *, behind: bool | None = None
     Args:
         robot: the robot.
         q: joint positions, shape (7,) [rad].
-        behind: whether the wrist of the arm with A3 = 0 is behind A1's x axis; None: as in these joint positions, which
-            may change along a motion.
 
     Returns:
         In (-pi, pi] [rad].
     """
-    given = Joints(*array(q, 7, "q").tolist())
-    return float(one().hi_arm_angle(constants(_robot(robot)), given, -1 if behind is None else behind))
+    return float(one().hi_arm_angle(constants(_robot(robot)), Joints(*array(q, 7, "q").tolist())))
 
 
 def redundancy(robot: RobotModel, q: npt.ArrayLike) -> Redundancy:

@@ -31,7 +31,7 @@ _FUNCTIONS: dict[str, tuple[object, ...]] = {
     "hk_link": (None, _P, _P, _INT, _P),
     "hk_jacobian": (None, _P, _LONG, _P, _P, _P),
     "hk_joints": (None, _P, _P, _P, _P, _P),
-    "hi_arm_angle": (_REAL, _P, _P, _INT),
+    "hi_arm_angle": (_REAL, _P, _P),
     "hi_intervals": (_INT, _P, _P, _INT, _P),
     "hi_joints": (_INT, _P, _P, *[_REAL] * 8, _INT, _P, _P),
     "hi_solve": (None, _P, _LONG, _P, _P, _P, _P, _INT, _P, _P),

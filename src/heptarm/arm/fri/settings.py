@@ -125,12 +125,7 @@ def request(
     history: int = 2048,
     timeout: float = 10.0,
 ) -> FriRequest:
-    """Check the keywords of `Arm.fri` and turn them into a request.
-
-    Args:
-        connection: to the cabinet.
-        kind: the commanded quantity, or "monitor".
-        load: on the flange, as far as it is known.
+    """Check the keywords of `Arm.fri`, and the load on the flange as far as it is known; turn them into a request.
 
     Raises:
         CommandRejected: this cabinet does not support such a session.

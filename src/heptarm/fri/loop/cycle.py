@@ -401,7 +401,8 @@ class Cycle:
         is_compiled: whether the native part calls the law.
         limit: interrupts a law in Python that does not return; None: nothing does.
         q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, torque_guard, pose_commander, fallback, exchange, record, law, estimator, watch: its parts.
+        layout, session, guard, torque_guard, pose_commander, fallback, exchange, record, law, estimator, watch: its
+            parts.
         failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
         mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.

@@ -316,7 +316,8 @@ class Loop:
             ConnectionLost: the port or the loop itself has failed; the text gives the cause.
         """
         if self._native is None:
-            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python and commands no torques: {self._why_python}")
+            text = f"the loop runs in pure Python and commands no torques: {self._why_python}"
+            self.cycle.record.report(time.monotonic_ns(), text)
             self._run_in_python()
         else:
             self._run_native(self._native)

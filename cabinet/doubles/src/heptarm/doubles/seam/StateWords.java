@@ -33,7 +33,7 @@ public final class StateWords {
     public static final int PROGRESS = 60;
     /** Remaining time; NaN: unknown [s] */
     public static final int REMAINING = 61;
-    /** E1, the angle of A3 [rad] */
+    /** Arm angle [rad] */
     public static final int E1 = 62;
     /** Status of the posture */
     public static final int STATUS = 63;
