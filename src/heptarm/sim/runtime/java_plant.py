@@ -13,6 +13,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from math import isnan
 from typing import Any, cast
 
 import jpype
