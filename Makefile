@@ -5,12 +5,12 @@ STAMPS := build/stamps
 # Hundreds of processes start here; without compiled bytecode each of them compiles the package for half a second.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
+.PHONY: setup native cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
 	wheel first-hour clean help
 
 ##@ To try it
 
-demo: cabinet  ## motions on the virtual cabinet, a table and a plot; installs only what that needs
+demo: native cabinet  ## motions on the virtual cabinet, a table and a plot; installs only what that needs
 	.venv/bin/heptarm demo
 
 # Only the packages of the demo; those of the tests come on top of them.
@@ -20,10 +20,18 @@ $(STAMPS)/demo: pyproject.toml scripts/setup.sh $(wildcard scripts/lock/demo.txt
 
 ##@ To build
 
-setup: $(STAMPS)/venv cabinet  ## everything for developers: virtual environment, package, tools, compiled cabinet
+setup: $(STAMPS)/venv native cabinet  ## everything for developers: virtual environment, package, tools, extension, compiled cabinet
 
 $(STAMPS)/venv: $(STAMPS)/demo $(wildcard scripts/lock/all.txt scripts/lock/torch.txt)
 	scripts/setup.sh all
+	@mkdir -p $(STAMPS) && touch $@
+
+# Its sources are few: the build system knows by itself whether one has changed.
+native: $(STAMPS)/compiler  ## compile the extension heptarm._native
+	@$(PY) scripts/native.py
+
+$(STAMPS)/compiler: scripts/setup_compiler.sh $(STAMPS)/demo
+	scripts/setup_compiler.sh
 	@mkdir -p $(STAMPS) && touch $@
 
 $(STAMPS)/jdk: scripts/setup_jdk.py cabinet/toolchain.py $(STAMPS)/demo
@@ -136,14 +144,14 @@ docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
-wheel: cabinet  ## a wheel with the compiled jars, in dist/; installs only what that needs
+wheel: $(STAMPS)/compiler cabinet  ## a wheel with the compiled jars, in dist/; installs only what that needs
 	$(PY) -m pip wheel -q --no-deps --no-build-isolation --wheel-dir dist .
 
 first-hour:  ## what a newcomer does, timed: clone, demo, tutorial, the wheel with each Python of this machine
 	python3 scripts/first_hour.py
 
 clean:  ## everything that make made, but for the virtual environment
-	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf build dist docs/_build src/heptarm/sim/jars src/heptarm/_native*.so .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 
 help:  ## this list
 	@awk -F ':.*## ' '/^##@ / {printf "%s%s\n", (n++ ? "\n" : ""), substr($$0, 5)} /^[a-z0-9-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' \

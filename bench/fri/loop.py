@@ -22,13 +22,13 @@ from bench.measure.compiler import compiled
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
 from heptarm import law_from
+from heptarm._library import SWITCH
 from heptarm.fri import CompiledLaw, include_dir
 from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version
-from heptarm.io.compiled import SWITCH
 
 #: Over all blocks of a placement; fewer are for a quick check.
 CYCLES = int(os.environ.get("BENCH_CYCLES", "25000"))

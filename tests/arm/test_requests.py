@@ -11,8 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 import heptarm as ha
-from heptarm.io import exchange
-from heptarm.io.compiled import SWITCH
+from heptarm._library import SWITCH
 from heptarm.io.tcp import connect, listening
 from heptarm.io.transport import Transport
 from heptarm.wire import messages as wire
@@ -34,11 +33,9 @@ class TcpPeer(Peer):
 def peer(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Peer]:
     if request.param == "Python":
         monkeypatch.setenv(SWITCH, "1")
-    exchange._library.cache_clear()
     made = TcpPeer()
     yield made
     made.close()
-    exchange._library.cache_clear()
 
 
 def test_a_refused_request(peer: Peer) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.io.compiled import SWITCH
+from heptarm._library import SWITCH
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState
 from heptarm.sim.runtime import cabinet as virtual

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from heptarm._library import SWITCH
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, NotReady, ShapeError, Timeout
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop.client import Client
@@ -27,7 +28,6 @@ from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.version import Version
-from heptarm.io.compiled import SWITCH
 from heptarm.values.pose import Pose
 
 from .controller import IPO, Controller

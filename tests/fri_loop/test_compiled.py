@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri import Client, include_dir
 from heptarm.fri.loop import shared_memory as at
@@ -19,7 +20,6 @@ from heptarm.fri.loop.law_interface import Memory, dtype, flat
 from heptarm.fri.loop.native import Native, library
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
-from heptarm.io.compiled import Unavailable
 from heptarm.values.pose import Pose
 
 from . import laws as python_laws

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from heptarm._library import Unavailable
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import REPEATS
@@ -23,7 +24,6 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
-from heptarm.io.compiled import Unavailable
 from heptarm.io.udp import UdpSocket
 from tests.long import longer
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from heptarm import laws, model
+from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri import LawTrial
 from heptarm.fri.loop.native import library
-from heptarm.io.compiled import Unavailable
 from heptarm.laws.ready import across, constants, shared_library
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS, Body, robot

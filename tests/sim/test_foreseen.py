@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heptarm.io.compiled import Unavailable
+from heptarm._library import Unavailable
 from heptarm.planning.command import Order
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.controller.safety import StopRequest

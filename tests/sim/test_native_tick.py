@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from heptarm.io.compiled import SWITCH, Unavailable
+from heptarm._library import SWITCH, Unavailable
 from heptarm.planning.command import Order
 from heptarm.planning.native_inverse import inverse_library
 from heptarm.planning.seam import StateWords

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from heptarm.io.compiled import SWITCH
+from heptarm._library import SWITCH
 from heptarm.planning.command import TICK, Order
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
+from heptarm._library import Unavailable
 from heptarm.arm.fri.diagnosis import cause
 from heptarm.arm.fri.settings import PORTS
 from heptarm.cli.options import (
@@ -32,7 +33,6 @@ from heptarm.fri.loop.client import Client
 from heptarm.fri.loop.echo import floor
 from heptarm.fri.loop.user_api import State
 from heptarm.fri.protocol.messages import Quality
-from heptarm.io.compiled import Unavailable
 from heptarm.values.arrays import Array, within
 
 #: Messages kept for the picture.

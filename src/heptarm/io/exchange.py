@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
-import functools
-import importlib.util
 import sys
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Literal, Protocol, TypeVar, cast
 
-from heptarm.io.compiled import Unavailable, compiled_library, with_headers
+from heptarm._library import Unavailable, extension_file
 from heptarm.wire.messages import Message
 from heptarm.wire.session import Session
-
-_SOURCE = Path(__file__).with_name("exchange.c")
-
 
 P = TypeVar("P", covariant=True)
 
@@ -78,7 +71,7 @@ def compiled_link(
 ) -> tuple[Exchange[P], ReceiveState] | None:
     """The functions of a connection.
 
-    None: no socket, no compiler, no libcrypto for a session with a key, or a system or Python that is not supported.
+    None: no socket, no compiled part, or a Python without its lock.
 
     Args:
         session: it sends `simple_requests` of this session.
@@ -89,38 +82,22 @@ def compiled_link(
         reading: lock of the thread that reads the socket.
         sending: lock of the thread that writes to it.
     """
-    library = _library() if socket() >= 0 else None
-    if library is None or (session.has_key and not _takes_hash(library)):
+    if socket() < 0 or not _is_available():
         return None
+    from heptarm._native import exchange_functions
+
     locks = reading.acquire, reading.release, sending.acquire, sending.release
-    made = library.he_functions(
+    made = exchange_functions(
         (session.counts, session.waiting, session.tags, left, pending, spare, socket, *locks)
     )
     return cast("tuple[Exchange[P], ReceiveState]", made)
 
 
-@functools.cache
-def _library() -> ctypes.CDLL | None:
+def _is_available() -> bool:
     if not getattr(sys, "_is_gil_enabled", lambda: True)():
-        return None  # Python's lock protects the counts
-    source = with_headers(_SOURCE, _SOURCE.with_name("frame_layout.h"))
+        return False  # Python's lock protects the counts
     try:
-        made = compiled_library("exchange", source, holds_gil=True)
+        extension_file()
     except Unavailable:
-        return None
-    made.he_functions.argtypes, made.he_functions.restype = (ctypes.py_object,), ctypes.py_object
-    return made
-
-
-def _takes_hash(library: ctypes.CDLL) -> bool:
-    """Give a library the SHA-256 of libcrypto: of Python's own, or of the system's where Python's is not visible."""
-    pythons = importlib.util.find_spec("_hashlib")
-    names = [pythons.origin] if pythons else []
-    for name in (*names, "libcrypto.so.3", "libcrypto.so.1.1"):
-        try:
-            crypto = ctypes.CDLL(name)
-            library.he_hash(crypto.SHA256_Init, crypto.SHA256_Update, crypto.SHA256_Final)
-            return True
-        except (OSError, AttributeError):
-            continue
-    return False
+        return False
+    return True

@@ -1,4 +1,4 @@
-"""The ready laws: their parameters and memories, in the order of the structures of ready.c.
+"""The ready laws: their parameters and memories, in the order of the structures of ready_laws.c.
 
 Torque laws are for `arm.fri("torque", mode=JointImpedance(stiffness=0.0), ...)`: the cabinet compensates gravity and
 Coriolis torques there, and adds the law's. A goal of NaN is where the arm is when the law begins.
@@ -14,22 +14,16 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from heptarm._library import Unavailable, extension_file
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
-from heptarm.fri.loop.compiled import LibraryLaw, include_dir
-from heptarm.io.compiled import Unavailable, compiled_file, with_headers
+from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.values.arrays import Array, array, finite, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
 #: Kind of a session.
 Kind: TypeAlias = Literal["torque", "position", "wrench"]
-_SOURCE = Path(__file__).with_name("ready.c")
-_HEADERS = (
-    _SOURCE.with_name("model.h"),
-    *(include_dir().with_name(name) for name in ("kinematics.h", "limited_steps.h", "native_layout.h")),
-    *(include_dir() / name for name in ("heptarm_filter.h", "heptarm_law.h")),
-)
 _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
 #: Time constant of the low pass of the velocities [s].
@@ -41,21 +35,21 @@ TORQUE_FRACTION = 0.3
 
 
 def shared_library() -> Path:
-    """Build the laws at the first use, and keep them in the user's cache.
+    """The library with the laws: the compiled part of heptarm.
 
     Raises:
-        CommandRejected: there is no compiler, or it fails.
+        CommandRejected: it is missing.
     """
     try:
-        return compiled_file("laws", with_headers(_SOURCE, *_HEADERS))
+        return Path(extension_file())
     except Unavailable as error:
         raise CommandRejected(
-            f"the ready laws cannot be built: {error}", parameter="law", hint="install gcc"
+            f"the ready laws are not available: {error}", parameter="law", hint=error.hint
         ) from None
 
 
 def constants(arm: RobotModel, load: Body | None = None) -> Array:
-    """`struct robot` of model.h: the links, the load on the flange, the motors; shape (105,)."""
+    """`struct robot` of dynamics.h: the links, the load on the flange, the motors; shape (105,)."""
     links = arm.links
     inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
     body = load or Body(0.0, np.zeros(3))
@@ -70,7 +64,7 @@ class ReadyLaw(LibraryLaw):
     """A law of this package; made by its functions.
 
     Args:
-        name: of its function in ready.c.
+        name: of its function in ready_laws.c.
         params: parameters; a function of the robot where they depend on it.
         memory: members of its memory.
         kind: kind of the session that it is for: "torque", "position" or "wrench".
@@ -80,7 +74,7 @@ class ReadyLaw(LibraryLaw):
         self, name: str, params: Mapping[str, Any], memory: Mapping[str, npt.ArrayLike], *, kind: Kind
     ) -> None:
         fixed = {key: value for key, value in params.items() if not callable(value)}
-        super().__init__(_SOURCE, name, fixed, memory)
+        super().__init__(Path("heptarm._native"), name, fixed, memory)
         self._all = dict(params)
         self.kind: Kind = kind
 
@@ -89,7 +83,7 @@ class ReadyLaw(LibraryLaw):
         return {key: value(arm) if callable(value) else value for key, value in self._all.items()}
 
     def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
-        """Build and load the law; see `CompiledLaw.load`."""
+        """Load the law; see `CompiledLaw.load`."""
         self.path = shared_library()
         return super().load(params, memory)
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from pathlib import Path
 
 import numpy as np
 
-from heptarm.io.compiled import Unavailable, compiled_library
+from heptarm._library import Unavailable, library
 from heptarm.model.kinematics import Vec
 from heptarm.planning.geometry import Quat
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
-_SOURCE = Path(__file__).with_name("inverse.c")
 _REAL, _POINTER = ctypes.c_double, ctypes.c_void_p
 
 
@@ -22,7 +20,7 @@ _REAL, _POINTER = ctypes.c_double, ctypes.c_void_p
 def inverse_library() -> ctypes.CDLL | None:
     """Load the function; None: this system is not supported, or has no compiler."""
     try:
-        made = compiled_library("inverse", _SOURCE.read_bytes(), holds_gil=True)
+        made = library(holds_gil=True)
     except Unavailable:
         return None
     made.hi_joints.argtypes = (_POINTER, *([_REAL] * 8), ctypes.c_int, _POINTER, _POINTER)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import ctypes
 import functools
 from array import array
-from pathlib import Path
 
 import numpy as np
 
-from heptarm.io.compiled import Unavailable, compiled_library
+from heptarm._library import Unavailable, library
 from heptarm.planning.composite_path import CompositePath
 from heptarm.planning.jerk_profile import TimeLaw
 from heptarm.values.arrays import Array
@@ -21,8 +20,6 @@ from heptarm.values.arrays import Array
 #: So many set-points are computed at once in C, and without a compiler, where each time takes half a millisecond.
 MANY, MANY_IN_PYTHON = 64, 1024
 _AXES = 7
-#: The same in C.
-SET_POINTS = Path(__file__).with_name("ahead.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 
@@ -30,7 +27,7 @@ _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 def ahead_library() -> ctypes.CDLL | None:
     """Load the function; None: this system is not supported, or has no compiler."""
     try:
-        made = compiled_library("ahead", SET_POINTS.read_bytes(), holds_gil=True)
+        made = library(holds_gil=True)
     except Unavailable:
         return None
     made.ha_ahead.argtypes, made.ha_ahead.restype = (_POINTER, _POINTER, _REAL, _REAL), _WORD
@@ -38,7 +35,7 @@ def ahead_library() -> ctypes.CDLL | None:
 
 
 class _Table(ctypes.Structure):
-    """`struct table` of ahead.c."""
+    """`struct table` of set_points.h."""
 
     _fields_ = (
         ("pieces", _POINTER),
@@ -50,13 +47,13 @@ class _Table(ctypes.Structure):
 
 
 class Cursor(ctypes.Structure):
-    """`struct cursor` of ahead.c."""
+    """`struct cursor` of set_points.h."""
 
     _fields_ = (("time", _REAL), ("place", _REAL), ("piece", _WORD), ("line", _WORD))
 
 
 class _Ahead(ctypes.Structure):
-    """`struct ahead` of ahead.c."""
+    """`struct ahead` of set_points.h."""
 
     _fields_ = (
         ("last", _POINTER),

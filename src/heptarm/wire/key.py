@@ -88,13 +88,9 @@ class FrameTag:
 
     Args:
         key: the key of this direction [32 bytes].
-
-    Attributes:
-        begins: what the inner and the outer hash of a frame take first: the padded key, the inner one also the number
-            of the round.
     """
 
-    __slots__ = ("_hashes", "_key", "_round", "begins")
+    __slots__ = ("_hashes", "_key", "_round")
 
     def __init__(self, key: bytes) -> None:
         self._key = key.ljust(64, b"\0")
@@ -104,8 +100,8 @@ class FrameTag:
     def begin_round(self) -> None:
         """Begin to count the frames from 0; called again each time their sequence number wraps."""
         self._round += 1
-        self.begins = self._key.translate(_INNER) + _ROUND.pack(self._round), self._key.translate(_OUTER)
-        self._hashes = tuple(hashlib.sha256(begin).copy for begin in self.begins)
+        begins = self._key.translate(_INNER) + _ROUND.pack(self._round), self._key.translate(_OUTER)
+        self._hashes = tuple(hashlib.sha256(begin).copy for begin in begins)
 
     def of(self, frame: bytes | bytearray | memoryview) -> bytes:
         """The tag of a frame: of its header and its body."""

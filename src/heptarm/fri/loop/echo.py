@@ -43,10 +43,10 @@ def floor(seconds: float, *, period: float, cpu: int | None = None) -> Array:
         Time from receipt to reply of each datagram, shape (n,) [s].
 
     Raises:
-        Unavailable: there is no C compiler.
+        Unavailable: the compiled part is missing.
         ConnectFailed: the echo did not start.
     """
-    library()  # compiled here, so that its error is raised here
+    library()  # loaded here, so that its error is raised here
     count = max(1, round(seconds / period)) + _WARM_UP
     folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
     command = [sys.executable, "-m", "heptarm.fri.loop.echo", str(count), "" if cpu is None else str(cpu)]

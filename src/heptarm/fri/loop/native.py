@@ -13,11 +13,12 @@ import signal
 import socket
 import struct
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from heptarm import _library
+from heptarm._library import Unavailable
 from heptarm.fri.guard.fallback import Missing
 from heptarm.fri.guard.joint_guard import AXES, Limited
 from heptarm.fri.loop import shared_memory as at
@@ -30,7 +31,6 @@ from heptarm.fri.protocol.messages import MAX_IO, MAX_TRANSFORMATIONS, CommandMo
 from heptarm.fri.protocol.protobuf import Raw, fields, put_double, put_varint
 from heptarm.fri.protocol.version import MAX_DATAGRAM, Version, unwrap
 from heptarm.fri.session.statistics import BINS
-from heptarm.io.compiled import Unavailable, compiled_library, with_headers
 
 HANDBACK, LAW = -1, -2
 TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW, LAW_FAILED = range(6)
@@ -47,12 +47,6 @@ WARM_UP = 50_000
 #: Largest size of robot and connection info in messages for the native part.
 MAX_PLAIN = 64
 
-_SOURCE = Path(__file__).with_name("native.c")
-#: Headers that native.c includes, each behind those that include it.
-_HEADERS = (
-    *(_SOURCE.with_name(name) for name in ("kinematics.h", "limited_steps.h", "native_layout.h")),
-    _SOURCE.parent / "include" / "heptarm_law.h",
-)
 _WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p
 #: Fallbacks for missing commands, in the numbering of the native part.
 MISSING = tuple(Missing)
@@ -70,7 +64,7 @@ class LawStatus(enum.IntEnum):
     SLOW = 5
 
 
-#: `struct loop` of native.c, whose header schema/generate.py writes from this table: type, size (1: no array), names.
+#: `struct loop` of fri_loop.c, whose header schema/generate.py writes from this table: type, size (1: no array), names.
 STRUCT: tuple[tuple[str, int, str], ...] = (
     ("pointer", 1, "header latency jitter states commands outputs"),
     ("word", 1, "history bins sock address port"),
@@ -150,7 +144,7 @@ _TYPES: dict[str, Any] = {
 
 
 class _Memory(ctypes.Structure):
-    """`struct loop` of native.c."""
+    """`struct loop` of fri_loop.c."""
 
     _fields_ = tuple(
         (name, _TYPES[kind] if size == 1 else _TYPES[kind] * size)
@@ -166,7 +160,7 @@ def library() -> ctypes.CDLL:
     Raises:
         Unavailable: this system is not supported, or has no compiler.
     """
-    made = compiled_library("fri", with_headers(_SOURCE, *_HEADERS))
+    made = _library.library()
     made.hf_size.restype = _WORD
     made.hf_turn.argtypes = (_POINTER, ctypes.c_char_p, ctypes.c_int, _WORD)
     made.hf_answer.argtypes = (_POINTER,)

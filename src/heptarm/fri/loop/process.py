@@ -26,6 +26,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
+from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError
 from heptarm.fri.guard.collision_watch import watch_of
 from heptarm.fri.guard.fallback import Missing, Policy
@@ -50,7 +51,6 @@ from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.loop.wrench import WrenchEstimator
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version, spoken_version
-from heptarm.io.compiled import Unavailable
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import Address, UdpSocket
 

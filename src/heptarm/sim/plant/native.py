@@ -9,15 +9,14 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from heptarm.io.compiled import Unavailable, compiled_library
+from heptarm._library import Unavailable, library
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
-from heptarm.planning.table import SET_POINTS, Cursor, MotionTable
+from heptarm.planning.table import Cursor, MotionTable
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.shared_state import SharedState
@@ -30,9 +29,8 @@ DONE, LOADED, ASK, STRAINED, ELSEWHERE = range(5)
 
 #: MuJoCo's functions that a tick calls, and the members of `struct tick` that point to them.
 _CALLED = {"mj_step1": "step1", "mj_step2": "step2", "mj_mulM": "multiply"}
-_SOURCE = Path(__file__).with_name("native.c")
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
-#: `struct tick` of native.c: kind, size (0: a scalar), names.
+#: `struct tick` of tick.c, whose header schema/generate.py writes from this table: kind, size (0: a scalar), names.
 STRUCT: tuple[tuple[str, int, str], ...] = (
     ("words", 0, "memory"),
     # MuJoCo's vectors of the arm; those of the controller's model; what the sensors show
@@ -65,7 +63,7 @@ _SLICES = "Q Q_CMD DQ TAU TAU_EXT TAU_CMD POSE WRENCH"
 
 
 class _Memory(ctypes.Structure):
-    """`struct tick` of native.c."""
+    """`struct tick` of tick.c."""
 
     _fields_ = tuple(
         (name, _TYPES[kind] * size if size else _TYPES.get(kind, _POINTER))
@@ -74,40 +72,23 @@ class _Memory(ctypes.Structure):
     )
 
 
-def _header() -> str:
-    """Constants and `struct tick` for native.c."""
-    constants = {
-        "DONE": DONE,
-        "LOADED": LOADED,
-        "ASK": ASK,
-        "STRAINED": STRAINED,
-        "ELSEWHERE": ELSEWHERE,
-        "SLOTS": SLOTS,
-        "TICK_NS": TICK_NS,
-        "HEADER": HeaderWords.SECTION.start,
-        "NEWEST": HeaderWords.NEWEST,
-        "WAKE_AT": HeaderWords.WAKE,
-        "STATES": StateWords.SECTION.start,
-        "SIZE": StateWords.SIZE,
-        **{name: getattr(StateWords, name) for name in _WORDS.split()},
-        **{name: getattr(StateWords, name).start for name in _SLICES.split()},
-    }
-    types = {"words": "word *", "reals": "double *", "word": "word ", "real": "double ", "address": "void *"}
-    types |= {
-        "step": "step *",
-        "product": "product *",
-        "table": "const struct table *",
-        "cursor": "struct cursor ",
-    }
-    members = [
-        f"    {types[kind]}{name}{f'[{size}]' if size else ''};"
-        for kind, size, names in STRUCT
-        for name in names.split()
-    ]
-    lines = ["typedef int64_t word;", "typedef void step(const void *, void *);"]
-    lines += ["typedef void product(const void *, const void *, double *, const double *);"]
-    lines += [f"enum {{ {name} = {value} }};" for name, value in constants.items()]
-    return "\n".join([*lines, "struct tick {", *members, "};", ""])
+#: Constants of tick.c.
+CONSTANTS: dict[str, int] = {
+    "DONE": DONE,
+    "LOADED": LOADED,
+    "ASK": ASK,
+    "STRAINED": STRAINED,
+    "ELSEWHERE": ELSEWHERE,
+    "SLOTS": SLOTS,
+    "TICK_NS": TICK_NS,
+    "HEADER": HeaderWords.SECTION.start,
+    "NEWEST": HeaderWords.NEWEST,
+    "WAKE_AT": HeaderWords.WAKE,
+    "STATES": StateWords.SECTION.start,
+    "SIZE": StateWords.SIZE,
+    **{name: getattr(StateWords, name) for name in _WORDS.split()},
+    **{name: getattr(StateWords, name).start for name in _SLICES.split()},
+}
 
 
 def _mujoco() -> ctypes.CDLL:
@@ -130,9 +111,7 @@ def tick_library() -> ctypes.CDLL:
     Raises:
         Unavailable: this system is not supported, or has no compiler.
     """
-    made = compiled_library(
-        "tick", SET_POINTS.read_bytes() + _header().encode() + _SOURCE.read_bytes(), holds_gil=True
-    )
+    made = library(holds_gil=True)
     made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
     made.ht_write.restype = made.ht_publish.restype = _WORD
     made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)

@@ -12,7 +12,7 @@ from math import atan2, cos, inf, nan, sin, sqrt
 import mujoco
 import numpy as np
 
-from heptarm.io.compiled import Unavailable
+from heptarm._library import Unavailable
 from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import flange
 from heptarm.planning.command import TICK

@@ -1,13 +1,13 @@
 /* Kinematics and dynamics of an LBR in C, as in heptarm.model: the tests compare them. Base axes, SI units.
 
    Newton-Euler recursion in base axes (Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 5). */
-#ifndef HEPTARM_MODEL_H
-#define HEPTARM_MODEL_H
+#ifndef HEPTARM_DYNAMICS_H
+#define HEPTARM_DYNAMICS_H
 
 #include <math.h>
 #include <string.h>
 
-#include "../fri/loop/kinematics.h"
+#include "kinematics.h"
 
 enum { BODIES = 8 };
 
@@ -25,7 +25,7 @@ struct posture {
 };
 
 /* R S R' of a symmetric S = xx yy zz xy xz yz. */
-static void turned(const double *r, const double *s, double *into) {
+static inline void turned(const double *r, const double *s, double *into) {
     double full[9] = {s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]}, half[9];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) half[3 * i + j] = r[3 * i] * full[j] + r[3 * i + 1] * full[3 + j] + r[3 * i + 2] * full[6 + j];
@@ -33,7 +33,7 @@ static void turned(const double *r, const double *s, double *into) {
         for (int j = 0; j < 3; j++) into[3 * i + j] = dot(half + 3 * i, r + 3 * j, 3);
 }
 
-static void find_posture(const struct robot *robot, const double *q, struct posture *p) {
+static inline void find_posture(const struct robot *robot, const double *q, struct posture *p) {
     double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3];
     for (int i = 0; i < N; i++) {
         advance(i, robot->origin[i], q[i], turn, place, p->axis[i]);
@@ -53,7 +53,7 @@ static void find_posture(const struct robot *robot, const double *q, struct post
 }
 
 /* Force and moment about the joint of a body that moves with it. */
-static void newton_euler(const struct posture *p, int body, int joint, const double *w, const double *dw, const double *a, double *f, double *n) {
+static inline void newton_euler(const struct posture *p, int body, int joint, const double *w, const double *dw, const double *a, double *f, double *n) {
     double lever[3], part[3], force[3], momentum[3];
     for (int k = 0; k < 3; k++) lever[k] = p->com[body][k] - p->origin[joint][k];
     cross(w, lever, part);
@@ -72,7 +72,7 @@ static void newton_euler(const struct posture *p, int body, int joint, const dou
 }
 
 /* Inverse dynamics: M ddq + C dq + g with the acceleration of gravity `fall`. */
-static void inverse_dynamics(const struct posture *p, const double *dq, const double *ddq, const double *fall, double *tau) {
+static inline void inverse_dynamics(const struct posture *p, const double *dq, const double *ddq, const double *fall, double *tau) {
     double w[N][3], dw[N][3], a[N][3], part[3], lever[3];
     for (int i = 0; i < N; i++) {
         for (int k = 0; k < 3; k++) {
@@ -106,7 +106,7 @@ static void inverse_dynamics(const struct posture *p, const double *dq, const do
     }
 }
 
-static void mass_matrix(const struct posture *p, double m[N][N]) {
+static inline void mass_matrix(const struct posture *p, double m[N][N]) {
     static const double none[N];
     for (int j = 0; j < N; j++) {
         double unit[N] = {0}, column[N];
@@ -117,23 +117,23 @@ static void mass_matrix(const struct posture *p, double m[N][N]) {
 }
 
 /* With the inertia of the motors: what a torque accelerates. */
-static void moved_mass(const struct robot *robot, const struct posture *p, double m[N][N]) {
+static inline void moved_mass(const struct robot *robot, const struct posture *p, double m[N][N]) {
     mass_matrix(p, m);
     for (int i = 0; i < N; i++) m[i][i] += robot->rotor;
 }
 
-static void coriolis(const struct posture *p, const double *dq, double *tau) {
+static inline void coriolis(const struct posture *p, const double *dq, double *tau) {
     static const double none[N];
     inverse_dynamics(p, dq, none, none, tau);
 }
 
-static void gravity(const struct posture *p, const double *fall, double *tau) {
+static inline void gravity(const struct posture *p, const double *fall, double *tau) {
     static const double none[N];
     inverse_dynamics(p, none, none, fall, tau);
 }
 
 /* Rotation vector from a rotation to that of a unit quaternion x y z w, base axes [rad]. */
-static void rotation_error(const double *turn, const double *quat, double *error) {
+static inline void rotation_error(const double *turn, const double *quat, double *error) {
     double x = quat[0], y = quat[1], z = quat[2], w = quat[3];
     double goal[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
                       2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
@@ -151,7 +151,7 @@ static void rotation_error(const double *turn, const double *quat, double *error
 }
 
 /* Unit quaternion x y z w of a rotation (Shepperd 1978). */
-static void quaternion(const double *r, double *quat) {
+static inline void quaternion(const double *r, double *quat) {
     double trace = r[0] + r[4] + r[8];
     int largest = 3;
     double most = trace;

@@ -6,23 +6,23 @@
 
 #include <math.h>
 
-#include "native_layout.h"
+#include "fri_layout.h"
 
-static double least(double a, double b) { return a < b ? a : b; }
-static double most(double a, double b) { return a > b ? a : b; }
+static inline double least(double a, double b) { return a < b ? a : b; }
+static inline double most(double a, double b) { return a > b ? a : b; }
 
-static double ramp(double room, double jerk) {
+static inline double ramp(double room, double jerk) {
     if (room <= 0.0) return room;
     double n = (double)(word)((sqrt(1.0 + 8.0 * room / jerk) - 1.0) * 0.5);
     return n * jerk + (room - jerk * n * (n + 1) * 0.5) / (n + 1);
 }
 
-static double brake(double v, double a, double top, double jerk) {
+static inline double brake(double v, double a, double top, double jerk) {
     double target = v > 0.0 ? -ramp(v, jerk) : ramp(-v, jerk);
     return least(least(most(most(target, -top), a - jerk), top), a + jerk);
 }
 
-static double overrun(double v, double a, double top, double jerk) {
+static inline double overrun(double v, double a, double top, double jerk) {
     double peak = v + a * a / (2.0 * jerk), covered, rest;
     if (a >= 0.0)
         covered = (v > 0.0 ? v : 0.0) * a / jerk + a * a * a / (3.0 * jerk * jerk);
@@ -39,7 +39,7 @@ static double overrun(double v, double a, double top, double jerk) {
 
 /* Acceleration of the next step towards a goal that is `step` away and moves by `goal_v` in a step; whether the joint is there
    and as fast after it. */
-static double acceleration_to(double step, double goal_v, double v, double a, double high, double top, double jerk, int *is_there) {
+static inline double acceleration_to(double step, double goal_v, double v, double a, double high, double top, double jerk, int *is_there) {
     double upper = least(least(a + jerk, top), ramp(high - v, jerk));
     double lower = most(most(a - jerk, -top), -ramp(high + v, jerk));
     double wanted = step - v;

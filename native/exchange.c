@@ -3,11 +3,11 @@
 Python runs signal handlers between two instructions of its own, never within a function in C: so Ctrl-C comes before a
 request or after its answer, and none of the frames is cut.
 
-The interface of Python is declared here, since its headers are a package of its own on many systems. All of it belongs
-to the stable ABI. */
+Written against the limited API of Python 3.10. A frame's tag is computed by `FrameTag.of`, so that HMAC stands once. */
+
+#include "module.h"
 
 #include <errno.h>
-#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -15,59 +15,15 @@ to the stable ABI. */
 
 #include "frame_layout.h"
 
-typedef struct _object PyObject;
-typedef ptrdiff_t Py_ssize_t;
-typedef struct {
-    const char *name;
-    void *function;
-    int flags;
-    const char *text;
-} PyMethodDef;
-
-enum { METH_FASTCALL = 0x80 };
-
-extern PyObject _Py_NoneStruct, _Py_TrueStruct, _Py_FalseStruct;
-extern PyObject *PyExc_OSError, *PyExc_TypeError;
-extern void Py_IncRef(PyObject *), Py_DecRef(PyObject *);
-extern void *PyEval_SaveThread(void);
-extern void PyEval_RestoreThread(void *);
-extern PyObject *PyErr_Occurred(void), *PyErr_SetFromErrno(PyObject *);
-extern void PyErr_Clear(void), PyErr_SetString(PyObject *, const char *);
-extern int PyBytes_AsStringAndSize(PyObject *, char **, Py_ssize_t *);
-extern PyObject *PyBytes_FromStringAndSize(const char *, Py_ssize_t);
-extern PyObject *PyCFunction_NewEx(PyMethodDef *, PyObject *, PyObject *);
-extern int PyDict_SetItem(PyObject *, PyObject *, PyObject *);
-extern int PyList_Append(PyObject *, PyObject *), PyList_SetItem(PyObject *, Py_ssize_t, PyObject *);
-extern int PyList_SetSlice(PyObject *, Py_ssize_t, Py_ssize_t, PyObject *);
-extern PyObject *PyList_GetItem(PyObject *, Py_ssize_t);
-extern Py_ssize_t PyList_Size(PyObject *);
-extern long PyLong_AsLong(PyObject *);
-extern long long PyLong_AsLongLong(PyObject *);
-extern unsigned long PyLong_AsUnsignedLong(PyObject *);
-extern PyObject *PyLong_FromLongLong(long long), *PyLong_FromUnsignedLong(unsigned long);
-extern PyObject *PyObject_CallFunctionObjArgs(PyObject *, ...);
-extern PyObject *PyObject_GetAttr(PyObject *, PyObject *);
-extern PyObject *PyUnicode_InternFromString(const char *);
-extern PyObject *PyTuple_GetItem(PyObject *, Py_ssize_t), *PyTuple_Pack(Py_ssize_t, ...);
-
 /* what `line`, the tuple of a connection, contains: the parameters of `compiled_link` in exchange.py */
 enum { COUNTS, WAITING, TAGS, LEFT, PENDING, SPARE, SOCKET, TAKE_READING, END_READING, TAKE_SENDING, END_SENDING };
 /* what `counts` contains: see heptarm.wire.session */
 enum { SENT, RECEIVED, REQUESTED, UNREAD };
 /* what `tags` contains in a session with a key: of our frames, of the other side's */
 enum { OURS, THEIRS };
-/* what `begins` of a FrameTag contains */
-enum { INNER, OUTER, HASHES };
-static PyObject *begins;
-/* longest body of a request, what is read at once, a digest of SHA-256 [bytes] */
-enum { LONGEST = 1024, ROOM = 16384, DIGEST = 32 };
-
-/* SHA-256 of OpenSSL's libcrypto (openssl/sha.h): a SHA256_CTX is 112 bytes long and needs no memory of its own, unlike
-the hashes of hashlib. */
-typedef struct {
-    uint64_t words[14];
-} Hash;
-static int (*hash_init)(Hash *), (*hash_update)(Hash *, const void *, size_t), (*hash_final)(uint8_t *, Hash *);
+static PyObject *of; /* name of the method of a FrameTag */
+/* longest body of a request, what is read at once [bytes] */
+enum { LONGEST = 1024, ROOM = 16384 };
 
 static PyObject *part(PyObject *line, Py_ssize_t which)
 {
@@ -76,21 +32,21 @@ static PyObject *part(PyObject *line, Py_ssize_t which)
 
 static int takes(PyObject *line, Py_ssize_t which)
 {
-    PyObject *taken = PyObject_CallFunctionObjArgs(part(line, which), &_Py_FalseStruct, NULL);
-    Py_DecRef(taken);
-    return taken == &_Py_TrueStruct;
+    PyObject *taken = PyObject_CallFunctionObjArgs(part(line, which), Py_False, NULL);
+    Py_XDECREF(taken);
+    return taken == Py_True;
 }
 
 static void ends(PyObject *line, Py_ssize_t which)
 {
-    Py_DecRef(PyObject_CallFunctionObjArgs(part(line, which), NULL));
+    Py_XDECREF(PyObject_CallFunctionObjArgs(part(line, which), NULL));
 }
 
 static int descriptor(PyObject *line)
 {
     PyObject *number = PyObject_CallFunctionObjArgs(part(line, SOCKET), NULL);
     int socket = (int)PyLong_AsLong(number);
-    Py_DecRef(number);
+    Py_XDECREF(number);
     return socket;
 }
 
@@ -126,30 +82,20 @@ static int is_tagged(PyObject *line)
     return PyList_Size(part(line, TAGS)) != 0;
 }
 
-/* Compute the tag of a frame as FrameTag.of does. Returns whether it was possible. */
+/* Compute the tag of a frame. Returns whether it was possible. */
 static int tag(PyObject *line, Py_ssize_t whose, const uint8_t *frame, size_t size, uint8_t *tag)
 {
-    PyObject *begin = PyObject_GetAttr(PyList_GetItem(part(line, TAGS), whose), begins);
-    uint8_t digest[DIGEST];
-    const void *message = frame;
-    int i = 0;
-    for (; i < HASHES && begin != NULL; i++) {
-        Hash hash;
-        char *first;
-        Py_ssize_t length;
-        if (PyBytes_AsStringAndSize(PyTuple_GetItem(begin, i), &first, &length))
-            break;
-        if (!hash_init(&hash) || !hash_update(&hash, first, (size_t)length) || !hash_update(&hash, message, size)
-            || !hash_final(digest, &hash))
-            break;
-        message = digest;
-        size = DIGEST;
-    }
-    Py_DecRef(begin);
+    PyObject *bytes = PyBytes_FromStringAndSize((const char *)frame, (Py_ssize_t)size);
+    PyObject *made = bytes ? PyObject_CallMethodObjArgs(PyList_GetItem(part(line, TAGS), whose), of, bytes, NULL) : NULL;
+    char *first = NULL;
+    Py_ssize_t length = 0;
+    int done = made != NULL && !PyBytes_AsStringAndSize(made, &first, &length) && length == TAG;
+    if (done)
+        memcpy(tag, first, TAG);
+    Py_XDECREF(bytes);
+    Py_XDECREF(made);
     PyErr_Clear();
-    if (i == HASHES)
-        memcpy(tag, digest, TAG);
-    return i == HASHES;
+    return done;
 }
 
 /* Send a whole frame. Returns 1; 0 if nothing could be sent at once; -1 with errno. */
@@ -210,8 +156,8 @@ static PyObject *pair(PyObject *first, const uint8_t *frame, ssize_t length)
 {
     PyObject *body = PyBytes_FromStringAndSize((const char *)frame + HEADER, length);
     PyObject *both = first && body ? PyTuple_Pack(2, first, body) : NULL;
-    Py_DecRef(first);
-    Py_DecRef(body);
+    Py_XDECREF(first);
+    Py_XDECREF(body);
     return both;
 }
 
@@ -219,7 +165,7 @@ static void keep(PyObject *line, const uint8_t *data, ssize_t size)
 {
     PyObject *left = PyBytes_FromStringAndSize((const char *)data, size);
     PyList_Append(part(line, LEFT), left);
-    Py_DecRef(left);
+    Py_XDECREF(left);
 }
 
 /* Receive what has come, or wait for it. Returns its size; 0 at the end; -1: nothing; -2 with errno: the connection is
@@ -263,13 +209,13 @@ static PyObject *leave(PyObject *line, uint32_t request, PyObject *kind, const u
     PyObject *number = PyLong_FromUnsignedLong(request), *spare = part(line, SPARE);
     Py_ssize_t last = PyList_Size(spare) - 1;
     PyObject *pending = PyList_GetItem(spare, last);
-    Py_IncRef(pending);
+    Py_INCREF(pending);
     PyList_SetSlice(spare, last, last + 1, NULL);
     PyDict_SetItem(part(line, WAITING), number, kind);
     PyDict_SetItem(part(line, PENDING), number, pending);
     if (size > 0)
         keep(line, data, size);
-    Py_DecRef(number);
+    Py_XDECREF(number);
     return pending;
 }
 
@@ -316,8 +262,8 @@ static PyObject *exchange(PyObject *line, PyObject *const *given, Py_ssize_t cou
     if (result != NULL)
         return result;
     if (sent == 0) {
-        Py_IncRef(&_Py_NoneStruct);
-        return &_Py_NoneStruct;
+        Py_INCREF(Py_None);
+        return Py_None;
     }
     errno = error;
     return PyErr_SetFromErrno(PyExc_OSError);
@@ -334,7 +280,7 @@ static PyObject *state(PyObject *line, PyObject *const *given, Py_ssize_t count)
     if (PyErr_Occurred())
         return NULL;
     int socket = descriptor(line);
-    PyObject *result = &_Py_FalseStruct;
+    PyObject *result = Py_False;
     if (socket >= 0 && !PyList_Size(part(line, LEFT)) && !counted(line, UNREAD)) {
         uint8_t data[ROOM];
         ssize_t size = receives(socket, data, (int)flags);
@@ -348,33 +294,26 @@ static PyObject *state(PyObject *line, PyObject *const *given, Py_ssize_t count)
         if (size > 0)
             keep(line, data, size);
         if (size < 0)
-            result = &_Py_NoneStruct;
+            result = Py_None;
     }
-    Py_IncRef(result);
+    Py_INCREF(result);
     return result;
 }
 
 static PyMethodDef methods[] = {
-    {"exchange", exchange, METH_FASTCALL, NULL},
-    {"state", state, METH_FASTCALL, NULL},
+    {"exchange", (PyCFunction)(void (*)(void))exchange, METH_FASTCALL, NULL},
+    {"state", (PyCFunction)(void (*)(void))state, METH_FASTCALL, NULL},
 };
 
-/* Where SHA256_Init, SHA256_Update and SHA256_Final are: once, before a session with a key. */
-void he_hash(int (*init)(Hash *), int (*update)(Hash *, const void *, size_t), int (*final)(uint8_t *, Hash *))
+/* Both functions for one connection, whose tuple is `line`. */
+PyObject *exchange_functions(PyObject *module, PyObject *line)
 {
-    hash_init = init;
-    hash_update = update;
-    hash_final = final;
-}
-
-/* Both functions for one connection. */
-PyObject *he_functions(PyObject *line)
-{
-    if (begins == NULL && (begins = PyUnicode_InternFromString("begins")) == NULL)
+    (void)module;
+    if (of == NULL && (of = PyUnicode_InternFromString("of")) == NULL)
         return NULL;
-    PyObject *first = PyCFunction_NewEx(&methods[0], line, NULL), *second = PyCFunction_NewEx(&methods[1], line, NULL);
+    PyObject *first = PyCFunction_New(&methods[0], line), *second = PyCFunction_New(&methods[1], line);
     PyObject *both = first && second ? PyTuple_Pack(2, first, second) : NULL;
-    Py_DecRef(first);
-    Py_DecRef(second);
+    Py_XDECREF(first);
+    Py_XDECREF(second);
     return both;
 }

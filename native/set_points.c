@@ -1,25 +1,8 @@
-/* Set-points of a motion: what `SetPointRows` computes in Python, which is the reference. */
+#include "set_points.h"
+
 #include <math.h>
-#include <stdint.h>
 
-enum { AXES = 7, PIECE = 5, LINE = 2 + 2 * AXES };
-
-/* What `MotionTable` describes. Rows of pieces: a time, and the coefficients of s over the time since; of lines: s at both ends,
-   joint positions at the first one and their span. */
-struct table {
-    const double *pieces, *lines;
-    int64_t piece_count, line_count;
-    double end;
-};
-
-/* Where a motion is: its time, s there, and the piece and the line that they are in. */
-struct cursor {
-    double time, place;
-    int64_t piece, line;
-};
-
-/* Puts a cursor at a time before all lines; s is not known there. */
-static void ha_put(const struct table *t, struct cursor *c, double time) {
+void ha_put(const struct table *t, struct cursor *c, double time) {
     int64_t low = 0, high = t->piece_count - 1;
     while (low < high) { /* the last piece that begins before it */
         int64_t middle = (low + high + 1) / 2;
@@ -29,9 +12,7 @@ static void ha_put(const struct table *t, struct cursor *c, double time) {
     c->time = time, c->place = 0.0, c->piece = low, c->line = 0;
 }
 
-/* Moves a cursor on, and gives the set-point there. Returns 0 at the end of the profile or of the path, and where an axis cannot
-   follow: `leap` is how far it comes from `last` in a tick. */
-static int64_t ha_next(const struct table *t, struct cursor *c, double step, const double *last, const double *leap, double *there) {
+int64_t ha_next(const struct table *t, struct cursor *c, double step, const double *last, const double *leap, double *there) {
     double time = c->time += step;
     if (time >= t->end) return 0;
     while (c->piece < t->piece_count - 1 && time >= t->pieces[(c->piece + 1) * PIECE]) c->piece++;

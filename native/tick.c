@@ -2,8 +2,11 @@
    heptarm.sim.plant.plant, heptarm.sim.plant.external_load and heptarm.sim.plant.drive_monitor. This file does the same; sums of
    products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
 
-   The constants, and `struct tick`, whose members all have eight bytes, come from heptarm.sim.plant.native; set-points, from
-   heptarm/planning/ahead.c. */
+   tick_layout.h is generated from heptarm.sim.plant.native: the constants, and `struct tick`, whose members all have eight
+   bytes. */
+#include <math.h>
+
+#include "tick_layout.h"
 
 static void copy(double *to, const double *from, word count) {
     for (word i = 0; i < count; i++) to[i] = from[i];

@@ -2,9 +2,8 @@
    fri.guard. This file does the same, to the last bit, for messages that differ from the previous one in numbers only; every
    other message is handed back to Python unchanged.
 
-   native_layout.h is generated from the tables of the Python modules: layout of the shared memory, constants, and
+   fri_layout.h is generated from the tables of the Python modules: layout of the shared memory, constants, and
    `struct loop`, whose members all have eight bytes. */
-#define _GNU_SOURCE
 #include <arpa/inet.h>
 #include <errno.h>
 #include <math.h>
@@ -19,10 +18,10 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "include/heptarm_law.h"
+#include <heptarm_law.h>
 #include "kinematics.h"
 #include "limited_steps.h"
-#include "native_layout.h"
+#include "fri_layout.h"
 
 enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
 /* Place of an array of a state in t_arrays, and its bit in t_known. */
@@ -807,7 +806,7 @@ static void find_wrench(struct loop *l) {
 
 /* Process a datagram: HANDBACK, LAW (call hf_answer next), or the size of the answer in t_reply, 0 for none. */
 int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
-    struct seen seen;
+    struct seen seen = {0};
     int commanding = l->state == COMMANDING_ACTIVE, waiting = l->state == COMMANDING_WAIT;
     if (!l->hot || !read_message(l, data, size, &seen)) return HANDBACK;
     if (seen.sequence != (((uint64_t)l->sequence + 1) & 0xffffffff)) return HANDBACK;

@@ -2,8 +2,8 @@
 #include <heptarm_filter.h>
 #include <heptarm_law.h>
 
-#include "../fri/loop/limited_steps.h"
-#include "model.h"
+#include "limited_steps.h"
+#include "dynamics.h"
 
 static double clamp(double value, double limit) { return value > limit ? limit : value < -limit ? -limit : value; }
 

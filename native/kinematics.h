@@ -9,20 +9,20 @@
 
 enum { N = 7 };
 
-static void cross(const double *a, const double *b, double *c) {
+static inline void cross(const double *a, const double *b, double *c) {
     double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2];
     c[2] = a[0] * b[1] - a[1] * b[0];
     c[0] = x;
     c[1] = y;
 }
 
-static double dot(const double *a, const double *b, int size) {
+static inline double dot(const double *a, const double *b, int size) {
     double sum = 0.0;
     for (int i = 0; i < size; i++) sum += a[i] * b[i];
     return sum;
 }
 
-static void rotate(const double *turn, const double *v, double *into) {
+static inline void rotate(const double *turn, const double *v, double *into) {
     double x = dot(turn, v, 3), y = dot(turn + 3, v, 3);
     into[2] = dot(turn + 6, v, 3);
     into[0] = x;
@@ -30,7 +30,7 @@ static void rotate(const double *turn, const double *v, double *into) {
 }
 
 /* Move a frame, its rotation and its place, from link i - 1 to link i, whose joint is at `origin` in it; the joint's axis. */
-static void advance(int i, const double *origin, double q, double *turn, double *place, double *axis) {
+static inline void advance(int i, const double *origin, double q, double *turn, double *place, double *axis) {
     static const int direction[N] = {2, 1, 2, 1, 2, 1, 2};
     static const double sign[N] = {1, 1, 1, -1, 1, 1, 1};
     double c = cos(q), s = sin(q) * sign[i], offset[3];
@@ -46,7 +46,7 @@ static void advance(int i, const double *origin, double q, double *turn, double 
 }
 
 /* Jacobian of a point that moves with the flange, base axes. */
-static void jacobian(const double axis[N][3], const double origin[N][3], const double *point, double j[6][N]) {
+static inline void jacobian(const double axis[N][3], const double origin[N][3], const double *point, double j[6][N]) {
     for (int i = 0; i < N; i++) {
         double lever[3], part[3];
         for (int k = 0; k < 3; k++) lever[k] = point[k] - origin[i][k];
@@ -59,7 +59,7 @@ static void jacobian(const double axis[N][3], const double origin[N][3], const d
 }
 
 /* Cholesky factor of a symmetric positive definite matrix, in place; 0 if it is not. */
-static int factorise(double *m, int size) {
+static inline int factorise(double *m, int size) {
     for (int i = 0; i < size; i++)
         for (int j = 0; j <= i; j++) {
             double sum = m[size * i + j] - dot(m + size * i, m + size * j, j);
@@ -73,7 +73,7 @@ static int factorise(double *m, int size) {
     return 1;
 }
 
-static void solve(const double *factor, int size, double *b) {
+static inline void solve(const double *factor, int size, double *b) {
     for (int i = 0; i < size; i++) b[i] = (b[i] - dot(factor + size * i, b, i)) / factor[size * i + i];
     for (int i = size - 1; i >= 0; i--) {
         for (int j = i + 1; j < size; j++) b[i] -= factor[size * j + i] * b[j];
@@ -83,7 +83,7 @@ static void solve(const double *factor, int size, double *b) {
 
 /* J J' + DAMPING 1 of a Jacobian, factorised: damped inverses near singular postures; 0 if it is not positive definite. */
 #define DAMPING 1e-4
-static int damped_square(const double j[6][N], double *square) {
+static inline int damped_square(const double j[6][N], double *square) {
     for (int r = 0; r < 6; r++)
         for (int c = 0; c < 6; c++) square[6 * r + c] = dot(j[r], j[c], N) + (r == c ? DAMPING : 0.0);
     return factorise(square, 6);
@@ -101,7 +101,7 @@ struct wrench_map {
 };
 
 /* 0 if the damped square is not positive definite. */
-static int map_wrenches(const struct chain *chain, const double *q, struct wrench_map *map) {
+static inline int map_wrenches(const struct chain *chain, const double *q, struct wrench_map *map) {
     double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3], axis[N][3], origin[N][3];
     double j[6][N], factor[36], column[6];
     memcpy(map->q, q, sizeof map->q);
@@ -122,7 +122,7 @@ static int map_wrenches(const struct chain *chain, const double *q, struct wrenc
 }
 
 /* External wrench on the flange, base axes [N, Nm], that explains external torques of the joints best (least squares). */
-static void explain_torques(const struct wrench_map *map, const double *tau, double *wrench) {
+static inline void explain_torques(const struct wrench_map *map, const double *tau, double *wrench) {
     for (int r = 0; r < 6; r++) wrench[r] = dot(map->inverse[r], tau, N);
 }
 
