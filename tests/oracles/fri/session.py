@@ -1,51 +1,18 @@
-"""State machine of a client's session: it tracks state, quality, counters and lost messages."""
+"""State machine of a client's session, in Python: what native/fri_session.c has to do."""
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass
 
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import MonitoringReader, Sample
-from heptarm.fri.protocol.protobuf import MalformedMessage, read_varint
+from heptarm.fri.protocol.protobuf import MalformedMessage
 from heptarm.fri.protocol.version import Version, recognise, spoken_version
-from heptarm.fri.session.answers import NOTHING, Answers, Setpoint
+from heptarm.fri.session.events import Event, Kind
 from heptarm.fri.session.statistics import Counters, Histogram
 from heptarm.values.robot import ROBOTS
 
-
-class Kind(enum.Enum):
-    """Subject of an event."""
-
-    STATE = "state"
-    QUALITY = "quality"
-    VERSION = "version"
-    WRONG_VERSION = "wrong version"
-    MALFORMED = "malformed"
-    LOST = "lost"
-    DUPLICATED = "duplicated"
-    REORDERED = "reordered"
-    RESTARTED = "restarted"
-    COMMAND_MODE = "command mode"
-    SAFETY = "safety"
-    NO_IPO = "no interpolator position"
-    CLIENT = "client"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Event of a session.
-
-    Attributes:
-        kind: subject.
-        text: description.
-        at: time of the client's clock [ns].
-    """
-
-    kind: Kind
-    text: str
-    at: int
+from .answers import NOTHING, Answers, Setpoint
+from .sample import Sample, sample_of
 
 
 #: Largest decrease of the counter that counts as a reordered message; a larger one is a restart of the controller.
