@@ -15,12 +15,13 @@ import pytest
 from heptarm.errors import ConnectionLost
 from heptarm.fri import Client
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.cycle import LAW_FAILED, LOOP_FAILED
+from heptarm.fri.loop.cycle import LAW_FAILED
+from heptarm.fri.loop.native import OVERRUN
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, SessionState
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.session import MAX_COORDINATE, OVERRUN, Kind
+from heptarm.fri.session.events import Kind
 from heptarm.values.robot import robot
 
 from .controller import IPO, Controller

@@ -1,70 +1,48 @@
-"""One cycle of the loop: process a datagram, make its answer, publish the result in shared memory.
-
-There is no socket or clock here; `heptarm.fri.loop.process` has both. A cycle also handles poses, signals and frames.
-"""
+"""One cycle of the loop, in Python: what native/fri_cycle.c has to do."""
 
 from __future__ import annotations
 
-import json
 import math
-import time
-import traceback
-from collections.abc import Callable, Sequence
+import struct
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.fri.guard.collision_watch import CollisionWatch
-from heptarm.fri.guard.fallback import CommandFallback, Policy
-from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
-from heptarm.fri.guard.joint_guard import JointGuard, Limits
-from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
+from heptarm.errors import CommandRejected
+from heptarm.fri.guard.fallback import Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.law_interface import Memory
-from heptarm.fri.loop.law_limit import EndlessLaw, LawLimit
-from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
+from heptarm.fri.loop.cycle import LAW_FAILED, describe
+from heptarm.fri.loop.native import COLLIDED, GAP_PERIODS, GRACE, MIN_GAP, REPEATS, REPEATS_ANALOG
+from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
-from heptarm.fri.loop.wrench import WrenchEstimator, posture
+from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.answers import NOTHING, Setpoint
-from heptarm.fri.session.session import Positions, Session
 from heptarm.fri.session.statistics import Histogram
+from heptarm.values.condition.collision import Collision
 from heptarm.values.pose import Pose
 
-#: `law(state, out, params)`, or `law(state, out, params, memory)`.
-Law = Callable[..., object]
+from .answers import NOTHING, Setpoint
+from .collision_watch import CollisionWatch, as_numbers
+from .fallback import CommandFallback
+from .gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
+from .joint_guard import JointGuard
+from .pose_guard import PoseGuard, between, moved
+from .record import NAN6, NAN7, NOTHING_SENT, Record, Sent
+from .sample import Sample
+from .session import Session
+from .wrench import WrenchEstimator
 
-#: A gap in the messages of more command periods than this is bridged by an estimate of the setpoint.
-GAP_PERIODS = 5
-#: A gap has at least this duration [ns]; skipped cycles of a shorter one are done evenly towards the target.
-MIN_GAP = 25_000_000
-#: A command given up to this long before commanding starts counts [ns].
-GRACE = 50_000_000
-#: Time budget of a law, as a fraction of the command period.
-LAW_FRACTION = 0.5
-#: Beginning of the text of the event after a failure of the law.
-LAW_FAILED = "the law failed, the arm brakes: "
-#: Beginning of the text of the event after a collision.
-COLLIDED = "collision, the arm brakes: "
-#: Beginning of the text of the event after a failure of the loop itself.
-LOOP_FAILED = "the loop failed, the arm brakes: "
-#: Largest number of answers that repeat an output until the cabinet shows it.
-REPEATS = 50
-#: Number of answers that repeat an analog output, which the cabinet may round; an answer may be lost.
-REPEATS_ANALOG = 10
 #: Largest number of skipped cycles that are done after a short gap.
 _MAX_SKIPPED = 25
 #: A larger jump of the counter is a change of the counter, not lost messages.
 _MAX_LOST = 1000
+_KINDS = {m.IoType.BOOLEAN: 0, m.IoType.DIGITAL: 1, m.IoType.ANALOG: 2}
 _ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
 _JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)
-
-
-class LawFailure(HeptarmError):
-    """A compiled law has failed; the text gives the cause."""
 
 
 def from_wire(values: Sequence[float]) -> tuple[float, ...]:
@@ -166,7 +144,12 @@ class PoseCommander:
         guard, monitor = self.guard, message.monitor
         displacement: Sequence[float] = _ZEROS6
         e1_change = 0.0
-        if last is not None and monitor is not None and monitor.pose is not None:
+        if (
+            last is not None
+            and monitor is not None
+            and monitor.pose is not None
+            and math.isfinite(last[at.S_POSE])
+        ):
             then = State(last)
             displacement = between(then.pose.array.tolist(), from_wire(monitor.pose.values))
             if monitor.redundancy is not None and math.isfinite(then.e1):
@@ -237,14 +220,13 @@ class SignalExchange:
         self.signals = Signals()
         self.numbers: Sequence[float] = ()
         self.outputs = Outputs()
-        self.outputs_seen = layout.outputs.tick
+        self.outputs_seen = int(layout.outputs._words[0])
         self._known: dict[str, m.IoValue] = {}
         self._asked: tuple[m.Transformation, ...] = ()
         self.pending: dict[str, tuple[int | float, int]] = {}
-        self._taken: dict[str, int] = {}  # by output, count of the last write
+        self._taken = 0  # count of the newest output
         self._frames: dict[str, tuple[tuple[float, ...], m.TimeStamp | None]] = {}
-        self._published: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-        layout.offered.write(json.dumps({"signals": self.signals.text, "frames": []}))
+        self._published: tuple[object, ...] = ((), ())
 
     @property
     def is_idle(self) -> bool:
@@ -253,11 +235,6 @@ class SignalExchange:
 
     def update(self, sample: Sample) -> None:
         """Read signals and requested frames of a message."""
-        if not sample.is_full:
-            if not self.is_idle:
-                self._known, self._asked, self.numbers = {}, (), ()
-                self._publish(())
-            return
         full = sample.message
         io = full.monitor.io if full.monitor is not None else ()
         self._known = {one.name: one for one in io}
@@ -265,44 +242,37 @@ class SignalExchange:
         self.numbers = [float(one.value) for one in io]
         self._publish(io)
 
-    @property
-    def known(self) -> tuple[m.IoValue, ...]:
-        """Signals in the last message, each name once."""
-        return tuple(self._known.values())
-
-    def show(self, values: Sequence[int | float]) -> None:
-        """Note the values in a message that only the native part has read, in the order of `known`."""
-        signals = zip(self.known, values, strict=True)
-        self._known = {one.name: replace(one, value=value) for one, value in signals}
-
     def _publish(self, io: tuple[m.IoValue, ...]) -> None:
         """Publish the names of signals and frames for the user's process when they change."""
-        names = tuple(self._known), tuple(one.name for one in self._asked)
+        names = tuple((one.name, one.type, one.direction) for one in io), tuple(one.name for one in self._asked)
         if names == self._published:
             return
         self._published = names
-        self.signals = self.outputs.signals = Signals.of(io)
+        self.signals = self.outputs.signals = Signals.of(names[0])
         self.pending = {name: one for name, one in self.pending.items() if name in self._known}
-        self._layout.offered.write(json.dumps({"signals": self.signals.text, "frames": names[1]}))
 
     def take(self) -> None:
         """Read new outputs and frames of the user's process."""
-        note = self._layout.outputs
-        if note.tick == self.outputs_seen:
+        words = self._layout.outputs._words
+        if words[0] == self.outputs_seen:
             return
-        text = note.read()
-        if text is None:  # being written: read it in the next cycle
-            return
-        self.outputs_seen = note.tick
-        given = json.loads(text)
-        for name, (count, value) in given["io"].items():
-            if count > self._taken.get(name, 0):
-                self._taken[name] = count
-                self._request(name, value)
+        self.outputs_seen = int(words[0])
+        place, newest = 3, self._taken
+        for _ in range(int(words[1])):
+            count, is_analog, bits = (int(one) for one in words[place : place + 3])
+            if count > self._taken:
+                kind = "<d" if is_analog else "<Q"
+                newest = max(newest, count)
+                self._request(at._name(words[place + 3 :]), struct.unpack(kind, struct.pack("<q", bits))[0])
+            place += 3 + at.NAME_WORDS
+        self._taken = newest
         stamp = next((one.stamp for one in self._asked), None)
-        for name, numbers in given["frames"].items():
-            if name not in self._frames or self._frames[name][0] != tuple(numbers):
-                self._frames[name] = (tuple(numbers), stamp)
+        for _ in range(int(words[2])):
+            name = at._name(words[place:])
+            numbers = tuple(words[place + at.NAME_WORDS :][:7].view(np.float64).tolist())
+            if name not in self._frames or self._frames[name][0] != numbers:
+                self._frames[name] = (numbers, stamp)
+            place += at.NAME_WORDS + 7
 
     def write(self) -> None:
         """Request the outputs that the law has written and the cabinet does not show yet."""
@@ -313,8 +283,7 @@ class SignalExchange:
         self.outputs.written.clear()
 
     def _request(self, name: str, value: int | float) -> None:
-        known = self._known.get(name)
-        is_analog = known is not None and known.type is m.IoType.ANALOG
+        is_analog = isinstance(value, float)
         self.pending[name] = (value, REPEATS_ANALOG if is_analog else REPEATS)
 
     def add(self, setpoint: Setpoint, version: Version, report: Callable[[str], None]) -> Setpoint:
@@ -330,9 +299,14 @@ class SignalExchange:
         io = []
         for name, (value, left) in list(self.pending.items()):
             known = self._known.get(name)
-            if known is None:  # the session has changed since the output was checked
+            is_analog = isinstance(value, float)
+            if (  # the session has changed since the output was checked
+                known is None
+                or known.direction is not m.IoDirection.OUTPUT
+                or (known.type is m.IoType.ANALOG) != is_analog
+            ):
                 del self.pending[name]
-                report(f"this FRI session no longer has an output {name!r}")
+                report(f"this FRI session no longer has an output '{name}'")
                 continue
             shown = known.value == value and left < REPEATS
             if shown or not left:
@@ -380,76 +354,37 @@ class Cycle:
 
     Args:
         layout: the shared memory.
-        version: wire format; None takes it from the first datagram.
-        limits: limits of the joint guard.
-        pose_limits: limits of the pose guard; None for the defaults.
-        policy: behaviour without fresh commands.
-        law: called in every cycle of COMMANDING_ACTIVE; None uses the commands of the user's process.
-        params: parameters of the law.
-        memory: its memory, on `memory_values`; None: the law takes none.
-        memory_values: words of its memory, initially those of its first call.
-        positions: position limits of the robot [rad], see `Session`.
-        estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
-        watch: detects collisions, at which the arm brakes; None: nothing does.
-
-    Attributes:
-        memory_values: words of the law's memory.
-        is_compiled: whether the native part calls the law.
-        limit: interrupts a law in Python that does not return; None: nothing does.
-        q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, pose_commander, fallback, exchange, record, law, estimator, watch: its parts.
-        failure: why the loop has to end, in one line; empty as long as nothing failed in it.
-        is_ending: whether it brakes to end, regardless of commands.
-        mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
-        slope: velocity of the interpolator at that time [rad/s].
-        started: time at which commands became effective [ns].
-        commands_seen: number of commands read from the user's process.
+        settings: settings of the loop.
     """
 
-    def __init__(
-        self,
-        layout: at.Layout,
-        *,
-        version: Version | None,
-        limits: Limits,
-        pose_limits: PoseLimits | None = None,
-        policy: Policy,
-        law: Law | None = None,
-        params: Params | None = None,
-        memory: Memory | None = None,
-        memory_values: Floats | None = None,
-        positions: Positions | None = None,
-        estimator: WrenchEstimator | None = None,
-        watch: CollisionWatch | None = None,
-    ) -> None:
-        self.layout = layout
-        self.failure = ""
+    def __init__(self, layout: at.Layout, settings: LoopSettings) -> None:
+        self.layout, arm = layout, settings.arm
+        values, schema = settings.law_params
         self.session = Session(
-            version,
+            settings.wire,
             latency=Histogram(layout.latency),
             jitter=Histogram(layout.jitter),
-            positions=positions,
+            positions=(tuple(arm.q_min.tolist()), tuple(arm.q_max.tolist())),
+            fastest=arm.dq_max.tolist(),
         )
-        self.guard = JointGuard(limits)
-        self.pose_commander = PoseCommander(pose_limits or PoseLimits())
-        self.fallback = CommandFallback(policy)
+        self.guard = JointGuard(settings.limits or Limits.of(arm))
+        self.pose_commander = PoseCommander(settings.pose_limits or PoseLimits())
+        self.fallback = CommandFallback(settings.policy or Policy())
         self.is_ending = False
-        self.law = law
-        self._params = params
+        self.law = settings.law
+        self._params = Params(values.copy(), schema)
         self._param_tick = -1
-        self._memory = memory
-        self.memory_values: Floats = np.zeros(0) if memory_values is None else memory_values
-        self._memory_written = np.zeros(len(self.memory_values))
-        self._memory_tick = 0
-        self.is_compiled = False
-        self.limit: LawLimit | None = None
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)
         self.record = Record(layout, self.session)
-        self.estimator, self.watch = estimator, watch
+        self.session.publish = lambda event: self.record.report(event.at, event.text, event.kind)
+        self.estimator = WrenchEstimator(chain_of(arm))
+        guard = settings.collision
+        self.watch = None if guard is None else CollisionWatch(**as_numbers(guard))
         self._out = Output(self.exchange.outputs)
         self.commands_seen = layout.commands.count
-        self._restarts = 0
+        self.epoch, self._commanded, self._is_stale = 0, False, False
+        self._began = self._before_began = 0
         self._skipped = 0  # cycles without a message since the last setpoint
         self.mirrored: tuple[m.Joints, int] | None = None  # position, counter
         self.slope: Sequence[float] = NAN7
@@ -461,51 +396,17 @@ class Cycle:
 
     def turn(self, datagram: bytes, received: int) -> bytes | None:
         """Process a datagram and make its answer; call `finish` next.
-
-        An error never gets out: it is reported, the arm brakes from then on, and the loop ends with its cause.
-
-        Args:
-            datagram: the datagram.
-            received: time of receipt, monotonic clock [ns].
         """
-        kept = self.guard.sent, self.pose_commander.guard.motion
-        try:
-            return self._turn(datagram, received)
-        except Exception as error:
-            self._fail(error, received)
-        self.guard.sent, self.pose_commander.guard.motion = kept
-        try:
-            return self._safe_answer()
-        except Exception:  # the controller stops the arm itself when no answer arrives
-            return None
+        return self._turn(datagram, received)
 
     def forget_controller(self) -> None:
         """Reset for another controller: its counter, version and interpolator are not those of the last one."""
         self.session.restart()
+        self._began += 1
         self.guard.stop()
         self.pose_commander.guard.stop()
         self.pose_commander.forget()
         self.mirrored = self.q_before = None
-
-    def _fail(self, error: Exception, now: int) -> None:
-        """Report an error of the loop, and end the loop once the arm is at rest."""
-        if not self.failure:
-            self.failure = LOOP_FAILED + describe(error)
-            self.record.report(now, self.failure)
-        self.end()
-        self.layout.header[at.STOP] = 1
-
-    def _safe_answer(self) -> bytes | None:
-        """Answer that brakes where commands are effective, and mirrors the interpolator elsewhere."""
-        session, self.record.sent = self.session, NOTHING_SENT
-        setpoint = NOTHING
-        if session.is_commanding and session.mode in _JOINT_MODES and self.guard.is_started:
-            setpoint = Setpoint(q=tuple(self.guard.position(None)))
-        elif session.is_commanding and self.pose_commander.guard.is_started:
-            setpoint = Setpoint(pose=self.pose_commander.command(None, 0))
-        answer = session.answer(setpoint)
-        self._answered = answer is not None
-        return answer
 
     def _turn(self, datagram: bytes, received: int) -> bytes | None:
         session, record, exchange = self.session, self.record, self.exchange
@@ -515,8 +416,8 @@ class Cycle:
         self._fresh = sample = session.receive(datagram, received)
         if sample is None:
             return None
-        self._find_wrench(sample)
         self._differentiate(sample, sample.sequence - previous)
+        self._find_wrench(sample)
         exchange.update(sample)
         record.signals, record.state.signals = exchange.numbers, exchange.signals
         self._detect_collision(sample, received)
@@ -562,14 +463,14 @@ class Cycle:
 
     def _find_wrench(self, sample: Sample) -> None:
         """Take the external wrench of a message, or estimate it from the torques."""
-        monitor = sample.message.monitor if sample.is_full else None
+        monitor = sample.message.monitor
         sent = monitor.wrench if monitor is not None else None
         if sent is not None and not math.isnan(sent[0]):
             self.record.wrench = sent
         elif self.estimator is None or sample.q is None or sample.tau_ext is None:
             self.record.wrench = NAN6
         else:
-            self.record.wrench = self.estimator.wrench(posture(sample.q, self.q_before), sample.tau_ext)
+            self.record.wrench = self.estimator.wrench(sample.q, sample.tau_ext)
             self.record.flags |= at.ESTIMATED
 
     def _detect_collision(self, sample: Sample, now: int) -> None:
@@ -578,7 +479,7 @@ class Cycle:
             return
         found = self.watch.collision(sample.tau_ext, self.record.dq.tolist())
         if found is not None:
-            at.write_collision(self.layout, found)
+            write_collision(self.layout, found)
             text = str(found) if sample.tau_ext is not None else "the controller sends no external torques"
             self.record.report(now, COLLIDED + text)
             self.end()
@@ -590,13 +491,7 @@ class Cycle:
         self.session.counters.filled += bool(self.record.flags & at.FILLED)
 
     def finish(self, now: int) -> None:
-        """Publish the cycle, after its answer was sent at `now` [ns]; an error ends the loop as in `turn`."""
-        try:
-            self._publish(now)
-        except Exception as error:
-            self._fail(error, now)
-
-    def _publish(self, now: int) -> None:
+        """Publish the cycle, after its answer was sent at `now` [ns]."""
         session, header = self.session, self.layout.header
         if self._answered:
             session.answered(now)
@@ -604,17 +499,11 @@ class Cycle:
         self.record.report_all()
         if self._fresh is not None:
             self.record.publish(self._fresh, now - session.received if self._answered else 0)
+            header[at.EPOCH] = self.epoch
         session.counters.save(header, at.COUNTS)
-        if self.guard.was_limited:
-            at.write_report(self.layout, self.guard.report)
-        if self.pose_commander.guard.was_limited:
-            at.write_report(self.layout, self.pose_commander.guard.report)
+        write_report(self.layout, self.guard.report)
+        write_report(self.layout, self.pose_commander.guard.report)
         header[at.BEAT] = now
-
-    def idle(self, now: int) -> None:
-        """Publish that the loop runs although no message arrives."""
-        self.layout.header[at.BEAT] = now
-        self.record.report_all()
 
     def end(self) -> None:
         """Brake from now on, regardless of commands."""
@@ -637,8 +526,13 @@ class Cycle:
         elif pose_commander.has_pose:
             pose_commander.guard.stop()
             pose_commander.forget()
-        again = session.counters.restarts != self._restarts
-        self._restarts = session.counters.restarts
+        began = self._began + session.counters.restarts
+        again, self._before_began = began != self._before_began, began
+        commands = session.state >= m.SessionState.COMMANDING_WAIT
+        if commands and (again or not self._commanded):
+            self.epoch += 1
+            self._is_stale = False
+        self._commanded = commands
         self._skipped = 0
         if again or not session.is_commanding:
             guard.stop()
@@ -689,11 +583,14 @@ class Cycle:
     def _resume(self, sample: Sample, *, time: float, period: float) -> None:
         """Restart the joint guard after a gap, from the estimated positions and velocities."""
         guard, words = self.guard, self.layout.states.newest()
-        assert words is not None and sample.q is not None
-        then, now, is_exact = State(words).q, sample.q, True
-        if sample.q_cmd is not None:
-            then, now = State(words).q_cmd, sample.q_cmd
-        else:  # a compliant arm may deviate permanently from its setpoint
+        assert words is not None
+        before, is_exact = State(words), True
+        then: Floats = np.full(7, np.nan)
+        now: Sequence[float] = NAN7
+        if sample.q_cmd is not None and not np.isnan(before.q_cmd[0]):
+            then, now = before.q_cmd, sample.q_cmd
+        elif sample.q is not None and not np.isnan(before.q[0]):  # a compliant arm may deviate permanently
+            then, now = before.q, sample.q
             is_exact = sample.robot is not None and sample.robot.control_mode is m.ControlMode.POSITION
         commanded = [q - v for q, v in zip(guard.q, guard.v, strict=True)]
         speeds = [v / period for v in guard.v]
@@ -781,6 +678,16 @@ class Cycle:
         when = int(ints[at.C_AT])
         if when + GRACE < self.started:
             return
+        if ints[at.C_EPOCH] != self.epoch:
+            self.layout.header[at.STALE] += 1
+            if not self._is_stale:
+                self.record.report(
+                    self.session.received,
+                    "commands of a program that has not seen this session are not executed: the arm is held until the program "
+                    "has read a state of it",
+                )
+            self._is_stale = True
+            return
         self.fallback.command(
             when,
             q=numbers[at.C_Q : at.C_Q + 7] if given & at.GIVEN_Q else None,
@@ -801,55 +708,31 @@ class Cycle:
 
     def call_law(self, state: State, out: Output, now: int) -> None:
         """Call the law with its newest parameters; brake from now on if it fails."""
-        assert self.law is not None and self._params is not None
+        assert callable(self.law)
         ring = self.layout.params
-        if ring.count != self._param_tick:
-            words = ring.read(ring.count - 1)
-            if words is not None:
-                self._param_tick = ring.count
-                self._params.replace(words[1:])
-        began = time.monotonic_ns()
+        if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
+            self._param_tick = ring.count
+            self._params.replace(words[1:])
         try:
-            if self.limit is not None:
-                self.limit.begin(began)
-            if self._memory is None:
-                self.law(state, out, self._params)
-            else:
-                self._take_memory()
-                self.law(state, out, self._params, self._memory)
-                self.layout.memory.write(self.memory_values)
-            if self.limit is not None:
-                self.limit.end()
-        except BaseException as error:  # sys.exit() as well: the arm has to brake first
-            if self.limit is not None:
-                self.limit.end()
-            is_clear = isinstance(error, (LawFailure, EndlessLaw))
-            self.law_failed(str(error) if is_clear else describe(error), now)
-        if not self.is_compiled:  # the native part counts those of a compiled law
-            self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
-
-    def _take_memory(self) -> None:
-        """Take over what the user's process has written to the memory of the law."""
-        ring, size = self.layout.memory_set, len(self.memory_values)
-        if ring.count == self._memory_tick:
-            return
-        words = ring.read(ring.count - 1)
-        if words is None:  # being written: read it in the next cycle
-            return
-        self._memory_tick = ring.count
-        values, written = words[1 : 1 + size], words[1 + size :]
-        newer = written > self._memory_written
-        self.memory_values[newer] = values[newer]
-        self._memory_written[:] = written
-
-    def law_failed(self, text: str, now: int) -> None:
-        """Report that the law has failed; brake from now on."""
-        self.record.report(now, LAW_FAILED + text)
-        self.end()
+            self.law(state, out, self._params)
+        except BaseException as error:
+            self.record.report(now, LAW_FAILED + describe(error))
+            self.end()
 
 
-def describe(error: BaseException) -> str:
-    """Describe an error in one line, with its place."""
-    trace = traceback.extract_tb(error.__traceback__)
-    place = f" ({trace[-1].filename.rpartition('/')[2]}, line {trace[-1].lineno})" if trace else ""
-    return f"{type(error).__name__}: {error}{place}"
+def write_report(layout: at.Layout, report: object) -> None:
+    """Write the report of a guard."""
+    ints, floats = layout.block.ints, layout.block.floats
+    size, (counts, worst, allowed) = at._places(report)  # type: ignore[arg-type]
+    for kind in range(len(report.counts)):  # type: ignore[attr-defined]
+        start, end = size * kind, size * (kind + 1)
+        ints[counts + start : counts + end] = report.counts[kind]  # type: ignore[attr-defined]
+        floats[worst + start : worst + end] = report.worst[kind]  # type: ignore[attr-defined]
+        floats[allowed + start : allowed + end] = report.allowed[kind]  # type: ignore[attr-defined]
+
+
+def write_collision(layout: at.Layout, found: Collision) -> None:
+    """Write the first collision."""
+    floats = layout.block.floats
+    floats[at.COLLISION_TORQUE], floats[at.COLLISION_ALLOWED] = found.torque, found.allowed
+    layout.block.ints[at.COLLIDED] = 1 + found.joint

@@ -50,10 +50,14 @@ class JointGuard:
         limits, more = self.limits, 1.0 + ROUNDING
         self.period = period
         self.V = [value * period * more for value in limits.dq_max]
-        self.A = [value * period**2 * more for value in limits.ddq_max]
-        self.J = [value * period**3 * more for value in limits.dddq_max]
+        self.A = [value * period * period * more for value in limits.ddq_max]
+        self.J = [value * period * period * period * more for value in limits.dddq_max]
+        self.coast = max(COAST, COAST_PERIODS * period) / period
         # closer to a position limit than this, the stopping distance has to be checked
-        self.near = [overrun(v, a, a, j) + v for v, a, j in zip(self.V, self.A, self.J, strict=True)]
+        self.near = [
+            overrun(v, a, a, j) + v * (1.0 + self.coast)
+            for v, a, j in zip(self.V, self.A, self.J, strict=True)
+        ]
 
     def start(self, q: Sequence[float], dq: Sequence[float], *, period: float) -> None:
         """Start from position and velocity of the interpolator, with zero torque.
@@ -64,13 +68,16 @@ class JointGuard:
             period: command period [s].
         """
         self._scale(period)
-        self.q, self.r, self.a = list(q), list(q), [0.0] * AXES
+        self.q = [new if math.isfinite(new) else old for new, old in zip(q, self.q, strict=True)]
+        self.r, self.a = list(self.q), [0.0] * AXES
+        dq = [value if math.isfinite(value) else 0.0 for value in dq]
         self.v = [min(max(value * period, -top), top) for value, top in zip(dq, self.V, strict=True)]
         self.tau, self.wrench = [0.0] * AXES, [0.0] * 6
         for axis in range(AXES):
             v, a, j = self.v[axis], self.A[axis], self.J[axis]
-            self.low[axis] = min(self.limits.q_min[axis], q[axis] - overrun(-v, 0.0, a, j))
-            self.high[axis] = max(self.limits.q_max[axis], q[axis] + overrun(v, 0.0, a, j))
+            here, coast = self.q[axis], self.coast
+            self.low[axis] = min(self.limits.q_min[axis], here - overrun(-v, 0.0, a, j) - coast * max(-v, 0.0))
+            self.high[axis] = max(self.limits.q_max[axis], here + overrun(v, 0.0, a, j) + coast * max(v, 0.0))
         self.is_started, self.was_limited = True, False
 
     def stop(self) -> None:
@@ -168,10 +175,10 @@ class JointGuard:
         goal_v = min(max(goal - before, -high), high)
         step = goal - q
         wanted = step - v
-        if lower <= wanted <= upper and ON_TRACK * abs(step - goal_v) <= jerk:
+        is_there = lower <= wanted <= upper and ON_TRACK * abs(step - goal_v) <= jerk
+        if is_there:
             acc = wanted
         else:
-            self._report_violation(i, step, wanted, a)
             # in the frame of the moving goal, mirrored so that it lies ahead
             sign = 1.0 if step >= goal_v else -1.0
             ahead, speed, bent = sign * (step - goal_v), sign * (v - goal_v), sign * a
@@ -184,17 +191,30 @@ class JointGuard:
             else:  # interpolate between full acceleration and braking: just stops at the goal
                 rest = ahead - speed - least - overrun(speed + least, least, planned_a, planned_j)
                 acc = sign * (least if rest <= 0.0 else least + (most - least) * rest / (rest - room))
-        speed = v + acc
-        there = q + speed
-        if (
-            there + overrun(speed, acc, top, jerk) > self.high[i]
-            or there - overrun(-speed, -acc, top, jerk) < self.low[i]
-        ):
-            braking = brake(v, a, top, jerk)
-            if braking != acc and wanted == acc:
-                self._report_violation(i, step, wanted, a)
+        kept = self._held_back(i, acc)
+        if not is_there or kept != acc:
+            self._report_violation(i, step, wanted, a)
+        return kept
+
+    def _excess(self, i: int, acc: float) -> float:
+        """By how much an axis would pass a position limit after a step, if the cabinet then had to stop it."""
+        speed = self.v[i] + acc
+        there, top, jerk = self.q[i] + speed, self.A[i], self.J[i]
+        above = there + overrun(speed, acc, top, jerk) + self.coast * max(speed, 0.0) - self.high[i]
+        below = self.low[i] - there + overrun(-speed, -acc, top, jerk) + self.coast * max(-speed, 0.0)
+        return max(above, below)
+
+    def _held_back(self, i: int, acc: float) -> float:
+        """The acceleration nearest to a planned one with which the axis still stops before its limit."""
+        over = self._excess(i, acc)
+        if over <= 0.0:
+            return acc
+        braking = brake(self.v[i], self.a[i], self.A[i], self.J[i])
+        room = self._excess(i, braking)
+        if room >= 0.0:
             return braking
-        return acc
+        kept = braking + (acc - braking) * room / (room - over)
+        return kept if self._excess(i, kept) <= SLACK else braking
 
     def _report_violation(self, i: int, step: float, wanted: float, a: float) -> None:
         """Report the first limit that a target violates."""
@@ -202,9 +222,9 @@ class JointGuard:
         if abs(step) > self.V[i]:
             self._limited(Limited.VELOCITY, i, step / period, self.limits.dq_max[i])
         elif abs(wanted) > self.A[i]:
-            self._limited(Limited.ACCELERATION, i, wanted / period**2, self.limits.ddq_max[i])
+            self._limited(Limited.ACCELERATION, i, wanted / (period * period), self.limits.ddq_max[i])
         else:
-            self._limited(Limited.JERK, i, (wanted - a) / period**3, self.limits.dddq_max[i])
+            self._limited(Limited.JERK, i, (wanted - a) / (period * period * period), self.limits.dddq_max[i])
 
     def _limited(self, kind: Limited, axis: int, asked: float, allowed: float) -> None:
         self.was_limited = True

@@ -9,7 +9,13 @@ import math
 from collections.abc import Sequence
 
 from heptarm.fri.guard.joint_guard import PLANNED
-from heptarm.fri.guard.pose_guard import LARGEST_COORDINATE, SMALLEST_NORM, PoseLimited, PoseLimits, PoseReport
+from heptarm.fri.guard.pose_guard import (
+    LARGEST_COORDINATE,
+    SMALLEST_NORM,
+    PoseLimited,
+    PoseLimits,
+    PoseReport,
+)
 
 from .joint_guard import ROUNDING
 
@@ -56,7 +62,7 @@ class PoseGuard:
         self._rates = (limits.velocity, limits.angular_velocity, limits.elbow_velocity)
         self._changes = (limits.acceleration, limits.angular_acceleration, limits.elbow_acceleration)
         self._tops = tuple(rate * period * more for rate in self._rates)
-        self._mosts = tuple(change * period**2 * more for change in self._changes)
+        self._mosts = tuple(change * period * period * more for change in self._changes)
 
     def start(
         self,
@@ -206,7 +212,7 @@ class PoseGuard:
         if speed > top:
             self._limited(PoseLimited.VELOCITY, part, speed / period, self._rates[part])
         else:
-            self._limited(PoseLimited.ACCELERATION, part, max(bend, far) / period**2, self._changes[part])
+            self._limited(PoseLimited.ACCELERATION, part, max(bend, far) / (period * period), self._changes[part])
         planned, wanted = PLANNED * most, goal_v
         if far > 0.0:  # largest velocity that still stops at the moving goal with the acceleration `planned`
             rate = min(far, planned * (math.sqrt(0.25 + 2.0 * far / planned) - 0.5))
