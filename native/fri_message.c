@@ -154,7 +154,7 @@ static int real(const struct field *f, const char *name, double *value, char *wh
 static int doubles(struct part p, int tag, const char *name, int exactly, int most_of_them, double *into, char *why) {
     uint64_t found_tag;
     struct field f;
-    int found = 0, room = exactly > 0 ? exactly : most_of_them;
+    int found = 0, room = exactly > 0 ? exactly : most_of_them, is_wrong = 0;
     p.begin = p.at;
     while (p.at < p.end) {
         if (*p.at == (tag << 3 | FIXED64) && p.end - p.at > 8 && found < room) { /* a controller sends one by one */
@@ -165,12 +165,13 @@ static int doubles(struct part p, int tag, const char *name, int exactly, int mo
         if (!next_field(&p, &found_tag, &f, why)) return -1;
         if (found_tag != (uint64_t)tag) continue;
         int size = f.kind == FIXED64 || f.kind == BYTES ? (int)(f.bytes.end - f.bytes.at) : 1;
-        if (size % 8) {
-            refuse(why, "FRI message: %s must consist of doubles", name);
-            return -1;
-        }
+        is_wrong |= size % 8 != 0;
         for (int i = 0; i < size / 8; i++, found++)
             if (found < room) memcpy(into + found, f.bytes.at + 8 * i, 8);
+    }
+    if (is_wrong) {
+        refuse(why, "FRI message: %s must consist of doubles", name);
+        return -1;
     }
     if (exactly > 0 && found != exactly) {
         refuse(why, "FRI message: %s must have %d values, got %d", name, exactly, found);
