@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -49,7 +50,8 @@ class Client(Reader):
         host: own address to bind; "0.0.0.0" for all. None: that of the interface to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
         timeout: time limit for the start of the loop's process [s], beside the compilation of a law.
-        **settings: fields of `LoopSettings`.
+        settings: settings of the loop; None for the defaults.
+        **keywords: fields of `LoopSettings`, in place of those of `settings`.
 
     Attributes:
         params: parameters of the law; assign to change them while it runs.
@@ -71,11 +73,12 @@ class Client(Reader):
         host: str | None = None,
         remote: str | None = None,
         timeout: float = 30.0,
-        **settings: Unpack[LoopKeywords],
+        settings: LoopSettings | None = None,
+        **keywords: Unpack[LoopKeywords],
     ) -> None:
         refuse_windows("FRI")
         library()
-        self.settings = LoopSettings(**settings)
+        self.settings = LoopSettings(**keywords) if settings is None else replace(settings, **keywords)
         integer(port, "port", 0, 65535)
         for address, what in ((host, "host"), (remote, "remote")):
             if address is not None:
@@ -165,9 +168,9 @@ class Client(Reader):
     ) -> None:
         """Send a command to the loop; it is valid until the next one, or until the policy's patience ends.
 
-        A command is for the session of the state that was read last from this client: `state`, `session`, `next`, `wait`. In a
-        session of which no state was read it is not executed, `events` says so and `stats.stale` counts it: a place that was
-        computed in an older session may be far from where the arm now is.
+        A command is for the session of the state that was read last from this client (`state`, `session`, `next`,
+        `wait`). In a session of which no state was read it is not executed, `events` says so and `stats.stale` counts
+        it: a place that was computed in an older session may be far from where the arm now is.
 
         The guard limits it. NaN entries keep the last target of their axis or coordinate, or of the rotation. Arguments
         that are None keep their last values.

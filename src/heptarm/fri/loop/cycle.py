@@ -165,7 +165,7 @@ class Cycle:
 
     def call_law(self) -> None:
         """Call the law in Python on the state of this cycle; brake from now on if it fails."""
-        law, seam, layout = self._law, self.seam, self.layout
+        law, layout = self._law, self.layout
         assert law is not None and not isinstance(law, CompiledLaw)
         ring = layout.params
         if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:

@@ -22,7 +22,6 @@ import threading
 from collections import deque
 from dataclasses import dataclass, replace
 from importlib.machinery import PathFinder
-from types import FunctionType
 from typing import Any
 
 import cloudpickle
@@ -125,9 +124,14 @@ class Place:
 class _Pickler(cloudpickle.Pickler):  # type: ignore[misc]
     """Pickles settings; a law that the new process can import by its name, any other by value."""
 
+    def __init__(self, file: io.BytesIO, law: Law | CompiledLaw | None) -> None:
+        super().__init__(file)
+        self._law, self._name = law, None if law is None else importable(law)
+
     def reducer_override(self, obj: Any) -> Any:
-        name = importable(obj) if isinstance(obj, (CompiledLaw, FunctionType)) else None
-        return super().reducer_override(obj) if name is None else (imported, (name,))
+        if obj is self._law and self._name is not None:
+            return imported, (self._name,)
+        return super().reducer_override(obj)
 
 
 def packed(settings: LoopSettings, place: Place) -> bytes:
@@ -148,7 +152,7 @@ def packed(settings: LoopSettings, place: Place) -> bytes:
         if foreign:
             cloudpickle.register_pickle_by_value(module)
         try:
-            _Pickler(into).dump((settings, place))
+            _Pickler(into, law).dump((settings, place))
         finally:
             if foreign:
                 cloudpickle.unregister_pickle_by_value(module)

@@ -56,8 +56,8 @@ class LoopSettings:
         pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
         policy: behaviour without fresh commands; None for the default.
         law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in every cycle
-            of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the loop calls it
-            without Python. None: commands come from `command`.
+            of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the loop calls
+            it without Python. None: commands come from `command`.
         params: parameters of the law, numbers and arrays by name.
         memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
         collision: bands of the external torques; at a torque outside its band the arm brakes at once, and the client

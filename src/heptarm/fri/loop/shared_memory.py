@@ -27,7 +27,7 @@ COUNTS = 16
 LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED = 32, 81, 130
 #: Since when a law in Python runs, monotonic clock [ns]; 0: none runs.
 LAW_SINCE = 180
-#: Number of the session in which commands count, as of the newest state; commands of an older one that were not executed.
+#: Number of the session in which commands count, as of the newest state; commands of an older one, not executed.
 EPOCH, STALE = 181, 182
 LATENCY = 192
 JITTER = LATENCY + BINS + 1
@@ -160,7 +160,7 @@ class Writes:
         """Write them all; they replace the previous ones.
 
         Args:
-            outputs: by full name the count of the write, which grows with each, and the value: a float of an analog one.
+            outputs: by full name the count of the write, which grows with each, and the value, a float if analog.
             frames: by name x y z [m] and quaternion x y z w.
         """
         rows = [np.array([len(outputs), len(frames)])]

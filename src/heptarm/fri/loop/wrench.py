@@ -1,8 +1,8 @@
 """Estimate of the external wrench from the torques of the joints, for versions of FRI that send none.
 
-It is the wrench on the flange that explains the external torques best, min |J' F - tau_ext|, damped (Siciliano et al.,
-"Robotics", 2009, section 3.5), so it is as good as the load data, and assumes a contact at the tool: a push on the elbow is
-explained, too. The computation is `map_wrenches` of native/kinematics.h.
+It is the wrench on the flange that explains the external torques best, min |J' F - tau_ext|, damped (Siciliano et
+al., "Robotics", 2009, section 3.5), so it is as good as the load data, and assumes a contact at the tool: a push on
+the elbow is explained, too. The computation is `map_wrenches` of native/kinematics.h.
 """
 
 from __future__ import annotations

@@ -542,7 +542,8 @@ class Interpolator:
     def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
         """Come to rest off the path: all axes together, in the direction of the present velocity.
 
-        The axes of an overlay have no path in common: each brakes as hard as it may, as the guard of the client expects.
+        The axes of an overlay have no path in common: each brakes as hard as it may, as the guard of the client
+        expects.
         """
         if self.is_overlaid:
             self.is_overlaid = False

@@ -168,8 +168,9 @@ class Server:
             reading = self._reading(now)
             datagram = self.controller.tick(reading, now)
             if datagram is not None:
-                version = self.controller.configuration.version
-                self._there.send(self._scenario.sent(datagram, version, now * 1e-9), now)
+                said = self.controller.said
+                assert said is not None
+                self._there.send(self._scenario.sent(datagram, said, now * 1e-9), now)
             for message in self._there.arrived(now):
                 self._send(message)
             action = self.controller.superposition
