@@ -278,6 +278,13 @@ static void start(struct fri_loop *l, int by_pose, int again, double period) {
     l->started = l->session.received;
 }
 
+/* Go on with another period: the limits are per step. A session that began unseen may have another one. */
+static void rescale(struct fri_loop *l, double period) {
+    double q[AXES], dq[AXES];
+    for (int i = 0; i < AXES; i++) q[i] = l->guard.q[i], dq[i] = l->guard.v[i] / l->guard.period;
+    joint_guard_start(&l->guard, q, dq, period);
+}
+
 /* Update guards and policy for the state of the session; `leap` is the increment of the controller's counter, `elapsed` the time
    since the message before. */
 static void follow(struct fri_loop *l, word leap, word elapsed) {
@@ -309,6 +316,7 @@ static void follow(struct fri_loop *l, word leap, word elapsed) {
             (by_pose ? resume_pose : resume_joints)(l, gap, period);
         } else {
             l->skipped = (step - 1) / s->multiplier;
+            if (!by_pose && l->guard.period != period) rescale(l, period);
         }
         l->ticks += step; /* the controller's time advances while messages are lost */
         l->is_mirrored = 0;

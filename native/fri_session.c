@@ -104,12 +104,33 @@ static int check_range(struct fri_loop *l, struct message *m, int array, const c
     return 1;
 }
 
+/* Whether a message is of the session that the last one was of, as far as its counter and the time say. */
+static int goes_on(const struct session *s, const struct message *m, word now) {
+    word steps = (m->sequence - s->sequence) & WRAP;
+    return s->has_message && s->state != IDLE && m->has_link && m->state != IDLE && steps <= WRAP / 2 && now - s->received <= MAX_GAP;
+}
+
+/* The periods of a session never change. */
+static int check_periods(struct fri_loop *l, struct message *m, word now) {
+    const struct session *s = &l->session;
+    word period = m->period_ms > 0 ? m->period_ms : 0, multiplier = m->multiplier > 1 ? m->multiplier : 1;
+    if (m->period_ms > MAX_PERIOD_MS)
+        return implausible(m, "FRI message: the send period must be in [1, %d] ms, got %lld ms: the datagram is damaged", MAX_PERIOD_MS,
+                           (long long)m->period_ms);
+    if (m->multiplier > MAX_MULTIPLIER)
+        return implausible(m, "FRI message: the receive multiplier must be in [1, %d], got %lld: the datagram is damaged",
+                           MAX_MULTIPLIER, (long long)m->multiplier);
+    if (!goes_on(s, m, now) || (period * 1000000 == s->period && multiplier == s->multiplier)) return 1;
+    return implausible(m, "FRI message: the session has %lld ms and %lld messages per answer, got %lld ms and %lld: the datagram is damaged",
+                       (long long)s->period / 1000000, (long long)s->multiplier, (long long)period, (long long)multiplier);
+}
+
 /* Whether the interpolator can have moved so far since the last message of this session in which commands count. */
 static int check_reach(struct fri_loop *l, struct message *m, word now) {
     struct session *s = &l->session;
     word steps = (m->sequence - s->sequence) & WRAP, elapsed = now - l->reach_from;
-    int goes_on = s->has_message && l->reach_from && s->state >= COMMANDING_WAIT && m->state >= COMMANDING_WAIT && steps < WRAP / 2;
-    if (!goes_on || !(m->known & BIT_OF(S_Q_IPO))) return 1;
+    int commands = l->reach_from && s->state >= COMMANDING_WAIT && m->state >= COMMANDING_WAIT;
+    if (!commands || !s->has_message || steps > WRAP / 2 || !(m->known & BIT_OF(S_Q_IPO))) return 1;
     if (steps <= MAX_LOST && steps * s->period > elapsed) elapsed = steps * s->period;
     double time = 1e-9 * (double)(elapsed + s->period);
     for (int i = 0; i < AXES; i++) {
@@ -127,12 +148,7 @@ static int check_plausible(struct fri_loop *l, struct message *m, word now) {
     double sum = 0.0;
     for (int i = 0; i < AXES; i++) sum += m->known & BIT_OF(S_Q) ? m->joints[PLACE_OF(S_Q)][i] : 0.0;
     if (!isfinite(sum)) return implausible(m, "FRI message: joint positions must be finite; the datagram is damaged");
-    if (m->period_ms > MAX_PERIOD_MS)
-        return implausible(m, "FRI message: the send period must be in [1, %d] ms, got %lld ms: the datagram is damaged", MAX_PERIOD_MS,
-                           (long long)m->period_ms);
-    if (m->multiplier > MAX_MULTIPLIER)
-        return implausible(m, "FRI message: the receive multiplier must be in [1, %d], got %lld: the datagram is damaged",
-                           MAX_MULTIPLIER, (long long)m->multiplier);
+    if (m->has_link && !check_periods(l, m, now)) return 0;
     if (!check_range(l, m, S_Q_IPO, "interpolated") || !check_range(l, m, S_Q_CMD, "commanded")) return 0;
     if (!check_reach(l, m, now)) return 0;
     if (m->mode != CARTESIAN_POSE) return 1; /* only then is a pose sent back */

@@ -13,16 +13,19 @@ import textwrap
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from heptarm._library import SWITCH
+from heptarm._library import SWITCH, Unavailable
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, NotReady, ShapeError, Timeout
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.native import library
 from heptarm.fri.loop.process import importable
+from heptarm.fri.loop.settings import LoopKeywords, LoopSettings
 from heptarm.fri.loop.shared_memory import PID
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol import messages as m
@@ -437,8 +440,16 @@ def test_what_the_system_refuses_is_said_plainly() -> None:
         assert policy == os.SCHED_FIFO or "no real-time priority" in client.refused[0]
 
 
-def test_without_the_native_part_polling_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extension_it_says_so_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SWITCH, "1")
-    with Client(0, realtime=False, busy_poll=1e-4) as client:
-        (line,) = client.refused
-    assert line.startswith("no busy polling: ") and SWITCH in line
+    library.cache_clear()
+    with pytest.raises(Unavailable, match=SWITCH):
+        Client(0, realtime=False)
+    library.cache_clear()
+
+
+def test_a_new_setting_is_written_once() -> None:
+    """Settings and their keywords for type checkers are the same."""
+    assert set(LoopKeywords.__annotations__) == {one.name for one in fields(LoopSettings)}
+    with pytest.raises(TypeError, match="busy_pol"):
+        LoopSettings(busy_pol=1e-4)  # type: ignore[call-arg]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -561,6 +561,8 @@ class Cycle:
                     self._resume(sample, time=gap, period=period)
             else:
                 self._skipped = (step - 1) // session.multiplier
+                if not by_pose and guard.period != period:
+                    guard.start(guard.q, [v / guard.period for v in guard.v], period=period)
             record.ticks += step  # the controller's time advances while messages are lost
             self.mirrored = None
         elif session.state is m.SessionState.COMMANDING_WAIT and by_pose:

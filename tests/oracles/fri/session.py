@@ -227,12 +227,7 @@ class Session:
         """
         if sample.q is not None and not math.isfinite(sum(sample.q)):
             raise ImplausibleMessage("FRI message: joint positions must be finite; the datagram is damaged")
-        if (link := sample.connection) is not None:
-            for name, unit, value in (("send period", " ms", link.period_ms), ("receive multiplier", "", link.multiplier)):
-                if value is not None and value > 100:
-                    raise ImplausibleMessage(
-                        f"FRI message: the {name} must be in [1, 100]{unit}, got {value}{unit}: the datagram is damaged"
-                    )
+        self._check_periods(sample, now)
         for name, values in (("interpolated", sample.q_ipo), ("commanded", sample.q_cmd)):
             if values is None:
                 continue
@@ -262,6 +257,31 @@ class Session:
             raise ImplausibleMessage(
                 f"FRI message: the interpolated redundancy angle must be in [-2π, 2π] rad, got "
                 f"{ipo.redundancy.value:.4g} rad: the datagram is damaged"
+            )
+
+    def _check_periods(self, sample: Sample, now: int) -> None:
+        """Check the periods, which never change in a session."""
+        link, last = sample.connection, self.sample
+        if link is None:
+            return
+        for name, unit, value in (
+            ("send period", " ms", link.period_ms),
+            ("receive multiplier", "", link.multiplier),
+        ):
+            if value is not None and value > 100:
+                raise ImplausibleMessage(
+                    f"FRI message: the {name} must be in [1, 100]{unit}, got {value}{unit}: the datagram is damaged"
+                )
+        idle = m.SessionState.IDLE
+        if last is None or idle in (self.state, link.state) or now - self.received > MAX_GAP:
+            return
+        if (sample.sequence - last.sequence) % _WRAP >= _WRAP // 2:
+            return
+        period, multiplier = link.period_ms or 0, max(1, link.multiplier or 1)
+        if (period * 1_000_000, multiplier) != (self.period, self.multiplier):
+            raise ImplausibleMessage(
+                f"FRI message: the session has {self.period // 1_000_000} ms and {self.multiplier} messages per answer, got "
+                f"{period} ms and {multiplier}: the datagram is damaged"
             )
 
     def _check_reach(self, sample: Sample, now: int) -> None:
