@@ -90,6 +90,7 @@ struct fri_loop *fri_new(struct fri_seam *seam) {
     l->exchange.outputs_seen = *seam->outputs;
     fri_session_restart(&l->session);
     l->began = l->session.began;
+    l->pose_ipo_e1 = l->pose_guard.e1 = NAN;
     fri_set_trouble(l, "no message received from a controller yet");
     seam->reply = (word *)l->reply;
     return l;

@@ -6,11 +6,12 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 
+from heptarm.fri.protocol.fast_codec import CommandTemplate, MonitoringReader
+
 from bench.measure.blocks import by_turns, placements
 from bench.measure.figure import Figure, benchmark
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import CommandTemplate, MonitoringReader
 from heptarm.fri.protocol.version import Version
 
 _JOINTS = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)

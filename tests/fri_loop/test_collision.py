@@ -17,7 +17,6 @@ from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
 from heptarm.values.condition.collision import CollisionGuard
-
 from tests.oracles.fri import codec
 
 from .controller import IPO, Controller

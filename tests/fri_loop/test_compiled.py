@@ -1,4 +1,4 @@
-"""Laws that the loop calls without Python: compiled by Numba, or from a shared library; parameters, memory and failures."""
+"""Laws that the loop calls without Python: by Numba, or from a shared library; parameters, memory, failures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.fri.loop.law_interface import Memory, dtype, flat
 from heptarm.fri.loop.settings import LoopSettings
-from heptarm.fri.loop.user_api import Params, State
+from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.values.pose import Pose
 
@@ -25,7 +25,6 @@ from . import laws as python_laws
 from .controller import IPO, Controller
 from .laws import filtered, filtered_slowly, looking, raising
 from .test_cycle import Bench
-
 
 SOURCE = Path(__file__).with_name("compiled_laws.c")
 OFFSET = {"offset": [0.02] * 7}

@@ -20,9 +20,9 @@ from heptarm.fri.loop.cycle import LAW_FAILED
 from heptarm.fri.loop.native import OVERRUN
 from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import State
-from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, SessionState
+from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version, unwrap, wrap
 from heptarm.fri.session.events import Kind
 from heptarm.values.robot import robot
@@ -206,7 +206,7 @@ def test_a_pose_with_a_strange_name_is_sent_back_under_its_name(name: str, wire:
     bench.activate()
     bench.run(3)
     poses = [one.pose for one in bench.sent if one.pose is not None]
-    assert len(poses) == 6 and {one.name for one in poses} == {name} 
+    assert len(poses) == 6 and {one.name for one in poses} == {name}
 
 
 def leaves(state: object, out: object, params: object) -> None:

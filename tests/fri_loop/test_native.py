@@ -19,11 +19,12 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
+from tests.fri import strategies as some
 from tests.long import longer
 from tests.oracles.fri.cycle import Cycle as Oracle
 
-from .laws import lights, offset, torque
 from .controller import IPO
+from .laws import lights, offset, torque
 from .test_cycle import MS, Bench
 
 EXAMPLES = longer(25, 1000)
@@ -296,6 +297,17 @@ def test_every_byte_of_a_message_damaged(wire: Version) -> None:
             twins.message(bytes(datagram))
             twins.pure.controller.sequence += 1
             twins.step()
+    twins.check()
+
+
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data(), wire=st.sampled_from(list(Version)))
+def test_whatever_a_controller_may_send(data: st.DataObject, wire: Version) -> None:
+    """Legal messages of any content and order of sessions: read alike, answered alike."""
+    twins = Twins(wire=wire)
+    for _ in range(data.draw(st.integers(1, 8))):
+        value = data.draw(some.monitorings(wire))
+        twins.message(codec.encode_monitoring(value, wire), gap=data.draw(st.sampled_from((MS, 700 * MS))))
     twins.check()
 
 

@@ -20,7 +20,6 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, SessionState
 from heptarm.fri.protocol.version import Version
 from heptarm.values.pose import Pose
-
 from tests.oracles.fri import codec
 from tests.oracles.fri.cycle import from_wire
 from tests.oracles.fri.pose_guard import between

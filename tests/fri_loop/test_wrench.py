@@ -15,7 +15,6 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version
 from heptarm.values.robot import ROBOTS, robot
-
 from tests.oracles.fri.wrench import WrenchEstimator
 
 from .controller import Controller

@@ -93,8 +93,7 @@ class Record:
         """
         session = self._session
         robot, link = sample.robot, sample.connection
-        if self.info[0] is not robot or self.info[1] is not link:
-            self.info = (robot, link, information(sample.message))
+        self.info = (robot, link, information(sample.message))
         seconds, nanos = sample.stamp
         pose: Sequence[float] = NAN7
         e1, strategy = math.nan, at.ABSENT

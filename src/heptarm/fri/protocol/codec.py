@@ -1,6 +1,6 @@
-"""Codec of FRI messages for all versions: encoding writes the same bytes as KUKA's sides, decoding is strict.
+"""The controller's side of the FRI messages, for all versions: it writes monitoring messages and reads commands.
 
-The 1 kHz path has its own codec in `heptarm.fri.protocol.fast_codec`.
+Encoding writes the same bytes as KUKA's controllers, decoding is strict. The client's side is native/fri_message.c.
 """
 
 from __future__ import annotations
