@@ -83,6 +83,17 @@ class Lockstep:
         for _ in range(round(seconds * 1e3)):
             self._tick()
 
+    def end(self, way: str) -> None:
+        """End the session: the program leaves its block, the overlay stops, the session closes, the client falls silent."""
+        if way == "leave":
+            self._arm.release()
+        elif way == "stop":
+            self._controller.stop()
+        elif way == "close":
+            self._controller.close()
+        else:
+            self._held = []
+
     def lose(self, ticks: int) -> None:
         """Let messages get lost."""
         self._held = []

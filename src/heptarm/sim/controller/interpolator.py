@@ -542,12 +542,14 @@ class Interpolator:
     def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
         """Come to rest off the path: all axes together, in the direction of the present velocity.
 
-        The axes of an overlay have no path in common: each brakes as hard as it may, as the guard of the client
-        expects.
+        The axes of an overlay have no path in common: each brakes as hard as it may, and as soon, as the guard of the
+        client expects. A jerk as gentle as that of a motion would take several degrees more.
         """
         if self.is_overlaid:
             self.is_overlaid = False
-            run.follower = braking_axes(self._robot, self._command.after, self._command.speed)
+            run.follower = braking_axes(
+                self._robot, self._command.after, self._command.speed, jerk=FAST_JERK
+            )
             run.braking, run.stop = True, None
             return
         if run.guided is not None:
