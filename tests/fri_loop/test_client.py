@@ -453,3 +453,26 @@ def test_a_new_setting_is_written_once() -> None:
     assert set(LoopKeywords.__annotations__) == {one.name for one in fields(LoopSettings)}
     with pytest.raises(TypeError, match="busy_pol"):
         LoopSettings(busy_pol=1e-4)  # type: ignore[call-arg]
+
+
+def test_a_client_that_streams_on_does_not_command_a_session_that_it_has_not_seen() -> None:
+    with Client(0, realtime=False, policy=Policy(Missing.HOLD)) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            client.wait("COMMANDING_ACTIVE")
+            client.command(q=np.add(IPO, 0.1))
+            _until(client, np.add(IPO, 0.1))
+            controller.state, controller.sequence = SessionState.MONITORING_WAIT, 0
+            controller.ipo = tuple(value - 0.3 for value in IPO)
+            controller.active()
+            controller.settle()
+            deadline = time.monotonic() + 30.0
+            while not client.stats.stale:
+                client.command(q=np.add(IPO, 0.1))
+                assert time.monotonic() < deadline
+            controller.settle()
+            assert controller.answers[-1].q == controller.ipo
+            client.next()
+            client.command(q=np.add(IPO, 0.1))
+            _until(client, np.add(IPO, 0.1))

@@ -182,6 +182,32 @@ def test_a_session_that_restarts_between_two_messages_is_a_new_start() -> None:
     assert bench.sent[-1].q == bench.controller.ipo
 
 
+def test_commands_of_a_program_that_has_not_seen_the_session_hold_the_arm() -> None:
+    """A controller restarts elsewhere while a program streams absolute positions: A1 went back to the old place."""
+    bench = Bench()
+    bench.activate()
+    old = tuple(value + 0.2 for value in IPO)
+    bench.command(old)
+    bench.run(1200)
+    seen = bench.layout.header[at.EPOCH]
+    bench.controller.sequence = 0
+    bench.controller.ipo = tuple(value - 0.4 for value in IPO)
+    bench.activate()
+    for _ in range(300):
+        words = np.zeros(at.COMMAND_WORDS)
+        words[at.C_Q : at.C_Q + 7] = old
+        ints = words.view(np.int64)
+        ints[at.C_AT : at.C_GIVEN + 1], ints[at.C_EPOCH] = (bench.now, at.GIVEN_Q), seen
+        bench.layout.commands.write(words[1:])
+        bench.run(1)
+        assert bench.sent[-1].q == bench.controller.ipo, "it is held where the interpolator is"
+    assert bench.layout.header[at.STALE] == 300
+    assert sum("has not seen this session" in text for text in bench.texts) == 1
+    bench.command(old)  # by a program that has read a state meanwhile
+    bench.run(1500)
+    assert bench.sent[-1].q == pytest.approx(old)
+
+
 def test_the_interpolators_speed_is_taken_over() -> None:
     """An overlay on a moving interpolator: mirroring while it moves at 0.2 rad/s, then commanding."""
     bench = Bench()

@@ -45,7 +45,7 @@ from heptarm.fri.loop.cycle import LAW_FAILED
 from heptarm.fri.loop.law_interface import LiveMemory
 from heptarm.fri.loop.user_api import Params, Stats
 from heptarm.fri.loop.user_api import State as FriState
-from heptarm.fri.protocol.messages import Quality, SessionState
+from heptarm.fri.protocol.messages import Quality, Safety, SessionState
 from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
 from heptarm.record.journal import FRI
@@ -55,6 +55,7 @@ from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause, Result
 from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
 
 #: Longest wait for the end of a session, and for a message of an open one [s].
 _PATIENCE = 5.0
@@ -188,6 +189,7 @@ class Fri(Block):
             MotionAborted: the cabinet ended the motion, by a safety stop for instance.
             StreamError: the law raised an error, or the cabinet closed a monitoring session.
             CollisionDetected: the external torque of a joint left its band.
+            SafetyStop: the robot is in a safety stop.
             ConnectionLost: the connection to the cabinet has ended.
         """
         if self._closed or self._client is None:
@@ -209,6 +211,12 @@ class Fri(Block):
             raise StreamError(self._law_error, hint="the guard braked the arm within its limits")
         if self.kind == "monitor" and not was_open:
             raise self._connection.final_error() or self._early_end(None, hint)
+        if self.kind != "monitor" and (stop := self._stop) is not None:
+            raise SafetyStop(
+                f"the FRI session ended while the robot is in a safety stop ({stop.name})",
+                code=int(Code.SAFETY_STOP),
+                hint="clear its cause, then recover",
+            )
 
     def _end(self) -> None:
         client, self._closed = self.client, True
@@ -245,6 +253,12 @@ class Fri(Block):
             history=self._connection.history(),
             hint="the guard braked the arm within its limits; check what the arm has hit",
         )
+
+    @property
+    def _stop(self) -> Safety | None:
+        """The safety stop in the last message; None: there is none."""
+        safety = self.client.state.safety if self.client.count else None
+        return None if safety is Safety.NORMAL_OPERATION else safety
 
     def _last_report(self) -> wire.FriChanged:
         """The cabinet's last report on this session."""
