@@ -5,7 +5,7 @@ STAMPS := build/stamps
 # Hundreds of processes start here; without compiled bytecode each of them compiles the package for half a second.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup native cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
+.PHONY: setup native sanitized cabinet demo test test-fast test-computing test-ros test-ros2 test-ros1 test-pythons test-long mutants conformance lint check bench soak figures lock docs \
 	wheel first-hour clean help
 
 ##@ To try it
@@ -22,8 +22,8 @@ $(STAMPS)/demo: pyproject.toml scripts/setup.sh $(wildcard scripts/lock/demo.txt
 
 setup: $(STAMPS)/venv native cabinet  ## everything for developers: virtual environment, package, tools, extension, compiled cabinet
 
-$(STAMPS)/venv: $(STAMPS)/demo $(wildcard scripts/lock/all.txt scripts/lock/torch.txt)
-	scripts/setup.sh all
+$(STAMPS)/venv: $(STAMPS)/demo $(wildcard scripts/lock/dev.txt scripts/lock/torch.txt)
+	scripts/setup.sh dev
 	@mkdir -p $(STAMPS) && touch $@
 
 # Its sources are few: the build system knows by itself whether one has changed.
@@ -63,8 +63,9 @@ cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
 
 ##@ To test
 
-lint: $(STAMPS)/venv  ## ruff, mypy, import contract
+lint: $(STAMPS)/venv  ## ruff (rules and format), mypy, import contract
 	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-logo
 
@@ -79,6 +80,13 @@ test: setup $(STAMPS)/browser  ## everything; what takes long begins first
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
 	wait $$beside; beside=$$?; cat build/test-beside.log; exit $$((waiting + beside))
 	$(PY) -m pytest $(LONGEST) -m alone
+
+# Folders with tests that need no simulator; those in them that do are skipped as soon as they reach for it.
+FAST := tests/values tests/wire tests/model tests/fri tests/arm tests/record tests/ros tests/schema tests/transports tests/devices \
+	tests/docs tests/house tests/mutation tests/panel tests/sim tests/test_errors.py
+
+test-fast: $(STAMPS)/venv native  ## for every save: what needs neither JVM nor MuJoCo, in about a minute
+	$(PY) -m pytest -q -rfE -n $(WORKERS) -p tests.fast -m "not slow and not alone and not browser" $(FAST)
 
 # A compiler that gets a tenth of a processor beside all others is slow, and does not hang.
 test-computing: setup $(STAMPS)/browser  ## tests that mostly compute: values, protocols, kinematics, simulated steps, training, compilers, the site
@@ -97,7 +105,22 @@ test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searc
 	scripts/setup_rviz.sh
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance
+	@$(MAKE) --no-print-directory sanitized
 	@$(MAKE) --no-print-directory test-pythons
+	@$(MAKE) --no-print-directory mutants
+
+mutants: $(STAMPS)/venv native  ## a hundred slips in the core, of which the fast tests have to notice ninety; SEED=2 draws others
+	$(PY) -m tests.mutation --seed $(or $(SEED),1)
+
+# What runs in the process of the tests: FRI's loop in its own process uses the usual build.
+SANITIZED := tests/fri_loop/test_native.py tests/fri_loop/test_compiled.py tests/sim/test_native_tick.py \
+	tests/sim/test_table.py tests/model tests/transports/test_exchange.py
+
+sanitized: setup  ## the tests of the extension under ASan and UBSan
+	$(PY) scripts/native.py --sanitize
+	LD_PRELOAD="$$(cc -print-file-name=libasan.so) $$(cc -print-file-name=libubsan.so)" \
+		ASAN_OPTIONS=detect_leaks=0:handle_segv=0:verify_asan_link_order=0 UBSAN_OPTIONS=print_stacktrace=1 \
+		$(PY) -m pytest -q -p no:cacheprovider -p tests.sanitized $(SANITIZED)
 
 test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 3.13, and with the oldest packages; PYTHONS="3.10 lowest" selects
 	scripts/test_pythons.sh $(PYTHONS)

@@ -273,6 +273,7 @@ static void start(struct fri_loop *l, int by_pose, int again, double period) {
     else if (!by_pose && knows(l, S_Q_IPO))
         joint_guard_start(&l->guard, joints(l, S_Q_IPO), at_rest, period);
     l->is_pose_mirrored = 0;
+    fri_start_torque_guard((struct torque_guard *)l->seam->torque_guard);
     fri_commands_start(&l->commands);
     l->ticks = -1;
     l->commands_seen = l->header[H_COMMANDS] > 0 ? l->header[H_COMMANDS] - 1 : 0; /* one given just before the start counts */
@@ -367,7 +368,7 @@ static void fill_state(struct fri_loop *l, word *slot, word latency) {
     put(numbers + S_POSE, m->pose, AXES, has_pose && m->has_monitored_pose);
     numbers[S_E1] = has_pose ? m->e1 : NAN;
     put(numbers + S_Q_SENT, l->guard.q, AXES, l->sent_mode != ABSENT && !posed);
-    put(numbers + S_TAU_SENT, l->guard.tau, AXES, l->sent_mode == TORQUE);
+    put(numbers + S_TAU_SENT, l->guard.tau_sent, AXES, l->sent_mode == TORQUE);
     put(numbers + S_WRENCH_SENT, l->guard.wrench, 6, l->sent_mode == WRENCH);
     put(numbers + S_POSE_IPO, l->ipo_pose.values, AXES, active && l->has_pose);
     put(numbers + S_POSE_SENT, l->pose_sent, AXES, posed);
@@ -482,12 +483,16 @@ static int command_joints(struct fri_loop *l, const double *target, const double
         is_limited |= g->was_limited;
     }
     joint_guard_position(g, target, reach);
-    if (mode == TORQUE) joint_guard_torque(g, tau);
+    if (mode == TORQUE) {
+        double unknown[AXES];
+        for (int i = 0; i < AXES; i++) unknown[i] = NAN;
+        joint_guard_torque(g, tau, (struct torque_guard *)l->seam->torque_guard, knows(l, S_Q) ? joints(l, S_Q) : unknown, l->dq, !target);
+    }
     if (mode == WRENCH) joint_guard_force(g, wrench);
     g->was_limited |= is_limited;
     l->sent_mode = mode;
     count_setpoint(l, g->was_limited);
-    struct answer a = {.q = g->q, .tau = mode == TORQUE ? g->tau : NULL, .wrench = mode == WRENCH ? g->wrench : NULL, .strategy = ABSENT};
+    struct answer a = {.q = g->q, .tau = mode == TORQUE ? g->tau_sent : NULL, .wrench = mode == WRENCH ? g->wrench : NULL, .strategy = ABSENT};
     return write_answer(l, &a);
 }
 

@@ -14,6 +14,7 @@
 
    Every number of a guard's state is finite: a start refuses what is not, a target that is not keeps the last one. */
 #include "fri.h"
+#include "torque_guard.h"
 
 /* For so long the cabinet goes on without an answer [s], at least two command periods; see heptarm.sim.fri.limits. */
 #define COAST 5e-3
@@ -180,9 +181,24 @@ static void slew(struct joint_guard *g, double *last, const double *target, cons
     }
 }
 
-/* Limit magnitude and rate of torques [Nm]; the result is in `tau`. Call it after the position. */
-void joint_guard_torque(struct joint_guard *g, const double *target) {
+/* Limit magnitude and rate of torques [Nm], then the motion to which they lead (torque_guard.h); the result is in `tau_sent`. Call
+   it after the position; q and dq are measured. */
+void joint_guard_torque(struct joint_guard *g, const double *target, struct torque_guard *motion, const double *q, const double *dq, int is_braking) {
+    static const struct {
+        int bit, kind;
+    } parts[] = {{GUARD_SPEED_BIT, LIMITED_VELOCITY}, {GUARD_POSITION_BIT, LIMITED_POSITION}, {GUARD_TORQUE_BIT, LIMITED_TORQUE}};
     slew(g, g->tau, target, g->limits.tau_max, g->limits.dtau_max, AXES, LIMITED_TORQUE);
+    memcpy(g->tau_sent, g->tau, sizeof g->tau_sent);
+    int found = guard_torques(motion, q, dq, g->period, is_braking, g->tau_sent);
+    for (int part = 0; part < 3 && found; part++)
+        for (int i = 0; i < AXES; i++)
+            if (found >> (parts[part].bit + i) & 1) limited(g, parts[part].kind, i, motion->asked[i], motion->allowed[i]);
+}
+
+void fri_start_torque_guard(struct torque_guard *guard) { start_torque_guard(guard); }
+
+int fri_guard_torques(struct torque_guard *guard, const double *q, const double *dq, double dt, int is_braking, double *tau) {
+    return guard_torques(guard, q, dq, dt, is_braking, tau);
 }
 
 /* Limit magnitude and rate of a wrench [N, Nm]; the result is in `wrench`. Call it after the position. */
@@ -251,7 +267,7 @@ static void turn_to(const double *goal, const double *here, double *turn) {
 }
 
 /* Rotate a unit quaternion by a rotation vector in base axes [rad]. */
-static void turned(const double *quat, const double *turn, double *into) {
+static void rotated(const double *quat, const double *turn, double *into) {
     double angle = norm(turn), scale = angle > 1e-12 ? 0.5 * sin(0.5 * angle) / (0.5 * angle) : 0.5;
     double by[4] = {scale * turn[0], scale * turn[1], scale * turn[2], cos(0.5 * angle)}, p[4];
     product(by, quat, p);
@@ -268,7 +284,7 @@ void pose_between(const double *first, const double *second, double *displacemen
 /* Move a pose by a translation and a rotation vector in base axes [m, rad]. */
 void pose_moved(const double *pose, const double *displacement, double *into) {
     plus(pose, displacement, into);
-    turned(pose + 3, displacement + 3, into + 3);
+    rotated(pose + 3, displacement + 3, into + 3);
 }
 
 /* -------------------------------------------------------------------------------------------------------- pose guard */
@@ -373,7 +389,7 @@ void pose_guard_pose(struct pose_guard *g, const double *target, const double *i
         slow_down(g->v, g->most[FLANGE]);
         slow_down(g->w, g->most[ROTATION]);
         plus(g->xyz, g->v, g->xyz);
-        turned(g->quat, g->w, g->quat);
+        rotated(g->quat, g->w, g->quat);
         memcpy(g->goal_xyz, g->xyz, sizeof g->xyz);
         memcpy(g->goal_quat, g->quat, sizeof g->quat);
     } else {
@@ -396,7 +412,7 @@ void pose_guard_pose(struct pose_guard *g, const double *target, const double *i
             for (int i = 0; i < 4; i++) same += g->goal_quat[i] * g->quat[i];
             for (int i = 0; i < 4; i++) g->quat[i] = same >= 0.0 ? g->goal_quat[i] : -g->goal_quat[i];
         } else {
-            turned(g->quat, g->w, g->quat);
+            rotated(g->quat, g->w, g->quat);
         }
     }
     memcpy(sent, g->xyz, sizeof g->xyz);

@@ -87,13 +87,26 @@ static int take_slot(const word *ring, word count, word slots, word size, word *
     return 1;
 }
 
+/* Let parameters follow their targets for a cycle of `dt` seconds, each by its largest change in a second; one that is or becomes
+   NaN or infinite changes at once. */
+void fri_follow(double *values, const double *targets, const double *rates, word count, double dt) {
+    for (word i = 0; i < count; i++) {
+        double step = rates[i] * dt, apart = targets[i] - values[i];
+        values[i] = isfinite(apart) && fabs(apart) > step ? values[i] + copysign(step, apart) : targets[i];
+    }
+}
+
 /* Take over parameters, and what the user's process has written to the memory. */
-static void take_parameters(struct fri_loop *l) {
+static void take_parameters(struct fri_loop *l, double dt) {
     struct fri_seam *s = l->seam;
     double *copy = (double *)s->law_buffer;
-    word size = s->params_size, many = s->memory_size;
+    word size = s->params_size, many = s->memory_size, before = s->params_seen;
     word count = __atomic_load_n(&l->header[H_PARAMS], __ATOMIC_ACQUIRE);
-    if (take_slot(s->params_ring, count, PARAM_SLOTS, size, &s->params_seen, copy)) memcpy(s->params, copy, 8 * (size_t)size);
+    if (take_slot(s->params_ring, count, PARAM_SLOTS, size, &s->params_seen, copy)) {
+        memcpy(s->params_target, copy, 8 * (size_t)size);
+        if (!before) memcpy(s->params, copy, 8 * (size_t)size);
+    }
+    fri_follow((double *)s->params, (double *)s->params_target, (double *)s->params_rates, size, dt);
     count = __atomic_load_n(&l->header[H_MEMORY_SET], __ATOMIC_ACQUIRE);
     if (!take_slot(s->memory_set_ring, count, MEMORY_SLOTS, 2 * many, &s->memory_seen, copy)) return;
     for (word i = 0; i < many; i++) {
@@ -162,8 +175,8 @@ static int failed(struct fri_loop *l, int status, word code) {
 int fri_law(struct fri_loop *l, const word *slot) {
     struct fri_seam *s = l->seam;
     struct heptarm_state state;
-    take_parameters(l);
     law_state(l, slot, &state);
+    take_parameters(l, state.dt);
     word budget = (word)(LAW_FRACTION * state.dt * 1e9), began = clock_now();
     int number = sigsetjmp(law_exit, 0);
     if (number) return failed(l, number == TIME_IS_UP ? LAW_ENDLESS : LAW_CRASHED, number);

@@ -331,7 +331,8 @@ struct fri_seam {
     double dq[7];
     word received, has_law, written;
     word written_signal[10], written_value[10];
-    word *law, *params, *memory, *memory_written, *law_buffer;
+    word *torque_guard;
+    word *law, *params, *params_target, *params_rates, *memory, *memory_written, *law_buffer;
     word *params_ring, *memory_ring, *memory_set_ring;
     word params_size, memory_size, params_seen, memory_seen;
     word law_success, law_status, law_code, law_reported, law_late, law_not_finite;

@@ -37,10 +37,9 @@ def annotation(t: Type) -> str:
         return "tuple[float, ...]" if t.name == "f64" else "tuple[int, ...]"
     if t.kind in ("str", "bytes"):
         return t.kind
-    if t.kind == "list":
-        return f"tuple[{annotation(t.of)}, ...]"
-    if t.kind == "opt":
-        return f"{annotation(t.of)} | None"
+    if t.kind in ("list", "opt"):
+        assert t.of is not None
+        return f"tuple[{annotation(t.of)}, ...]" if t.kind == "list" else f"{annotation(t.of)} | None"
     return t.name
 
 

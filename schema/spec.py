@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-try:
+if sys.version_info >= (3, 11):
     import tomllib
-except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib  # type: ignore[no-redef]
+else:
+    import tomli as tomllib
 
 HERE = Path(__file__).resolve().parent
 PRIMITIVES = {"bool": "B", "u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i", "i64": "q", "f64": "d"}
 SIZES = {"bool": 1, "u8": 1, "u16": 2, "u32": 4, "u64": 8, "i32": 4, "i64": 8, "f64": 8}
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """What a file of the schema describes."""
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -207,8 +213,8 @@ def parse_field(entry: dict[str, Any], kinds: dict[str, str]) -> Field:
 
 
 def load(folder: Path = HERE) -> Spec:
-    raw = tomllib.loads((folder / "protocol.toml").read_text(encoding="utf-8"))
-    errors = tomllib.loads((folder / "errors.toml").read_text(encoding="utf-8"))["error"]
+    raw = read_toml(folder / "protocol.toml")
+    errors = read_toml(folder / "errors.toml")["error"]
     kinds = kinds_of(raw)
     enums = {n: Enum(n, e.get("base", "u8"), e["doc"], e["values"]) for n, e in raw["enum"].items()}
     enums |= {n: Enum(n, e["base"], e["doc"], e["values"], flags=True) for n, e in raw["flags"].items()}

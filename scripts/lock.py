@@ -18,16 +18,16 @@ LOCK = ROOT / "scripts" / "lock"
 UV = "uv==0.13.9"
 #: Name of a lock file and what it is made of.
 INPUTS = {
-    # the same versions as in "all", on top of which the tools of the developers come
+    # the same versions as in "dev", on top of which the tools of the developers come
     "demo": (
         "pyproject.toml",
         "--extra",
         "sim",
         "scripts/lock/demo.in",
         "--constraint",
-        "scripts/lock/all.txt",
+        "scripts/lock/dev.txt",
     ),
-    "all": ("pyproject.toml", "--extra", "all", "scripts/lock/all.in"),
+    "dev": ("pyproject.toml", "--extra", "dev", "scripts/lock/dev.in"),
     "ros2": ("scripts/ros2_requirements.txt",),
     "ros1": ("scripts/lock/ros1.in",),
     "numpy": ("scripts/lock/numpy.in",),

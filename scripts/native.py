@@ -26,7 +26,9 @@ def _tool(name: str) -> str:
 def main() -> int:
     """Configures once, then compiles what has changed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sanitize", action="store_true", help="a copy under ASan and UBSan, in build/sanitized")
+    parser.add_argument(
+        "--sanitize", action="store_true", help="a copy under ASan and UBSan, in build/sanitized"
+    )
     sanitize = parser.parse_args().sanitize
     cmake = _tool("cmake")
     folder = ROOT / "build" / ("sanitized" if sanitize else "native")

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from heptarm.values.arrays import Array
-from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.robot import FLANGE_RADIUS, FLANGES, ROBOTS, RobotModel
 
 ROOT = Path(__file__).parents[1]
 #: A cylinder for each link against collisions [m].
@@ -86,8 +86,19 @@ def model(robot: RobotModel) -> str:
         f"  height: {links.origin[0][2]:.9g}",
         f"  radius: {RADIUS[0]:g}",
         f"  mesh: {_mesh(robot, 0)}",
-        f"flange: {_list(links.flange)}",
+        "flanges:",
     ]
+    for flange in FLANGES.values():
+        links = robot.with_flange(flange).links
+        lines += [
+            f"  {flange.name}:",
+            f"    height: {flange.height:g}",
+            f"    around: {FLANGE_RADIUS:g}",
+            f"    mass: {links.mass[6]:.9g}",
+            f"    com: {_list(links.com[6])}",
+            f"    inertia: {_list(links.inertia[6][np.triu_indices(3)])}",
+            f"    next: {_list(links.flange)}",
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -1,9 +1,9 @@
 #!/bin/sh
-# Makes .venv with heptarm (editable). Usage: scripts/setup.sh demo (what the demo needs), all (with all tools, the default), or
+# Makes .venv with heptarm (editable). Usage: scripts/setup.sh demo (what the demo needs), dev (with all tools, the default), or
 # extras, for example "sim,viz".
 set -eu
 cd "$(dirname "$0")/.."
-extras=${1:-all}
+extras=${1:-dev}
 venv=.venv
 
 as_root_apt() { # installs Debian packages when that is possible
@@ -63,8 +63,8 @@ torch() { # A version for which there is a build without CUDA here; any newer on
 "$venv/bin/python" -c 'import sys, pip; sys.exit(int(pip.__version__.split(".")[0]) < 24)' || pip install -q -U "pip>=24"
 packages=".[$extras]"
 case $extras in
-all | demo)
-    if [ "$extras" = all ] && ! locked torch --no-index; then
+dev | demo)
+    if [ "$extras" = dev ] && ! locked torch --no-index; then
         echo "the locked build of torch is not on this machine; another build is installed, without a checksum" >&2
         torch || true
     fi
@@ -74,7 +74,7 @@ all | demo)
     echo "the locked versions are not all to be had here, or do not suffice; the newest are installed, without checksums" >&2
     if [ "$extras" = demo ]; then packages=".[sim] matplotlib"; fi
     ;;
-*,rl,* | rl | rl,* | *,rl | dev | dev,* | *,dev | *,dev,*) torch || true ;;
+*,rl,* | rl | rl,* | *,rl | dev,* | *,dev | *,dev,* | all) torch || true ;;
 esac
 # shellcheck disable=SC2086
 pip install -q -e $packages

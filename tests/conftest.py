@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
-from tests.long import LONG
+from tests.long import LONG, longer
+from tests.simulators import FASTER
 
 if TYPE_CHECKING:
     from heptarm import Arm
@@ -45,8 +46,12 @@ _LONG_FIRST = (
 _COMPUTING = ("fri", "house", "model", "rl", "schema", "sim", "values", "wire")
 
 # no timing assertions, above all on a busy machine
-settings.register_profile("heptarm", deadline=None)
+settings.register_profile("heptarm", deadline=None, max_examples=longer(40, 200))
 settings.load_profile("heptarm")
+# a mutant is to be noticed, not to be explained
+settings.register_profile(
+    "mutation", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -98,12 +103,12 @@ class RunningCabinet:
 def cabinet(request: pytest.FixtureRequest) -> Iterator[RunningCabinet]:
     """One virtual iiwa 14 for a module, at rest and without a controller after each test.
 
-    It runs in real time, or at the SPEED of the module.
+    It runs faster than time, or at the SPEED of the module: 1.0 where time is the subject.
     """
     from heptarm.arm.link.local_simulator import PrivateCabinet
     from heptarm.arm.link.target import Target
 
-    speed = getattr(request.module, "SPEED", 1.0)
+    speed = getattr(request.module, "SPEED", FASTER)
     running = PrivateCabinet.start(Target(model="iiwa14", options=(("speed", f"{speed:g}"),)))
     yield RunningCabinet(running.host, running.port, running.pid)
     running.close()
@@ -123,5 +128,5 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
 
 @pytest.fixture
 def private_target() -> str:
-    """A target that starts a private virtual cabinet, five times as fast as real time."""
-    return "sim://iiwa14?speed=5"
+    """A target that starts a private virtual cabinet, faster than real time."""
+    return f"sim://iiwa14?speed={FASTER:g}"

@@ -89,3 +89,23 @@ def test_pickled(kind: type[HeptarmError]) -> None:
 
 def test_limit_errors_are_value_errors() -> None:
     assert issubclass(LimitError, ValueError)
+
+
+def test_an_error_of_an_element_names_it_from_the_outside_to_the_inside() -> None:
+    error = errors.LimitError("q[3] must be at most 2.0 rad, got 2.5 rad", parameter="q[3]", hint="move it")
+    assert error.inside("") is error and str(error) == "q[3] must be at most 2.0 rad, got 2.5 rad (move it)"
+    error.inside("segments[2]").inside("motions[1]")
+    assert error.parameter == "motions[1].segments[2].q[3]"
+    assert str(error) == "motions[1].segments[2]: q[3] must be at most 2.0 rad, got 2.5 rad (move it)"
+    assert error.text == error.args[0]
+    assert errors.CommandRejected("no").inside("motions[1]").parameter == "motions[1]"
+
+
+def test_a_block_names_an_element() -> None:
+    with (
+        pytest.raises(errors.CommandRejected, match=r"^b\[1\]\.a\[0\]: no$") as found,
+        errors.inside("b[1]"),
+        errors.inside("a[0]"),
+    ):
+        raise errors.CommandRejected("no", parameter="x")
+    assert found.value.parameter == "b[1].a[0].x"

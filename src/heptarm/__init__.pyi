@@ -147,6 +147,9 @@ from .errors import (
     Timeout as Timeout,
 )
 from .errors import (
+    UnknownSetting as UnknownSetting,
+)
+from .errors import (
     Unreachable as Unreachable,
 )
 from .errors import (
@@ -157,6 +160,9 @@ from .fri.loop.compiled import (
 )
 from .fri.loop.compiled import (
     law_from as law_from,
+)
+from .fri.loop.parameters import (
+    param as param,
 )
 from .record.fri_client import (
     record_client as record_client,

@@ -16,6 +16,7 @@
     │   │   └── OutsideWorkspace            a command leaves `arm.workspace`
     │   ├── ModeConflict                    conflicts with what is running
     │   ├── CollisionForeseen               a collision model found bodies that would touch
+    │   ├── UnknownSetting (AttributeError) an object has no setting of that name
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result
     │   ├── MotionAborted                   it was stopped early
@@ -42,7 +43,8 @@ import importlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -83,6 +85,7 @@ class HeptarmError(Exception):
         self.value = value
         self.allowed = allowed
         self.hint = hint
+        self._place = ""
         self._black_box: Callable[[], Path | None] | None = None
 
     def __str__(self) -> str:
@@ -103,10 +106,37 @@ class HeptarmError(Exception):
         """
         return None if self._black_box is None else self._black_box()
 
+    def inside(self: _Error, place: str) -> _Error:
+        """The same error, of an element: text and parameter name it.
+
+        The elements that contain it put themselves before it, from the inside to the outside:
+        `error.inside("segments[2]").inside("motions[1]")` is of `motions[1].segments[2]`.
+
+        Args:
+            place: the element, such as "segments[2]"; "": none, and the error stays as it is.
+        """
+        if place:
+            said = self.text.removeprefix(f"{self._place}: ") if self._place else self.text
+            self._place = ".".join(filter(None, (place, self._place)))
+            self.text = f"{self._place}: {said}"
+            self.args = (self.text,)
+            self.parameter = ".".join(filter(None, (place, self.parameter)))
+        return self
+
     def with_black_box(self: _Error, source: HeptarmError | Callable[[], Path | None] | None) -> _Error:
         """The same error with the black box of another error, or with one that a function returns."""
         self._black_box = source._black_box if isinstance(source, HeptarmError) else source
         return self
+
+
+@contextmanager
+def inside(place: str) -> Iterator[None]:
+    """Name an element in the errors of a block; see `HeptarmError.inside`."""
+    try:
+        yield
+    except HeptarmError as error:
+        error.inside(place)
+        raise
 
 
 class ConnectFailed(HeptarmError, ConnectionError):
@@ -169,6 +199,10 @@ class CollisionForeseen(CommandRejected):
         super().__init__(text, **details)
         self.touch = touch
         self.motion = motion
+
+
+class UnknownSetting(CommandRejected, AttributeError):
+    """An object has no setting of this name, or it cannot be set; nothing was set."""
 
 
 class NotInControl(CommandRejected):

@@ -61,6 +61,8 @@ class Peer:
         self.motion = 0
         self.pushed = 0
         self.progress = 0.5
+        self.override = 1.0
+        self.clock_rate = 1.0  # of the clock that answers pings, in seconds per second of ours
         self.q = (0.1,) * 7
         self.dq = (0.0,) * 7
         self.is_open = True
@@ -167,6 +169,9 @@ class Peer:
         finally:
             client.transport.close()
 
+    def clock(self) -> int:
+        return round(self.clock_rate * time.monotonic_ns())
+
     def state(self) -> wire.State:
         now = time.monotonic_ns()
         return wire.State(
@@ -178,7 +183,7 @@ class Peer:
                 queued=0,
                 progress=self.progress,
                 remaining=1.0,
-                override=1.0,
+                override=self.override,
             ),
             safety=wire.SafetyState(
                 stamp=now, bits=wire.SafetyBits.READY_TO_MOVE, mode=wire.OperationMode.AUT
@@ -190,7 +195,7 @@ class Peer:
         if client.is_mute:
             return
         if isinstance(message, wire.Ping):
-            client.say(wire.Pong(sent=message.sent, received=time.monotonic_ns()))
+            client.say(wire.Pong(sent=message.sent, received=self.clock()))
             return
         if isinstance(message, wire.Pong):
             self.seen.append(message)

@@ -32,6 +32,8 @@ from heptarm.wire.codes import Code
 from tests.conftest import RunningCabinet
 from tests.retry import answers_late, retry
 
+SPEED = 1.0  # FRI answers within milliseconds of this machine's time
+
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
 COMPLIANT = CartesianImpedance(stiffness=(1500, 1500, 1500, 150, 150, 150))
 #: Long enough for a busy machine.

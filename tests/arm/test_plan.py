@@ -204,7 +204,7 @@ def test_torques_are_those_that_the_arm_then_has(arm: ha.Arm) -> None:
 
 
 def test_a_start_of_its_own_and_a_running_motion(arm: ha.Arm) -> None:
-    handle = arm.start([ha.ptp(HOME + 0.2, speed=0.05), ha.hold(4.0)])
+    handle = arm.start([ha.ptp(HOME + 0.2, speed=0.05), ha.hold(20.0)])
     arm.wait_until(lambda state: state.motion.active)
     with pytest.raises(ha.ModeConflict, match=r"a motion runs.*give start"):
         arm.plan(ha.lin_rel(z=0.05))

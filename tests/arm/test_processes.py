@@ -6,6 +6,7 @@ import asyncio
 import subprocess
 import sys
 import textwrap
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
@@ -153,18 +154,169 @@ async def _await(handle: ha.MotionHandle) -> ha.Result:
     return await handle
 
 
-def test_an_awaited_handle_raises_and_a_cancelled_wait_leaves_the_motion(peer: Peer) -> None:
-    peer.runs(1)
+def test_an_awaited_handle_raises_its_error(peer: Peer) -> None:
+    peer.runs(1, peer.finished(1, wire.Cause.SAFETY))
+
+    async def program(arm: ha.Arm) -> None:
+        handle = arm.start(HOME)
+        with pytest.raises(ha.MotionAborted) as raised:
+            await handle
+        assert handle.error is raised.value
+
+    with peer.arm() as arm:
+        asyncio.run(program(arm))
+
+
+# ----------------------------------------------------------------------------- cancelled waits in asyncio
+
+
+def braked(peer: Peer) -> None:
+    """The script: a motion begins, and only a stop ends it."""
+    peer.runs(1, wire.MotionStarted(id=1, item=0))
+    peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))
+
+
+async def by_wait_for(handle: ha.MotionHandle) -> None:
+    await asyncio.wait_for(_await(handle), 0.05)
+
+
+async def by_wait_for_itself(handle: ha.MotionHandle) -> None:
+    await asyncio.wait_for(handle, 0.05)
+
+
+async def by_timeout(handle: ha.MotionHandle) -> None:
+    async with asyncio.timeout(0.05):
+        await handle
+
+
+async def by_another_task(handle: ha.MotionHandle) -> None:
+    async def fails() -> None:
+        await asyncio.sleep(0.05)
+        raise TimeoutError
+
+    try:
+        async with asyncio.TaskGroup() as group:
+            group.create_task(_await(handle))
+            group.create_task(fails())
+    except Exception as failure:
+        assert [type(one) for one in failure.exceptions] == [TimeoutError]  # type: ignore[attr-defined]
+        assert handle.done  # the group has ended: nothing of it goes on
+        raise asyncio.TimeoutError from failure
+
+
+async def by_gather(handle: ha.MotionHandle) -> None:
+    try:
+        await asyncio.wait_for(asyncio.gather(_await(handle), asyncio.sleep(60.0)), 0.05)
+    except asyncio.TimeoutError:
+        while not handle.done:  # gather itself does not wait for those that it cancels
+            await asyncio.sleep(0.01)
+        raise
+
+
+async def by_cancel(handle: ha.MotionHandle) -> None:
+    task = asyncio.create_task(_await(handle))
+    await asyncio.sleep(0.05)
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    raise asyncio.TimeoutError
+
+
+_SINCE_3_11 = pytest.mark.skipif(sys.version_info < (3, 11), reason="of Python 3.11")
+
+
+@pytest.mark.parametrize(
+    "wait",
+    [
+        by_wait_for,
+        by_wait_for_itself,
+        pytest.param(by_timeout, marks=_SINCE_3_11),
+        pytest.param(by_another_task, marks=_SINCE_3_11),
+        by_gather,
+        by_cancel,
+    ],
+)
+def test_a_cancelled_await_brakes_the_arm(
+    peer: Peer, wait: Callable[[ha.MotionHandle], Awaitable[None]]
+) -> None:
+    braked(peer)
 
     async def program(arm: ha.Arm) -> None:
         handle = arm.start(HOME)
         with pytest.raises(asyncio.TimeoutError):
-            await asyncio.wait_for(_await(handle), 0.05)
+            await wait(handle)
+        assert handle.done and isinstance(handle.error, ha.MotionAborted)  # the wait lasts until then
+
+    with peer.arm() as arm:
+        asyncio.run(program(arm))
+
+
+def test_a_shielded_await_lets_the_motion_go_on(peer: Peer) -> None:
+    peer.runs(1, wire.MotionStarted(id=1, item=0))
+
+    async def program(arm: ha.Arm) -> ha.Result:
+        handle = arm.start(HOME)
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(asyncio.shield(handle), 0.05)
+        await asyncio.sleep(0.05)
         assert not handle.done
-        peer.tell(peer.finished(1, wire.Cause.SAFETY))
-        with pytest.raises(ha.MotionAborted) as raised:
-            await handle
-        assert handle.error is raised.value
+        peer.tell(peer.finished(1))
+        return await handle
+
+    with peer.arm() as arm:
+        assert asyncio.run(program(arm)).arrived
+    assert not [message for message in peer.seen if isinstance(message, wire.Stop)][1:]
+
+
+def test_a_second_cancellation_does_not_wait_for_the_end_of_the_motion(peer: Peer) -> None:
+    peer.runs(1, wire.MotionStarted(id=1, item=0))
+    peer.expect(wire.Stop, wire.Accepted(id=0))
+
+    async def program(arm: ha.Arm) -> None:
+        handle = arm.start(HOME)
+        task = asyncio.create_task(_await(handle))
+        await asyncio.sleep(0.05)
+        task.cancel()
+        await asyncio.sleep(0.05)
+        assert not task.done()  # the arm brakes
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        assert not handle.done
+        peer.tell(peer.finished(1, wire.Cause.STOPPED))
+
+    with peer.arm() as arm:
+        asyncio.run(program(arm))
+
+
+def test_a_closed_coroutine_brakes_the_arm(peer: Peer) -> None:
+    braked(peer)
+
+    async def program(arm: ha.Arm) -> None:
+        handle = arm.start(HOME)
+        waiting = _await(handle)
+        waiting.send(None)
+        waiting.close()
+        while not handle.done:
+            await asyncio.sleep(0.01)
+
+    with peer.arm() as arm:
+        asyncio.run(program(arm))
+
+
+def test_a_wait_that_is_cancelled_after_the_end_stops_nothing(peer: Peer) -> None:
+    peer.runs(1, peer.finished(1))
+
+    async def program(arm: ha.Arm) -> None:
+        handle = arm.start(HOME)
+        handle.wait(timeout=30.0)
+        task = asyncio.create_task(_await(handle))
+        await asyncio.sleep(0)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        count = len([message for message in peer.seen if isinstance(message, wire.Stop)])
+        assert count == 0
 
     with peer.arm() as arm:
         asyncio.run(program(arm))

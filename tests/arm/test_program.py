@@ -182,3 +182,18 @@ def test_arcs_and_splines_reach_the_wire_whole() -> None:
         one(ha.spline_joints([np.zeros(7), deg(0, 121, 0, 0, 0, 0, 0)]))
     assert 15 < longest([curve], ROBOT, 1.0) < longest([curve], ROBOT, 0.01)
     assert 15 < longest([ha.spline_joints([np.zeros(7)] * 3)], ROBOT, 1.0) < 200
+
+
+def test_a_refused_element_is_named_in_text_and_parameter() -> None:
+    far = Pose.at(9.0, 0.0, 0.5)
+    line = ha.spline([ha.spl(POSE)] * 30 + [ha.spl(far)] + [ha.spl(POSE)])
+    with pytest.raises(ha.LimitError, match=r"^segments\[30\]: target\.x must") as error:
+        one(line)
+    assert error.value.parameter == "segments[30].target.x"
+    with pytest.raises(ha.LimitError, match=r"^motions\[1\]\.segments\[30\]: target\.x must") as error:
+        items([hold(1.0), line], ROBOT, 1.0)
+    assert error.value.parameter == "motions[1].segments[30].target.x"
+    joints = ha.spline_joints([np.zeros(7)] * 3 + [deg(0, 0, 0, 121, 0, 0, 0)])
+    with pytest.raises(ha.LimitError, match=r"^motions\[1\]\.points\[3\]: .*A4") as error:
+        items([hold(1.0), joints], ROBOT, 1.0)
+    assert error.value.parameter.startswith("motions[1].points[3].q")

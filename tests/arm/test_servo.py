@@ -17,6 +17,8 @@ from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import Position
 from tests.conftest import RunningCabinet
 
+SPEED = 1.0  # streams by this machine's clock
+
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
 TOUCH = 2e-3
 

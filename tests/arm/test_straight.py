@@ -12,6 +12,8 @@ from heptarm.values.mode.impedance import CartesianImpedance
 from tests.conftest import RunningCabinet
 from tests.retry import retry, starved
 
+SPEED = 1.0  # streams by this machine's clock
+
 
 @pytest.fixture
 def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:

@@ -24,6 +24,8 @@ from tests.arm.programs import end, script
 from tests.conftest import RunningCabinet
 from tests.interrupts import ctrl_c_interrupts
 
+SPEED = 1.0  # programs are interrupted and stopped at moments of this machine's time
+
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 #: Takes about three seconds.
 FAR = ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
@@ -109,6 +111,22 @@ def test_motions_can_be_awaited_together(arm: Arm) -> None:
         return list(await asyncio.gather(*(_await(arm.start(m)) for m in (near, ptp(HOME)))))
 
     assert all(result.arrived for result in asyncio.run(program()))
+
+
+def test_an_await_that_times_out_brakes_the_arm(arm: Arm) -> None:
+    async def program() -> ha.MotionHandle:
+        handle, behind = arm.start(FAR), arm.start(ptp(HOME))
+        await asyncio.to_thread(under_way, arm)
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(handle, 0.01)
+        assert handle.done
+        with pytest.raises(ha.MotionAborted):
+            await behind
+        return handle
+
+    handle = asyncio.run(program())
+    assert isinstance(handle.error, ha.MotionAborted) and handle.error.cause is ha.Cause.STOPPED
+    assert arm.wait_for_rest(timeout=30.0).q[0] < np.radians(59)
 
 
 async def _await(handle: ha.MotionHandle) -> ha.Result:
@@ -228,7 +246,7 @@ def test_arrays_are_read_only_and_consistent(arm: Arm) -> None:
 
 
 def test_requests_while_states_stream_and_the_arm_moves(arm: Arm) -> None:
-    arm.subscribe(rate=1000.0)
+    arm.subscribe(rate=500.0)
     handle = arm.start(ptp(HOME + deg(20, 0, 0, 0, 0, 0, 0), speed=0.3))
     for _ in range(300):
         arm.set_override(1.0)

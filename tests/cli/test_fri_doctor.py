@@ -17,6 +17,8 @@ from tests.cli.test_fri import controller, free_port
 from tests.conftest import RunningCabinet
 from tests.retry import retry
 
+SPEED = 1.0  # FRI answers within milliseconds of this machine's time
+
 
 def verdicts(*arguments: str, fails: bool = False) -> dict[str, dict[str, Any]]:
     def parsed(done: subprocess.CompletedProcess[str]) -> dict[str, dict[str, Any]]:

@@ -10,6 +10,8 @@ import pytest
 from tests.cli.running import objects, run
 from tests.conftest import RunningCabinet
 
+SPEED = 1.0  # a recording of so many seconds
+
 pytestmark = pytest.mark.slow
 
 

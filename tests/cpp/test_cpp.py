@@ -40,12 +40,12 @@ FLAGS = (
 KEY = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj"
 
 
-def compiled(source: Path, folder: Path) -> Path:
+def compiled(source: Path, folder: Path, *flags: str) -> Path:
     compiler = shutil.which("g++") or shutil.which("clang++")
     if compiler is None:
         pytest.skip("no C++ compiler here: the C++ client is not tested")
     program = folder / source.stem
-    subprocess.run([compiler, *FLAGS, "-o", str(program), str(source)], check=True, timeout=800)
+    subprocess.run([compiler, *FLAGS, *flags, "-o", str(program), str(source)], check=True, timeout=800)
     return program
 
 
@@ -298,4 +298,4 @@ def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     for name, text in (("program", whole[0]), ("page", head + body)):
         source = tmp_path / f"{name}.cpp"
         source.write_text(text)
-        compiled(source, tmp_path)
+        compiled(source, tmp_path, "-O0", "-c")  # the examples are linked and run

@@ -25,7 +25,8 @@ const images = [...document.images].filter(i => !i.complete || i.naturalWidth ==
 return {wide: wide, culprits: culprits, images: images, title: document.title};
 """
 
-pytestmark = [pytest.mark.slow, pytest.mark.computing]
+#: CI builds the site beside the tests, see .github/workflows/test.yml; `test_links` is quick.
+pytestmark = [pytest.mark.slow, pytest.mark.computing, pytest.mark.long]
 
 
 @pytest.fixture(scope="session")  # tests with a browser come last

@@ -11,13 +11,15 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.drawing import cannot_draw
+from tests.lending import Lender
 from tests.retry import busy, retry
-from tests.simulators import PATIENT, PATIENT_AND_FASTER
+from tests.simulators import FASTER, PATIENT, PATIENT_AND_FASTER
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^( *)```(?:python|\{code-block\} python)([^\n]*)\n(.*?)^\1```", re.S | re.M)
@@ -36,6 +38,8 @@ REAL_TIME = (
     ),
     "stopping.md",
 )
+#: What an example, or the tests of what they call, run in every test as well.
+IN_LONG_RUN = ("commissioning.md", "laws.md", "scenarios.md")
 RUNNER = """
 import os, sys
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -44,6 +48,13 @@ for name in sys.argv[1:]:
     source = open(name, encoding="utf-8").read()
     exec(compile(source, os.path.basename(name), "exec"), page)
 """
+
+
+@pytest.fixture(scope="module")
+def lender(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lender]:
+    """The virtual cabinets of all pages."""
+    with Lender(tmp_path_factory.mktemp("lender") / "socket", 1.0, FASTER) as lender:
+        yield lender
 
 
 def _blocks(page: Path) -> list[tuple[int, str, bool]]:
@@ -69,8 +80,16 @@ def test_snippets_compile(page: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [p for p in PAGES if any(run for *_, run in _blocks(p))], ids=_id)
-def test_snippets_run(page: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[pytest.mark.long] if page.name in IN_LONG_RUN else [])
+        for page in PAGES
+        if any(run for *_, run in _blocks(page))
+    ],
+    ids=_id,
+)
+def test_snippets_run(page: Path, tmp_path: Path, lender: Lender) -> None:
     files = []
     for line, source, run in _blocks(page):
         if run:
@@ -78,7 +97,7 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
             files.append(tmp_path / f"{page.stem}-line-{line}.py")
             files[-1].write_text(source, encoding="utf-8")
 
-    program = (PATIENT if page.name in REAL_TIME else PATIENT_AND_FASTER) + RUNNER
+    program = lender.prelude + (PATIENT if page.name in REAL_TIME else PATIENT_AND_FASTER) + RUNNER
 
     def run_page() -> subprocess.CompletedProcess[str]:
         return subprocess.run(

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.long import longer
 from tests.retry import busy, retry
 from tests.simulators import FASTER, PATIENT, PATIENT_AND_FASTER
 
@@ -22,8 +21,8 @@ REAL_TIME = (
 )
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
-#: One peg is taken from its holder, and one from the hole; more of them with LONG=1.
-ARGUMENTS: dict[str, tuple[str, ...]] = {"16_insertion.py": longer(("2",), ())}
+#: The same skills as in the cookbook, whose page runs in every test, and in the scenarios.
+IN_LONG_RUN = ("15_pick_and_place.py", "16_insertion.py", "17_polishing.py")
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself
@@ -35,7 +34,11 @@ EXAMPLES = sorted(
 )  # those in real time before the shared one is there, which takes its part of the machine
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "example",
+    [pytest.param(one, marks=[pytest.mark.long] if one.name in IN_LONG_RUN else []) for one in EXAMPLES],
+    ids=lambda path: path.name,
+)
 def test_example(example: Path, request: pytest.FixtureRequest) -> None:
     if example.name in REAL_TIME:
         target, before = "sim://iiwa14", PATIENT
@@ -47,7 +50,7 @@ def test_example(example: Path, request: pytest.FixtureRequest) -> None:
 
     def run() -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-c", before + RUNNER, str(example), *ARGUMENTS.get(example.name, ())],
+            [sys.executable, "-c", before + RUNNER, str(example)],
             capture_output=True,
             text=True,
             timeout=140,

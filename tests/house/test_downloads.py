@@ -25,7 +25,7 @@ PYTHON = """#!/bin/sh
 echo "$*" >>calls
 case $* in
 *torch.txt*) {torch} ;;
-*all.txt*) {locked} ;;
+*dev.txt*) {locked} ;;
 esac
 """
 MISSING = "echo 'ERROR: No matching distribution found for x==1'; exit 1"
@@ -61,8 +61,8 @@ def test_every_locked_package_has_a_version_and_checksums(name: str) -> None:
 
 
 def test_the_lock_file_agrees_with_the_project() -> None:
-    versions = locked("all")
-    for one in project("all"):
+    versions = locked("dev")
+    for one in project("dev"):
         if one.name == "torch" or (one.marker and not one.marker.evaluate({"sys_platform": "linux"})):
             continue
         pinned = [
@@ -70,9 +70,24 @@ def test_the_lock_file_agrees_with_the_project() -> None:
             for pin in versions.get(canonicalize_name(one.name), [])
             if not pin.marker or pin.marker.evaluate()
         ]
-        assert pinned, f"{one} is not in scripts/lock/all.txt: make lock"
+        assert pinned, f"{one} is not in scripts/lock/dev.txt: make lock"
         (version,) = {str(pin.specifier).removeprefix("==") for pin in pinned}
         assert one.specifier.contains(version, prereleases=True), f"{one}, locked is {version}: make lock"
+
+
+def test_the_extra_for_users_has_no_tools_of_developers() -> None:
+    users, developers = ({one.name for one in project(extra)} for extra in ("all", "dev"))
+    assert users < developers
+    assert not users & {
+        "pytest",
+        "mypy",
+        "ruff",
+        "import-linter",
+        "selenium",
+        "build",
+        "sphinx",
+        "hypothesis",
+    }
 
 
 def test_scripts_fetch_nothing_but_packages() -> None:
@@ -95,7 +110,7 @@ def test_scripts_fetch_nothing_but_packages() -> None:
 
 
 def set_up(
-    folder: Path, *, torch: str = "", locked: str = "", extras: str = "all"
+    folder: Path, *, torch: str = "", locked: str = "", extras: str = "dev"
 ) -> tuple[int, str, list[str]]:
     """Exit code, what is said, and the calls of pip, of a set-up in which pip is made up."""
     (folder / "scripts").mkdir()
@@ -124,9 +139,9 @@ def test_locked_files_are_installed_with_their_checksums(tmp_path: Path) -> None
     code, _, calls = set_up(tmp_path)
     assert code == 0
     assert all("--require-hashes --no-deps" in one for one in calls if ".txt" in one)
-    assert any("all.txt" in one for one in calls)
+    assert any("dev.txt" in one for one in calls)
     assert "-m pip install -q --no-deps --no-build-isolation -e ." in calls
-    assert "-m pip install -q -e .[all]" not in calls
+    assert "-m pip install -q -e .[dev]" not in calls
 
 
 @posix
@@ -141,7 +156,7 @@ def test_a_file_with_another_content_ends_the_set_up(tmp_path: Path, which: str)
 def test_where_locked_files_are_not_to_be_had_it_reports_it_and_takes_others(tmp_path: Path) -> None:
     code, said, calls = set_up(tmp_path, locked=MISSING)
     assert code == 0 and "the newest are installed, without checksums" in said
-    assert calls[-1] == "-m pip install -q -e .[all]"
+    assert calls[-1] == "-m pip install -q -e .[dev]"
 
 
 @posix
@@ -149,8 +164,8 @@ def test_another_build_of_torch_is_taken_and_all_the_rest_is_checked(tmp_path: P
     code, said, calls = set_up(tmp_path, torch=MISSING)
     assert code == 0 and "another build is installed, without a checksum" in said
     assert "-m pip install -q torch==2.13.0" in calls
-    assert any("--require-hashes" in one and "all.txt" in one for one in calls)
-    assert "-m pip install -q -e .[all]" not in calls
+    assert any("--require-hashes" in one and "dev.txt" in one for one in calls)
+    assert "-m pip install -q -e .[dev]" not in calls
 
 
 @posix

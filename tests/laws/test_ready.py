@@ -13,7 +13,8 @@ from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri import LawTrial
 from heptarm.fri.loop.native import library
-from heptarm.laws.ready import across, constants, shared_library
+from heptarm.laws.ready import across, shared_library
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS, Body, robot
 
@@ -33,7 +34,7 @@ def test_the_model_in_c_is_that_of_python(name: str) -> None:
         for _ in range(5):
             q, dq = rng.uniform(arm.q_min, arm.q_max), rng.uniform(-2.0, 2.0, 7)
             found = [np.zeros(shape) for shape in ((7, 7), 7, 7, (6, 7), 7)]
-            arrays = (constants(arm, load), q, dq, *found)
+            arrays = (rigid_bodies(arm, load, rotor=ROTOR), q, dq, *found)
             compiled.heptarm_model(*(ctypes.c_void_p(one.ctypes.data) for one in arrays))
             mass, bias, weight, jac, pose = found
             assert np.abs(mass - model.mass_matrix(arm, q, load=load)).max() < 1e-12

@@ -8,6 +8,7 @@ import pytest
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.model.velocity import (
     MARGIN,
+    ElbowTask,
     Slowdown,
     VelocityPath,
     joint_velocity,
@@ -140,9 +141,10 @@ def test_a_fast_joint_beside_a_limit_brakes_no_harder_than_it_may() -> None:
 def test_a_twist_into_the_stretched_arm_slows_down_and_reports_the_singularity() -> None:
     arm = robot("iiwa14")
     one = path(acceleration=0.2, speed=0.3)
+    elbow = ElbowTask(arm, one.q)
     twist, least, jumps, before = np.array([0.1, 0, 0, 0, 0, 0.0]), 1.0, 0.0, np.zeros(7)
     for _ in range(2000):
-        dq, singular = resolved_twist(arm, one.q, twist)
+        dq, singular = resolved_twist(arm, one, twist, elbow=elbow)
         one.advance(dq, 0.01)
         jumps, before = max(jumps, float(np.abs(one.dq - before).max())), one.dq
         if singular.reason:

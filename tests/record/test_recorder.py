@@ -26,6 +26,8 @@ from tests.conftest import RunningCabinet
 from tests.fri_loop.controller import Controller
 from tests.simulators import PATIENT
 
+SPEED = 1.0  # rates, and FRI answers by this machine's clock
+
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 
 

@@ -222,6 +222,7 @@ def workers(out: Path, resume: str = "") -> list[str]:
     return [out_text.strip() for out_text, _ in said]
 
 
+@pytest.mark.long
 def test_two_workers_learn_one_policy_and_go_on_after_an_interruption(tmp_path: Path) -> None:
     path = tmp_path / "reach.npz"
     assert workers(path) == ["768", "768"]  # three updates of two workers

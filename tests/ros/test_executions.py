@@ -28,6 +28,8 @@ from heptarm.values.result import Cause, MotionEvent
 from heptarm.values.state import State
 from tests.conftest import RunningCabinet
 
+SPEED = 1.0  # streams and FRI answers by this machine's clock
+
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0])
 AWAY = np.array([0.3, -0.1, 0.2, 0.2, -0.3, 0.2, 0.5])
 PATIENCE = 60.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,14 @@ from heptarm.model.kinematics import jacobian
 from heptarm.planning.command import Order
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
+from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.motion.hand_guiding import HandGuide, hand_guide
 from tests.sim.driving import Ear, ready, run
 
 NAN = np.nan
 SIDEWAYS = (0.0, 60.0, 0.0)
+#: Bounds that are hardly felt.
+QUICK: dict[str, Any] = {"joint_velocity": 2.0, "cartesian_velocity": 2.0}
 
 
 def begun(guide: HandGuide | None = None, *, model: str = "iiwa14") -> tuple[Plant, Ear]:
@@ -100,7 +105,7 @@ def test_no_axis_leaves_its_own_limits(force: tuple[float, ...]) -> None:
 
 
 def test_a_limit_holds_one_axis_and_leaves_the_others_free() -> None:
-    plant, _ = begun(hand_guide(q_max=one(0, 0.2)))
+    plant, _ = begun(hand_guide(q_max=one(0, 0.2), **QUICK))
     q, dq = push_along(plant, SIDEWAYS, 1.5)
     assert 0.15 < q[-1, 0] < 0.2 and q[:, 0].max() < 0.2
     assert abs(dq[-1, 0]) < 0.02
@@ -110,7 +115,7 @@ def test_a_limit_holds_one_axis_and_leaves_the_others_free() -> None:
 
 
 def test_a_limit_can_hold_all_axes_until_the_switch_is_let_go() -> None:
-    plant, ear = begun(hand_guide(q_max=one(0, 0.2), at_limit="all"))
+    plant, ear = begun(hand_guide(q_max=one(0, 0.2), at_limit="all", **QUICK))
     q, _ = push_along(plant, SIDEWAYS, 2.0)
     assert q[:, 0].max() < 0.2
     assert np.abs(q[-1] - q[-500]).max() < 2e-3
@@ -138,6 +143,35 @@ def test_speed_limits() -> None:
         np.linalg.norm(jacobian(plant.robot, a)[:3] @ b) for a, b in zip(q[::20], dq[::20], strict=True)
     ]
     assert 0.05 < max(speeds) < 0.15
+
+
+def speeds(plant: Plant, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """Speeds of the flange [m/s]."""
+    steps = zip(q[::20], dq[::20], strict=True)
+    return np.array([np.linalg.norm(jacobian(plant.robot, a)[:3] @ b) for a, b in steps])
+
+
+@pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 15.0), (30.0, 30.0, 0.0)])
+def test_without_limits_of_its_own_it_is_bounded(force: tuple[float, ...]) -> None:
+    plant, ear = begun()
+    q, dq = push_along(plant, force, 2.0)
+    assert 0.1 < speeds(plant, q, dq).max() <= 0.25
+    assert (np.abs(dq) <= 0.52 * plant.robot.dq_max).all()
+    finish(plant)
+    assert ear.causes == ["started", "done"]
+
+
+@pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 60.0)])
+def test_floating_joints_are_damped_and_bounded(force: tuple[float, ...]) -> None:
+    plant, ear = ready(), Ear()
+    plant.submit(Order(1, "hold", duration=10.0, mode=JointImpedance(0.0, damping=0.0), listener=ear))
+    plant.step(50)
+    _, dq = push_along(plant, force, 2.0)
+    fastest = np.abs(dq)
+    assert fastest.max() > 0.1 and (fastest <= 0.52 * plant.robot.dq_max).all()
+    plant.step(1000)
+    assert np.abs(plant.snapshot.dq).max() < 1e-2, "it comes to rest where it is left"
+    assert ear.causes == ["started"]
 
 
 def test_reduced_speed_in_t1() -> None:

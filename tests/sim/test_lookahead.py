@@ -117,6 +117,35 @@ def test_what_the_controller_would_refuse(
         ahead(*motions)
 
 
+@pytest.mark.parametrize(
+    ("start", "axis", "turn"),
+    [
+        ((160, 45, 0, -90, 0, 45, 0), 1, 40),
+        ((-160, 45, 0, -90, 0, 45, 0), 1, -40),
+        ((0, 45, 0, -90, 0, 45, 165), 7, 40),
+        ((0, 45, 0, -90, 0, 45, -165), 7, -40),
+        ((0, 30, 0, -90, 0, 110, 0), 6, 40),
+    ],
+)
+def test_a_line_across_a_limit_names_the_limit(start: tuple[float, ...], axis: int, turn: float) -> None:
+    frames = FramesOfArm(lambda name: Pose.at(), lambda name: None)
+    q = deg(*start)
+    goal = Pose.from_matrix(model.forward(IIWA, q + np.radians(turn) * np.eye(7)[axis - 1]))
+    with pytest.raises(ha.LimitError, match=f"limit A{axis} on the path"):
+        look_ahead(IIWA, q, [ha.lin(goal)], frames, step=0.01)
+
+
+def test_of_two_obstacles_on_a_line_the_first_is_named() -> None:
+    frames = FramesOfArm(lambda name: Pose.at(), lambda name: None)
+    q = deg(0, 30, 0, -90, 0, 100, 0)
+    flange = model.forward(IIWA, q)
+    # 30 deg about A6, which has 20 left, and then out of reach
+    turned = Pose.from_matrix(model.forward(IIWA, q + np.radians(60) * np.eye(7)[5]))
+    goal = Pose.of(flange[:3, 3] + [0.9, 0, 0.9], turned.quat)
+    with pytest.raises(ha.LimitError, match="limit A6 on the path"):
+        look_ahead(IIWA, q, [ha.lin(goal)], frames, step=0.01)
+
+
 def test_a_line_through_a_singularity_is_refused() -> None:
     stretched = deg(
         0, 5, 0, -10, 0, 5, 0

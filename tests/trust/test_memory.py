@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 
@@ -12,7 +11,6 @@ import heptarm as ha
 from bench.measure.cabinet import Cabinet
 from bench.trust.soak import soak
 
-LONG = bool(os.environ.get("LONG"))
 pytestmark = pytest.mark.alone
 
 
@@ -77,11 +75,12 @@ def test_black_boxes_of_many_clients_share_their_memory() -> None:
     assert float(grown) < 6.0  # 2 MB; with a thread for each file it was 13 MB
 
 
+@pytest.mark.long
 def test_a_soak_leaves_nothing_behind_and_loses_nothing() -> None:
-    """A minute of everything at once, three with LONG=1. `make soak MINUTES=90` reports the growth exactly."""
-    verdict = soak(180.0 if LONG else 60.0)
+    """Three minutes of everything at once. `make soak MINUTES=90` reports the growth exactly."""
+    verdict = soak(180.0)
     assert verdict.lost == []
     assert verdict.grown == {}
     assert {"observer", "fri", "fault", "servo", "motions"} <= set(verdict.done)
     # classes are still loaded and heaps still fill in the first minutes; a leak of each call showed 3 MB/min and more
-    assert max(verdict.slopes.values()) < (2.0 if LONG else 20.0)
+    assert max(verdict.slopes.values()) < 2.0

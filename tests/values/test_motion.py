@@ -194,6 +194,8 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: Dynamics(joint_speed=Q), LimitError, r"joint_speed\[0\] must .*got 0"),
         (lambda: Blending(relative=2.0), LimitError, "relative must .*got 2"),
         (lambda: Redundancy(math.inf), LimitError, "e1 must .*got inf"),
+        (lambda: Redundancy(e1=math.nan), LimitError, "e1 must .*got nan"),
+        (lambda: Redundancy(e1=np.float64(np.nan)), LimitError, "e1 must .*got nan"),
         (lambda: Redundancy(status=8), LimitError, "status must be 0 to 7, or -1 for not given, got 8"),
         (lambda: Redundancy(status=-2), LimitError, "status must .*got -2"),
         (lambda: Redundancy(turn=128), LimitError, "turn must .*got 128"),

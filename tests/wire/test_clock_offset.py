@@ -111,3 +111,20 @@ def test_old_samples_are_forgotten() -> None:
     cabinet, estimate = Cabinet(), ClockOffset(window=1000, span=1.0)
     run(cabinet, estimate, start=1e9, pings=100, every=50e6)
     assert len(estimate._samples) <= 22
+
+
+def test_a_small_step_after_a_silence_shows_on_a_clock_of_our_rate() -> None:
+    cabinet, estimate = Cabinet(), ClockOffset()
+    now = run(cabinet, estimate, start=1e9, pings=10, every=125e6)
+    cabinet.offset += 20e6  # a drift of 100 ppm over ten seconds is 1 ms
+    cabinet.ping(estimate, now + 10e9)
+    assert abs(estimate.to_cabinet(round(now + 10e9)) - cabinet.clock(now + 10e9)) < 150e3
+    assert estimate.rate == 1.0  # it stepped, it does not run faster
+
+
+def test_a_rate_that_is_not_ours_is_known_to_a_hundredth_so_that_a_ping_after_a_silence_corrects_it() -> None:
+    cabinet, estimate = Cabinet(rate=5.0), ClockOffset()
+    now = run(cabinet, estimate, start=1e9, pings=10, every=125e6)
+    cabinet.offset, cabinet.rate = cabinet.clock(now) - 5.03 * now, 5.03
+    cabinet.ping(estimate, now + 10e9)
+    assert estimate.rate == pytest.approx(5.03, rel=1e-3)

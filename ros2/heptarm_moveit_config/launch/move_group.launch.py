@@ -17,6 +17,7 @@ from moveit_configs_utils import MoveItConfigsBuilder
 ARGUMENTS = {
     "target": ("sim://iiwa14", "what to connect to"),
     "model": ("iiwa14", "iiwa7, iiwa14, med7 or med14"),
+    "flange": ("", "media flange of the robot: plain, or touch; empty: that of the target, plain in the description"),
     "namespace": ("", "namespace of all nodes and topics"),
     "prefix": ("", "prefix of the names of joints and frames, for several arms in one scene"),
     "xyz": ("0 0 0", "position of the arm in the world [m]"),
@@ -50,7 +51,7 @@ def _start(context):
     description = get_package_share_directory("heptarm_description")
     bringup = get_package_share_directory("heptarm_bringup")
     ours = get_package_share_directory("heptarm_moveit_config")
-    place = {name: given[name] for name in ("model", "prefix", "xyz", "rpy")}
+    place = {name: given[name] for name in ("model", "flange", "prefix", "xyz", "rpy")}
     configuration = (
         MoveItConfigsBuilder("heptarm", package_name="heptarm_moveit_config")
         .robot_description(file_path=os.path.join(description, "urdf", "heptarm.urdf.xacro"), mappings=place)

@@ -15,6 +15,7 @@ from moveit_configs_utils import MoveItConfigsBuilder
 
 ARGUMENTS = {
     "model": ("iiwa14", "iiwa7, iiwa14, med7 or med14"),
+    "flange": ("", "media flange of the robot: plain, or touch; empty: that of the target, plain in the description"),
     "namespace": ("", "namespace of the arm's node and of move_group"),
     "prefix": ("", "prefix of the names of joints and frames"),
 }
@@ -47,7 +48,7 @@ def _start(context):
         MoveItConfigsBuilder("heptarm", package_name="heptarm_moveit_config")
         .robot_description(
             file_path=os.path.join(description, "urdf", "heptarm.urdf.xacro"),
-            mappings={"model": model, "prefix": prefix},
+            mappings={"model": model, "flange": given["flange"], "prefix": prefix},
         )
         .robot_description_semantic(file_path="config/heptarm.srdf.xacro", mappings={"prefix": prefix})
         .robot_description_kinematics(file_path="config/kinematics.yaml")

@@ -18,6 +18,7 @@ from heptarm.arm.devices.io import Io
 from heptarm.arm.devices.operator import Operator
 from heptarm.arm.devices.smartpad import Pad
 from heptarm.arm.devices.tools import Tooling
+from heptarm.arm.flange_check import flange_warning
 from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection
@@ -31,6 +32,7 @@ from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
     JointServo,
+    LineServo,
     PoseServo,
     ServoKeywords,
     ServoRequest,
@@ -51,14 +53,17 @@ from heptarm.values.camera import Camera
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
+from heptarm.values.files import path_of
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
+from heptarm.values.sealed import Sealed
 from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
+from heptarm.values.text import lines
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.values.workspace import Workspace
 from heptarm.wire import messages as wire
@@ -72,6 +77,8 @@ _log = logging.getLogger("heptarm.arm")
 _STREAM_SIZE = 2000
 #: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
 _TOOL_PATIENCE = 5.0
+#: `Arm.speed` of a real robot until a program or its saved target sets another.
+REAL_SPEED = 0.25
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 
 
@@ -87,7 +94,7 @@ def _checked(check: CollisionCheck) -> CollisionCheck:
     return check
 
 
-class Arm:
+class Arm(Sealed):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -99,7 +106,7 @@ class Arm:
         self._foresight = Foresight(connection, self._tooling)
         self._io = Io(connection)
         self._pad = Pad(connection)
-        self._speed = 1.0
+        self._speed, self._is_speed_set = 1.0, False
         self._mode: Mode | None = None
         self._breaks: tuple[BreakRule, ...] = ()
         self._name = ""
@@ -111,6 +118,8 @@ class Arm:
         atexit.register(self.close)
         link = self._connection
         link.open()
+        if not self._is_speed_set and not self.is_virtual:
+            self._speed = REAL_SPEED
         if control:
             link.take_control()
         if link.options.rate > 0:
@@ -128,6 +137,19 @@ class Arm:
         joints = link.build(sample).groups.joints
         if joints is not None and np.isnan(joints.dq).any():
             link.feed.after(sample.number, link.options.timeout)
+        self._check_flange()
+
+    def _check_flange(self) -> None:
+        """Warn of a media flange that the robot model does not have."""
+        newest = self._connection.newest()
+        groups = None if newest is None else newest.groups
+        if groups is None or groups.joints is None or groups.pose is None:
+            return
+        expected = self._tooling.reached(groups.joints.q, TOOL)
+        if expected is not None and (
+            text := flange_warning(self.robot, groups.joints, groups.pose, expected)
+        ):
+            _log.warning("%s", text)
 
     def reconnect(self) -> None:
         """Make a new connection after the old one was lost; a controller takes control again.
@@ -197,6 +219,22 @@ class Arm:
         state = "closed" if link.closed.is_set() else "connected" if link.is_connected else "lost"
         name = f"{self._name}: " if self._name else ""
         return f"<Arm {name}{link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
+
+    def __str__(self) -> str:
+        """A few lines: the robot, its connection, and the ceiling of its speed."""
+        link = self._connection
+        if link.closed.is_set() or not link.is_connected:
+            return repr(self)
+        other = f"observing; {self.controller or 'nobody'} is in control"
+        begun = "" if self._is_speed_set or self.is_virtual else ", as every real robot begins"
+        rows = {
+            "name": self._name,
+            "cabinet": f"{self.cabinet}, {'simulated' if self.is_virtual else 'real'}",
+            "robot": self.robot.name,
+            "control": "in control" if link.in_control else other,
+            "speed": f"at most {self._speed:.0%} of each axis' maximum{begun}: arm.speed",
+        }
+        return lines(self.robot.title, rows)
 
     @property
     def name(self) -> str:
@@ -350,7 +388,12 @@ class Arm:
         )
 
     def record(
-        self, path: str | Path, *, rate: float | None = None, camera: Camera | None = None
+        self,
+        path: str | Path,
+        *,
+        rate: float | None = None,
+        camera: Camera | None = None,
+        overwrite: bool = False,
     ) -> Recorder:
         """A recording of everything that happens while the `with` block runs; `heptarm.load` reads it.
 
@@ -358,20 +401,23 @@ class Arm:
         The file is complete to its last half second even if this program is killed.
 
         Args:
-            path: the file, MCAP; it is replaced.
+            path: the file, MCAP.
             rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
             camera: a simulated camera whose pictures are in the file, too: of a model of the arm, not of the robot. It
                 needs the group "joints". A process of its own draws them, so that they never hold up the states; when
                 it is too slow it drops pictures, which `Recorder.pictures_dropped` counts. None: no pictures.
+            overwrite: replace a file that exists.
 
         Raises:
             LimitError: a rate outside its range.
-            CommandRejected: the file cannot be written, or this machine cannot draw (when the block begins).
+            CommandRejected: the file exists. Or it cannot be written, or this machine cannot draw (when the block
+                begins).
             MissingExtra: the package mcap is not installed, or those of a camera (when the block begins).
         """
         cameras = {} if camera is None else {"": camera_feed(self, camera)}
-        where = Path(instance(path, (str, Path), "path"))
-        return Recorder({"": self._connection}, where, rate=rate, cameras=cameras)
+        return Recorder(
+            {"": self._connection}, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite
+        )
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -413,13 +459,14 @@ class Arm:
     def speed(self) -> float:
         """Ceiling of the speed of all motions sent, a fraction of each axis' maximum in (0, 1].
 
-        A motion's own speed can only be lower.
+        A motion's own speed can only be lower. It begins at that of the saved target, otherwise at 0.25 on a real robot
+        and at 1 on a simulator.
         """
         return self._speed
 
     @speed.setter
     def speed(self, value: float) -> None:
-        self._speed = within(value, "speed", 0.0, 1.0, above=True)
+        self._speed, self._is_speed_set = within(value, "speed", 0.0, 1.0, above=True), True
 
     @property
     def collision_check(self) -> CollisionCheck | None:
@@ -745,8 +792,11 @@ class Arm:
         if kind == "joint":
             return JointServo(self._connection, terms)
         moving = self._tooling.on_flange(request.moving)
-        if kind in ("pose", "lin"):
-            return PoseServo(self._connection, terms, moving=moving)
+        elbow = request.elbow_task(self._connection.robot)
+        if kind == "lin":
+            return LineServo(self._connection, terms, moving=moving, elbow=elbow)
+        if kind == "pose":
+            return PoseServo(self._connection, terms, moving=moving, elbow=elbow)
         limits = JogLimits(*request.joint_fractions(self._speed), request.silence)
         if kind == "velocity":
             return VelocityServo(self._connection, terms, limits)
@@ -756,6 +806,7 @@ class Arm:
             limits,
             twist=TwistLimits(*request.line_limits()),
             moving=moving,
+            elbow=elbow,
             axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
         )
 
@@ -804,7 +855,7 @@ class Arm:
         rule = guarding.in_force(self) if settings.get("collision") is None else None
         if rule is not None:
             settings["collision"] = rule[0]
-        request = fri_settings.request(self._connection, kind, **settings)
+        request = fri_settings.request(self._connection, kind, load=self._tooling.load, **settings)
         return Fri(self._connection, request, on_collision=None if rule is None else rule[1])
 
     # -------------------------------------------------------------------------- stop and recover

@@ -6,6 +6,7 @@ import itertools
 import logging
 import os
 import socket
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -23,7 +24,8 @@ from heptarm.io.keys import find_key
 from heptarm.io.targets import SavedTarget
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import finite, flag, instance, within, word
-from heptarm.values.robot import ROBOTS
+from heptarm.values.robot import FLANGES, ROBOTS, robot
+from heptarm.values.robot import flange as flange_of
 from heptarm.wire import messages as wire
 
 _log = logging.getLogger("heptarm.arm")
@@ -58,6 +60,7 @@ def connect(
     watchdog: float = CONNECTION.default,
     datagrams: bool = False,
     black_box: bool = True,
+    flange: str | float | None = None,
 ) -> Arm:
     """Connect to an arm.
 
@@ -80,6 +83,9 @@ def connect(
             packets; what does not get through by UDP goes over TCP. `arm.connection.datagrams` reports how it fares.
         black_box: write the last 30 s to a file after an abort, a safety stop or a lost connection; the error has its
             path. The environment variable HEPTARM_BLACK_BOX chooses the folder, or is "off".
+        flange: media flange of the robot, as in its station setup: "plain", "touch", or how far its frame is above that
+            of a plain flange [m]. A private simulator gets it. None: that of the target, otherwise a plain one.
+            No cabinet reports it; a warning names the likely one where the poses of the cabinet contradict it.
 
     Returns:
         The arm; use it in a `with` block, which leaves the arm at rest.
@@ -110,7 +116,7 @@ def connect(
         raise ShapeError(
             f"name must have printable characters only, got {name!a}", code=3, parameter="name", value=name
         )
-    chosen = parse_target(target_from_env() if target is None else target)
+    chosen = parse_target(target_from_env() if target is None else target).with_flange(flange)
     if key is None and key_file is None:
         key_file = chosen.key_file
     found = find_key(key=key, key_file=key_file, host=chosen.host, port=chosen.port)
@@ -124,9 +130,13 @@ def connect(
         watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
         datagrams=datagrams,
         black_box=black_box,
+        flange=flange_of(flange) if flange is not None else chosen.flange or FLANGES["plain"],
     )
     private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
-    host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)
+    host, port = chosen.host, chosen.port
+    if private is not None:
+        host, port = private.host, private.port
+        options = replace(options, flange=robot(private.model).flange)  # the project may have another one
 
     def dial() -> Transport:
         try:
@@ -160,7 +170,9 @@ def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
         CommandRejected: the cabinet does not know the tool; the text lists those that it knows.
     """
     saved.mark_used()
-    arm.name, arm.speed = saved.name, saved.speed
+    arm.name = saved.name
+    if saved.speed is not None:
+        arm.speed = saved.speed
     newest = arm.connection.newest()
     mode = None if newest is None else newest.groups.mode
     if control and saved.tool and (mode is None or mode.tool != saved.tool):

@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 from heptarm.arm.arm import Arm, camera_feed
 from heptarm.arm.connect import connect
@@ -30,9 +30,11 @@ from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeErr
 from heptarm.record.recorder import Recorder
 from heptarm.values.arrays import flag, instance, shown, within
 from heptarm.values.camera import Camera
+from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
+from heptarm.values.sealed import Sealed
 from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.arm")
@@ -68,7 +70,7 @@ class StatesOfArms:
         return "\n".join([head, *map(str, self.states)])
 
 
-class Arms:
+class Arms(Sealed):
     """Several connected arms; made by `connect_all`.
 
     A `with` block leaves all of them at rest: however it ends, all are stopped at once, then closed one after the
@@ -112,27 +114,34 @@ class Arms:
         return f"<Arms {', '.join(f'{name}: {arm!r}' for name, arm in self._arms.items())}>"
 
     def record(
-        self, path: str | Path, *, rate: float | None = None, camera: Camera | None = None
+        self,
+        path: str | Path,
+        *,
+        rate: float | None = None,
+        camera: Camera | None = None,
+        overwrite: bool = False,
     ) -> Recorder:
         """A recording of all arms in one file, with one time line; see `Arm.record`.
 
         `heptarm.load(path, arm="left")` reads the part of one of them.
 
         Args:
-            path: the file, MCAP; it is replaced.
+            path: the file, MCAP.
             rate: have at least so many states of each pushed per second meanwhile [Hz]; None: as many as are.
             camera: a simulated camera in front of each of them, see `Arm.record`; None: no pictures.
+            overwrite: replace a file that exists.
 
         Raises:
             LimitError: a rate outside its range.
-            CommandRejected: the file cannot be written, or this machine cannot draw (when the block begins).
+            CommandRejected: the file exists. Or it cannot be written, or this machine cannot draw (when the block
+                begins).
             MissingExtra: the package mcap is not installed, or those of a camera (when the block begins).
         """
         sources = {name: arm.connection for name, arm in self._arms.items()}
         cameras = (
             {} if camera is None else {name: camera_feed(arm, camera) for name, arm in self._arms.items()}
         )
-        return Recorder(sources, Path(instance(path, (str, Path), "path")), rate=rate, cameras=cameras)
+        return Recorder(sources, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite)
 
     def close(self) -> None:
         """Stop all arms, then leave each at rest and disconnect it; calling it again has no effect."""
@@ -233,7 +242,7 @@ def states_together(*arms: Arm) -> StatesOfArms:
     return StatesOfArms(moment * 1e-9, chosen, (max(times) - min(times)) * 1e-9)
 
 
-class MotionOfArms:
+class MotionOfArms(Sealed):
     """Programs of several arms that began together; made by `start_together`.
 
     Attributes:
@@ -241,6 +250,9 @@ class MotionOfArms:
         skew: upper bound of the time between the first and the last arm that was released [s]: from the first request
             that was sent to the last one that was answered.
     """
+
+    handles: Final[Mapping[Arm, MotionHandle]]
+    skew: Final[float]
 
     def __init__(self, handles: Mapping[Arm, MotionHandle], *, skew: float, stops_others: bool) -> None:
         self.handles = dict(handles)

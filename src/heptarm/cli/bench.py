@@ -25,6 +25,7 @@ from heptarm.cli.options import (
     FriPort,
     FriVersion,
     Json,
+    Overwrite,
     Yes,
 )
 from heptarm.cli.output import confirm, emit
@@ -34,6 +35,7 @@ from heptarm.fri.loop.echo import floor
 from heptarm.fri.loop.user_api import State
 from heptarm.fri.protocol.messages import Quality
 from heptarm.values.arrays import Array, within
+from heptarm.values.files import refuse_existing
 
 #: Messages kept for the picture.
 _KEPT = 120_000
@@ -93,6 +95,7 @@ def bench(
     ] = None,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
     """Measure how fast and how reliably FRI messages are answered, and name the main disturbance.
@@ -106,6 +109,7 @@ def bench(
     seconds = within(duration, "duration", 0.1, 86400.0, unit="s")
     if plot is not None:
         require("matplotlib", extra="viz")
+        refuse_existing(plot, overwrite=overwrite, name="plot")
     kept = min(_KEPT, round(1.2 * seconds * 1e3 / max(fri_period, 1)) + 2000)
     settings = {"port": fri_port, "version": fri_version, "history": kept}
     if listen:

@@ -16,11 +16,13 @@ from heptarm.cli.options import (
     NO_TARGET,
     CommandTarget,
     Json,
+    Overwrite,
     Yes,
 )
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected
 from heptarm.testing import Outcome, Report, Scenario, Verdict
+from heptarm.values.files import refuse_existing
 
 #: Longest wait for an answer [s]: a machine that also simulates may be late.
 _TIMEOUT = 20.0
@@ -60,6 +62,7 @@ def check(
             help="With --commission: write this file with .md and .json. Default: commissioning-ROBOT-DATE."
         ),
     ] = None,
+    overwrite: Overwrite = False,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
@@ -73,11 +76,15 @@ def check(
         from heptarm.cli import commissioning
 
         where = target.or_else(testing.stage(speed=1.0 if sim_speed is None else sim_speed))
-        return commissioning.run(only, where, file=report, list_only=list_only, yes=yes, as_json=as_json)
+        return commissioning.run(
+            only, where, file=report, overwrite=overwrite, list_only=list_only, yes=yes, as_json=as_json
+        )
     if report is not None:
         raise CommandRejected(
             "--report needs --commission", parameter="report", hint="use --junit for a report on scenarios"
         )
+    if junit is not None:
+        refuse_existing(junit, overwrite=overwrite, name="junit")
     chosen = testing.find(only)
     if noisy and target.or_else(None).text:
         raise CommandRejected(

@@ -27,6 +27,7 @@ from heptarm.testing.commissioning import (
     find_steps,
 )
 from heptarm.testing.stage import has_operator
+from heptarm.values.files import refuse_existing
 
 _TIMEOUT = 20.0
 _STYLES = {Agreement.AGREES: "green", Agreement.DIFFERS: "red", Agreement.SKIPPED: "yellow"}
@@ -37,6 +38,7 @@ def run(
     target: CommandTarget,
     *,
     file: Path | None,
+    overwrite: bool,
     list_only: bool,
     yes: bool,
     as_json: bool,
@@ -44,7 +46,7 @@ def run(
     """Run the steps, or list them; the exit code is 1 if one differs.
 
     Raises:
-        CommandRejected: there is no such step, or nobody can be asked on a real robot.
+        CommandRejected: there is no such step, the report exists, or nobody can be asked on a real robot.
         ModeConflict: the robot is not in T1.
     """
     chosen = find_steps(only)
@@ -64,6 +66,8 @@ def run(
     console = Console()
     with target.connect(watchdog=CHECK.default, timeout=_TIMEOUT) as arm:
         base = file or Path(_default_name(arm))
+        for suffix in ("md", "json"):
+            refuse_existing(_with(base, suffix), overwrite=overwrite, name="report")
 
         def ended(report: CommissioningReport) -> None:
             _write(base, report)

@@ -21,10 +21,12 @@ from heptarm.cli.options import (
     NO_TARGET,
     CommandTarget,
     Json,
+    Overwrite,
 )
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
 from heptarm.values.arrays import Array
+from heptarm.values.files import refuse_existing
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
@@ -75,6 +77,7 @@ def demo(
         Path | None,
         Parameter(help="Where to save the plot. Default: heptarm-demo.png, if Matplotlib is installed."),
     ] = None,
+    overwrite: Overwrite = False,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
@@ -89,6 +92,7 @@ def demo(
     logging.getLogger("heptarm").setLevel(logging.ERROR)
     if plot is not None:
         require("matplotlib", extra="viz")
+        refuse_existing(plot, overwrite=overwrite, name="plot")
     elif importlib.util.find_spec("matplotlib") is not None:
         plot = Path("heptarm-demo.png")
     began = time.monotonic()

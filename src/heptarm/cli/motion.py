@@ -12,13 +12,23 @@ from cyclopts import Parameter
 
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import in_base, items
-from heptarm.cli.options import NO_TARGET, Access, CommandTarget, FrameOfPose, Json, MoveOptions, Speed
+from heptarm.cli.options import (
+    NO_TARGET,
+    Access,
+    CommandTarget,
+    FrameOfPose,
+    Json,
+    MoveOptions,
+    Overwrite,
+    Speed,
+)
 from heptarm.cli.output import confirm, emit, state_data
 from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
-from heptarm.errors import CommandRejected, NotReady
+from heptarm.errors import NotReady
 from heptarm.record.recording import load
 from heptarm.values.arrays import within
+from heptarm.values.files import refuse_existing
 from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.hand_guiding import hand_guide
@@ -196,6 +206,7 @@ def teach(
     ] = "",
     seconds: Annotated[float, Parameter(help="Time limit [s].")] = 60.0,
     tolerance: Annotated[float, Parameter(help="Largest deviation of the reduced trajectory [rad].")] = 2e-3,
+    overwrite: Overwrite = False,
     access: Access = _ACCESS,
 ) -> int:
     """Record a trajectory while a person guides the arm by hand.
@@ -207,6 +218,7 @@ def teach(
         heptarm teach path.npz --free xy --seconds 20 --target lab1
     """
     limit = within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
+    refuse_existing(out.with_suffix(".npz"), overwrite=overwrite, name="out")
     mode = compliance(free, frame="base") if free else None
     with access.target.connect() as arm:
         asked = free and not (arm.is_virtual or access.yes)
@@ -221,7 +233,7 @@ def teach(
         with progress(arm, seconds=limit):
             whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.real_time_factor, 1.0) + 1.0)
     trajectory = whole.trimmed().thinned(tolerance=tolerance)
-    file = trajectory.save(out)
+    file = trajectory.save(out, overwrite=overwrite)
     if access.as_json:
         emit(
             {
@@ -239,7 +251,13 @@ def teach(
 
 
 def replay(
-    file: Annotated[Path, Parameter(help="File written by heptarm teach, or a recording, .mcap.")],
+    file: Annotated[
+        Path,
+        Parameter(
+            help="File written by heptarm teach, a recording, .mcap, or a table, .csv: seven columns of joint "
+            "positions [rad], perhaps after one of times [s]."
+        ),
+    ],
     /,
     *,
     arm_of: Annotated[str, Parameter(name="--arm", help="Which arm, in a recording of several.")] = "",
@@ -251,6 +269,9 @@ def replay(
         float,
         Parameter(help="By servo: factor on the recorded speed; by spline: fraction of the full speed."),
     ] = 0.5,
+    rate: Annotated[
+        float, Parameter(help="Rows per second of a table that has no column of times [Hz].")
+    ] = 100.0,
     access: Access = _ACCESS,
 ) -> int:
     """Move to the start of a recorded trajectory and replay it.
@@ -261,7 +282,7 @@ def replay(
 
         heptarm replay run.mcap --target sim://iiwa14
     """
-    trajectory = _trajectory(file, arm_of)
+    trajectory = _trajectory(file, arm_of, rate)
     with access.target.connect() as arm:
         if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
@@ -275,18 +296,15 @@ def replay(
     return 0
 
 
-def _trajectory(file: Path, arm: str) -> Trajectory:
-    """The trajectory of a file that was taught, or that of a recording without its rests.
+def _trajectory(file: Path, arm: str, rate: float) -> Trajectory:
+    """The trajectory of a file that was taught or of a table, or that of a recording without its rests.
 
     Raises:
         CommandRejected: it cannot be read, or is neither.
     """
     if file.suffix.lower() == ".mcap":
         return load(file, arm=arm).trajectory().trimmed().thinned()
-    try:
-        return Trajectory.load(file)
-    except OSError as error:
-        raise CommandRejected(f"{file}: {error.strerror}", parameter="file", value=str(file)) from error
+    return Trajectory.load(file, rate=rate)
 
 
 def recover(

@@ -19,15 +19,21 @@ COMMON = Group("Common options")
 FRI = Group("FRI")
 
 
-def _check_model(_: object, name: str) -> None:
-    """Refuse a robot that heptarm does not know, in the way that cyclopts reports."""
+def check_model(_: object, name: str | None) -> None:
+    """Refuse a robot that heptarm does not know, in the way that cyclopts reports; None: not given."""
     try:
-        robot(name)
+        if name is not None:
+            robot(name)
     except CommandRejected as error:
         raise ValueError(error.text) from None
 
 
-Model = Annotated[str, Parameter(validator=_check_model, help=f"Robot: {', '.join(ROBOTS)}.")]
+Model = Annotated[
+    str,
+    Parameter(
+        validator=check_model, help=f"Robot: {', '.join(ROBOTS)}; with a media flange, such as iiwa14+touch."
+    ),
+]
 KeyFile = Annotated[
     Path | None,
     Parameter(
@@ -35,6 +41,11 @@ KeyFile = Annotated[
         group=COMMON,
         help="File with the pre-shared key. Default: HEPTARM_KEY, then the key stored for the target (heptarm key).",
     ),
+]
+
+
+Overwrite = Annotated[
+    bool, Parameter(name="--overwrite", negative="", help="Replace a file that exists; otherwise it is kept.")
 ]
 
 
@@ -47,6 +58,7 @@ class CommandTarget:
         text: as in `heptarm.connect`; None: not given.
         key_file: file with the key; None: the key is looked up elsewhere.
         datagrams: send servo targets and receive states by UDP as far as it gets through.
+        flange: media flange of the robot; "": that of the target.
     """
 
     text: Annotated[
@@ -67,6 +79,14 @@ class CommandTarget:
             help="Servo targets and states go by UDP beside the TCP connection: for networks that lose packets.",
         ),
     ] = False
+    flange: Annotated[
+        str,
+        Parameter(
+            group=COMMON,
+            help="Media flange of the robot: plain, touch, or its height above a plain one [m]. Default: that of the "
+            "target, or plain.",
+        ),
+    ] = ""
 
     def or_else(self, default: str | None) -> CommandTarget:
         """Complete it: as given, else HEPTARM_TARGET, else this default."""
@@ -91,6 +111,7 @@ class CommandTarget:
             self.text,
             key_file=self.key_file,
             datagrams=self.datagrams,
+            flange=self.flange or None,
             control=control,
             state_rate=STATE_RATE if state_rate is None else state_rate,
             watchdog=CONNECTION.default if watchdog is None else watchdog,

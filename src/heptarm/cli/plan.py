@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, FrameOfPose, Json, Speed
+from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, FrameOfPose, Json, Overwrite, Speed
 from heptarm.cli.output import emit
 from heptarm.values.frames import BASE
 from heptarm.values.motion.line import lin, lin_rel
@@ -44,6 +44,7 @@ class PlanOptions:
     out: Annotated[
         Path | None, Parameter(name=["--out", "-o"], help="Write a figure: .png, .svg, .pdf or .html.")
     ] = None
+    overwrite: Overwrite = False
     show: Annotated[
         bool,
         Parameter(negative="", help="Show it in an open panel, otherwise as a figure in the web browser."),
@@ -134,7 +135,7 @@ def _plan(motion: Motion, options: PlanOptions) -> int:
     if options.out is not None:
         from heptarm.record import plot
 
-        written = {"file": str(plot.save(preview.plot(), options.out))}
+        written = {"file": str(plot.save(preview.plot(), options.out, overwrite=options.overwrite))}
     if options.show:
         preview.show()
     if options.as_json:

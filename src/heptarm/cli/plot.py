@@ -7,10 +7,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from heptarm.cli.options import Json
+from heptarm.cli.options import Json, Overwrite
 from heptarm.cli.output import emit
 from heptarm.record import plot as plots
 from heptarm.record.recording import load
+from heptarm.values.files import refuse_existing
 
 
 def plot(
@@ -29,15 +30,18 @@ def plot(
     ] = None,
     arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
     compare: Annotated[Path | None, Parameter(help="A second recording, drawn on the first one.")] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
     """Plot a recording: joints, speeds and torques by their limits, wrench, path; motions and events as bands."""
     names = tuple(name.strip() for name in signals.split(",") if name.strip())
+    target = file.with_suffix(".png") if out is None else out
+    refuse_existing(target, overwrite=overwrite, name="out")
     run = load(file, arm=arm)
     figure = (
         plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare, arm=arm), names)
     )
-    written = plots.save(figure, file.with_suffix(".png") if out is None else out)
+    written = plots.save(figure, target, overwrite=overwrite)
     if as_json:
         emit(
             {

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 from cyclopts import Parameter
 
 from heptarm.arm.fri.settings import PORTS
-from heptarm.cli.options import NO_TARGET, CommandTarget, FriListen, FriPort, FriVersion, Json
+from heptarm.cli.options import NO_TARGET, CommandTarget, FriListen, FriPort, FriVersion, Json, Overwrite
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop.client import Client
@@ -19,6 +19,7 @@ from heptarm.record.recorder import Recorder
 from heptarm.record.recording import load
 from heptarm.values.arrays import within
 from heptarm.values.camera import Camera
+from heptarm.values.files import refuse_existing
 from heptarm.values.state import GROUP_NAMES
 from heptarm.viewers.live import LiveView
 
@@ -68,6 +69,7 @@ def record(
     listen: FriListen = False,
     fri_port: FriPort = None,
     fri_version: FriVersion = None,
+    overwrite: Overwrite = False,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
@@ -95,11 +97,13 @@ def record(
                 parameter="camera",
                 hint="leave out --listen or the options of the camera",
             )
-        return _record_fri(out, limit, note, {"port": fri_port, "version": fri_version}, as_json=as_json)
+        settings = {"port": fri_port, "version": fri_version}
+        return _record_fri(out, limit, note, settings, overwrite=overwrite, as_json=as_json)
+    refuse_existing(out, overwrite=overwrite, name="out")
     with target.connect(control=False, state_rate=rate) as arm:
         offered = arm.connection.welcome.groups
         arm.subscribe(rate=rate, groups=[name for name in GROUP_NAMES if name.upper() in _names(offered)])
-        with arm.record(out, camera=lens) as recorder:
+        with arm.record(out, camera=lens, overwrite=overwrite) as recorder:
             if not as_json:
                 print(
                     f"recording {arm.robot.title} to {out}{'' if limit else '; Ctrl-C ends it'}", flush=True
@@ -149,11 +153,13 @@ def wait_until_over(recorder: Recorder | LiveView, limit: float | None, note: st
         pass
 
 
-def _record_fri(out: Path, limit: float | None, note: str, settings: dict[str, Any], *, as_json: bool) -> int:
+def _record_fri(
+    out: Path, limit: float | None, note: str, settings: dict[str, Any], *, overwrite: bool, as_json: bool
+) -> int:
     """Record the FRI messages of any application."""
     port = settings["port"]
     with Client(PORTS[0] if port is None else port, version=settings["version"]) as client:
-        with record_client(client, out) as recorder:
+        with record_client(client, out, overwrite=overwrite) as recorder:
             if not as_json:
                 ending = "" if limit else "; Ctrl-C ends it"
                 print(f"recording FRI on UDP port {client.port} to {out}{ending}", flush=True)
@@ -179,11 +185,12 @@ def convert(
     /,
     *,
     arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
     """Convert a recording to Parquet, CSV or NumPy, or its pictures to a folder of JPEG files."""
     run = load(file, arm=arm)
-    files = convert_recording(run, out)
+    files = convert_recording(run, out, overwrite=overwrite)
     count = len(run.pictures)
     if as_json:
         found = {"files": [str(one) for one in files], "states": len(run), "pictures": count}

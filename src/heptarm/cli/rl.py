@@ -15,6 +15,7 @@ from heptarm.cli.options import (
     CommandTarget,
     Json,
     Model,
+    Overwrite,
     Speed,
     Yes,
 )
@@ -24,6 +25,7 @@ from heptarm.rl import deploy as deployment
 from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.policy import Policy, shipped
 from heptarm.rl.report import EpisodeReport
+from heptarm.values.files import refuse_existing
 from heptarm.values.mode.impedance import JointImpedance
 
 if TYPE_CHECKING:
@@ -61,6 +63,7 @@ def train(
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
     engine: Engine = "mujoco",
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
     """Train a policy; under torchrun, several workers train one."""
@@ -98,6 +101,7 @@ def train(
         steps=steps if resume and steps else None,
         device=device,
         engine=_engine(engine),
+        overwrite=overwrite,
     )
     curve = trained.plot(out.with_suffix(".png"))
     report = {"policy": str(out), "curve": str(curve), "steps": trained.steps, "seconds": trained.seconds}
@@ -132,16 +136,18 @@ def evaluate(
     randomisation: Randomisation = "none",
     engine: Engine = "mujoco",
     out: Annotated[Path | None, Parameter(help="Write report, recording and plot under this name.")] = None,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
     """Evaluate a policy in simulation."""
     from heptarm.rl.evaluate import evaluate as work
     from heptarm.rl.sim.randomisation import level
 
+    _refuse_reports(out, overwrite=overwrite)
     report = work(
         _load(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
     )
-    return _report(report, out, film=False, as_json=as_json)
+    return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
 
 
 def deploy(
@@ -165,11 +171,13 @@ def deploy(
     film: Annotated[
         bool, Parameter(negative="", help="With --out: also a film of the first episodes.")
     ] = False,
+    overwrite: Overwrite = False,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
+    _refuse_reports(out, overwrite=overwrite)
     network = _load(policy)
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
@@ -186,7 +194,7 @@ def deploy(
                 print(f"{number + 1:4d} of {len(targets)}: {1e3 * distance:6.1f} mm", file=sys.stderr)
 
         report = deployment.deploy(arm, network, targets, settings=settings, progress=show)
-    return _report(report, out, film=film, as_json=as_json)
+    return _report(report, out, film=film, overwrite=overwrite, as_json=as_json)
 
 
 def _load(file: Path | None) -> Policy:
@@ -222,9 +230,16 @@ def _ask(arm: Any, network: Policy, settings: DeploySettings) -> int:
     return 0
 
 
-def _report(report: EpisodeReport, out: Path | None, *, film: bool, as_json: bool) -> int:
+def _refuse_reports(out: Path | None, *, overwrite: bool) -> None:
+    """Refuse, before anything runs, a name under which there is a report."""
     if out is not None:
-        files = [report.save(out.with_suffix(".npz")), report.save(out.with_suffix(".json"))]
+        for suffix in (".npz", ".json", ".png"):
+            refuse_existing(out.with_suffix(suffix), overwrite=overwrite, name="out")
+
+
+def _report(report: EpisodeReport, out: Path | None, *, film: bool, overwrite: bool, as_json: bool) -> int:
+    if out is not None:
+        files = [report.save(out.with_suffix(one), overwrite=overwrite) for one in (".npz", ".json")]
         files.append(report.plot(out.with_suffix(".png")))
         if film:
             from heptarm.rl.film import film as draw

@@ -21,12 +21,14 @@ from heptarm.cli.options import (
     FRI,
     Json,
     KeyFile,
-    Model,
+    check_model,
 )
 from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed, refuse_windows, require_extra
 from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
+from heptarm.values.files import read_text
+from heptarm.values.robot import ROBOTS, robot
 from heptarm.values.simulator_options import RealTime, SimulatorOptions
 
 _APP = Group("Your own application")
@@ -47,7 +49,20 @@ _NOT_HERE_HINT = (
 
 def sim(
     *,
-    model: Model = "iiwa14",
+    model: Annotated[
+        str | None,
+        Parameter(
+            validator=check_model,
+            help=f"Robot: {', '.join(ROBOTS)}. Default: that of the project's StationSetup.cat, or iiwa14.",
+        ),
+    ] = None,
+    flange: Annotated[
+        str,
+        Parameter(
+            help="Media flange: plain, touch, or its height above a plain one [m]. Default: that of the project's "
+            "StationSetup.cat, or plain."
+        ),
+    ] = "",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[
         int | None,
@@ -265,7 +280,8 @@ def sim(
         )
     simulator = partial(
         SimulatorOptions,
-        model=model,
+        model=model or "",
+        flange=flange,
         host=host,
         speed=speed,
         real_time=real_time,
@@ -346,7 +362,7 @@ def sim(
                 )
         options = fri_sim.FriControllerOptions(
             version=fri,
-            model=model,
+            model=robot(model or "iiwa14", flange=flange or None).name,
             command=fri_command,
             client=fri_client,
             period=fri_period,
@@ -488,14 +504,15 @@ def _fleet(options: SimulatorOptions, count: int, *, key_file: Path | None, as_j
             key = find_key(key_file=key_file, host=host, port=port)
             cabinets.append(stack.enter_context(_child(_command(replace(options, port=port)), key)))
         stack.callback(_close_all, cabinets)  # before the first of them is waited for
-        targets = []
+        targets, model = [], ""
         for number, (cabinet, port) in enumerate(zip(cabinets, ports, strict=True), 1):
             ready = _ready(cabinet, f"virtual cabinet {number} does not start on {host}:{port}")
             targets.append(f"sim://{host}:{ready['port']}")
+            model = str(ready["model"])
             if as_json:
                 emit(ready | {"cabinet": number, "target": targets[-1]})
         if not as_json:
-            print(f"{count} virtual {options.model} are ready; Ctrl-C ends them:")
+            print(f"{count} virtual {model} are ready; Ctrl-C ends them:")
             for number, target in enumerate(targets, 1):
                 print(f"{number:3}  {target}")
             sys.stdout.flush()
@@ -566,7 +583,7 @@ def _cabinet(
         ConnectFailed: the cabinet or the page does not start; the text gives the reason.
         CommandRejected: the key cannot be used.
     """
-    model, host, port = options.model, options.host, options.port
+    host, port = options.host, options.port
     key = find_key(key_file=key_file, host=host, port=port)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
@@ -580,7 +597,7 @@ def _cabinet(
         if as_json:
             emit(ready | {"target": target})
         else:
-            print(f"A virtual {model} is ready. Connect with {target}; Ctrl-C ends it.")
+            print(f"A virtual {ready['model']} is ready. Connect with {target}; Ctrl-C ends it.")
             if page.name:
                 print(f"{'See it' if page.name == 'view' else 'The panel is'} at {ready[page.name]}")
             if sys.stdin is not None and sys.stdin.isatty():
@@ -635,10 +652,7 @@ def _read_answers(file: Path | None) -> list[int]:
     if file is None:
         return []
     found = []
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise CommandRejected(f"--answers: {error}", parameter="answers") from None
+    text = read_text(file, name="answers")
     for number, line in enumerate(text.splitlines(), 1):
         said = line.partition("#")[0].strip()
         if said and not said.isdecimal():
@@ -701,6 +715,7 @@ def _application(
             background=application.background,
             classpath=(out, *map(str, application.jars)),
             project=data_file,
+            station=application.station if cabinet.project is None else None,
             data=data,
             map=addresses,
             answer=answers,
@@ -715,7 +730,7 @@ def _application(
                     raise ConnectFailed(f"the virtual cabinet does not start: {ready.get('error')}")
                 if not as_json:
                     print(
-                        f"{application.main} runs on a virtual {options.model}; Ctrl-C deselects it.",
+                        f"{application.main} runs on a virtual {ready['model']}; Ctrl-C deselects it.",
                         flush=True,
                     )
                     if sys.stdin is not None and sys.stdin.isatty():
@@ -859,9 +874,12 @@ def _first(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
     assert child.stdout is not None
     line = child.stdout.readline()
     try:
-        return dict(json.loads(line))
+        ready = dict(json.loads(line))
     except ValueError:
         raise ConnectFailed(f"{otherwise}: {line.strip() or 'see the message above'}") from None
+    for note in ready.pop("notes", ()):
+        print(f"heptarm: {note}", file=sys.stderr, flush=True)
+    return ready
 
 
 def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:

@@ -26,12 +26,14 @@ def show(*, as_json: Json = False) -> int:
         if as_json:
             emit(
                 {"name": one.name, "address": one.address, "key": _key(one), "tool": one.tool}
-                | {"speed": one.speed, "last_used": None if one.last_used is None else used}
+                | {"speed": one.speed, "flange": one.flange}
+                | {"last_used": None if one.last_used is None else used}
             )
             continue
         more = [f"key: {_key(one) or 'none'}"]
         more += [f"tool: {one.tool}"] if one.tool else []
-        more += [f"speed: {one.speed:g}"] if one.speed < 1.0 else []
+        more += [f"speed: {one.speed:g}"] if one.speed is not None else []
+        more += [f"flange: {one.flange}"] if one.flange else []
         print(f"{one.name:12} {one.address:24} {', '.join(more)}; last used: {used}")
     if not found and not as_json:
         print("no targets are saved; `heptarm targets add lab1 172.31.1.147` saves one")
@@ -57,7 +59,15 @@ def add(
         Parameter(name="--key-file", help="File with its key. Default: the key stored for its address."),
     ] = None,
     tool: Annotated[str, Parameter(help="Tool that is attached when a client takes control.")] = "",
-    speed: Annotated[float, Parameter(help="Ceiling of the speed of all motions, (0, 1].")] = 1.0,
+    speed: Annotated[
+        float | None,
+        Parameter(
+            help="Ceiling of the speed of all motions, (0, 1]. Default: 0.25 of a real robot, 1 of a simulator."
+        ),
+    ] = None,
+    flange: Annotated[
+        str, Parameter(help="Media flange of the robot: plain, touch, or its height above a plain one [m].")
+    ] = "",
     replace: Annotated[
         bool, Parameter(name="--replace", negative="", help="Replace the target of this name.")
     ] = False,
@@ -80,7 +90,7 @@ def add(
     if key_file is not None:
         read_key_file(key_file)
         place = str(key_file.expanduser().resolve())
-    add_target(SavedTarget(name, address, place, tool, speed), replace=replace)
+    add_target(SavedTarget(name, address, place, tool, speed, flange), replace=replace)
     emit({"name": name, "file": str(targets_file())}) if as_json else print(
         f"{name} is {address} from now on"
     )

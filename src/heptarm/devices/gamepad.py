@@ -11,13 +11,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
 from heptarm.devices.device import DEAD_ZONE, REST, DeviceInput, Roles, gone, without_dead_zone
 from heptarm.errors import CommandRejected, NotReady, refuse_windows, require
 from heptarm.values.arrays import instance, within
+from heptarm.values.sealed import Sealed
 
 # Codes of the kernel's interface, as in linux/input-event-codes.h.
 _SYNC, _KEY, _ABSOLUTE = 0x00, 0x01, 0x03
@@ -96,7 +97,7 @@ class AxisRange:
         return float(np.clip((value - self.low) / (self.high - self.low), 0.0, 1.0))
 
 
-class Gamepad:
+class Gamepad(Sealed):
     """A gamepad: the left stick moves forward and to the left, the right one up and about z, the cross about x and y.
 
     Args:
@@ -106,7 +107,8 @@ class Gamepad:
         dead_zone: deflections below this are none, 0 to 0.9.
     """
 
-    roles = Roles(dead_man="LB", gripper="A", quit="START")
+    name: Final[str]
+    roles: Roles = Roles(dead_man="LB", gripper="A", quit="START")
 
     def __init__(
         self,

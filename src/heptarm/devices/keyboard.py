@@ -18,6 +18,7 @@ from heptarm.devices.device import REST, DeviceInput, Roles, gone
 from heptarm.errors import NotReady, refuse_windows
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import within
+from heptarm.values.sealed import Sealed
 
 #: Axis and direction of each key.
 KEYS = {
@@ -42,7 +43,7 @@ HELP = "w s: x   a d: y   r f: z   j l: about x   i k: about y   u o: about z   
 HOLD = 0.2
 
 
-class Keyboard:
+class Keyboard(Sealed):
     """The keyboard of a terminal, which reports keys at once until it is closed.
 
     Args:
@@ -55,7 +56,7 @@ class Keyboard:
     """
 
     name = "keyboard"
-    roles = Roles(gripper="SPACE", quit="Q")
+    roles: Roles = Roles(gripper="SPACE", quit="Q")
 
     def __init__(
         self, terminal: int | None = None, *, hold: float = HOLD, clock: Clock | None = None

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from heptarm.devices.device import DEAD_ZONE, REST, DeviceInput, Roles, without_dead_zone
 from heptarm.errors import NotReady, require
 from heptarm.values.arrays import within
+from heptarm.values.sealed import Sealed
 
 #: Most reports that one reading handles: translation, rotation and buttons come as reports of their own.
 _MOST_REPORTS = 64
@@ -33,7 +34,7 @@ class Mouse(Protocol):
         """Release it."""
 
 
-class SpaceMouse:
+class SpaceMouse(Sealed):
     """A SpaceMouse: its cap moves the arm in all six directions while the left button is held.
 
     Args:
@@ -42,7 +43,7 @@ class SpaceMouse:
     """
 
     name = "SpaceMouse"
-    roles = Roles(dead_man="LEFT", gripper="RIGHT")
+    roles: Roles = Roles(dead_man="LEFT", gripper="RIGHT")
 
     def __init__(self, mouse: Mouse, *, dead_zone: float = DEAD_ZONE) -> None:
         self._mouse = mouse

@@ -7,20 +7,22 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TextIO
+from typing import Final, TextIO
 
 import numpy.typing as npt
 
 from heptarm.devices.device import REST, DeviceInput, InputDevice, Roles
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import CommandRejected
 from heptarm.io.clock import Clock, RealClock
-from heptarm.values.arrays import callback, finite, instance
+from heptarm.values.arrays import callback, finite, flag, instance
+from heptarm.values.files import path_of, read_text, refuse_existing, unreadable
+from heptarm.values.sealed import Sealed
 
 #: The first line of a file of inputs.
 _FORMAT = "heptarm input 1"
 
 
-class SyntheticDevice:
+class SyntheticDevice(Sealed):
     """A function of time as an input device; it rests when the function returns None.
 
     Args:
@@ -30,6 +32,7 @@ class SyntheticDevice:
     """
 
     name = "synthetic"
+    roles: Roles
 
     def __init__(
         self,
@@ -56,7 +59,7 @@ class SyntheticDevice:
         """Has no effect."""
 
 
-class RecordedDevice:
+class RecordedDevice(Sealed):
     """A recorded stream of inputs; it begins with the first reading, and rests after its end.
 
     Args:
@@ -69,6 +72,7 @@ class RecordedDevice:
     """
 
     name = "recording"
+    roles: Roles
 
     def __init__(
         self,
@@ -110,7 +114,7 @@ class RecordedDevice:
         """Has no effect."""
 
 
-class RecordingDevice:
+class RecordingDevice(Sealed):
     """Another device, whose inputs are written to a file while it is read.
 
     Args:
@@ -122,13 +126,16 @@ class RecordingDevice:
         CommandRejected: the file cannot be written.
     """
 
+    name: Final[str]
+    roles: Roles
+
     def __init__(self, device: InputDevice, path: str | Path, *, clock: Clock | None = None) -> None:
         self.name, self.roles = device.name, device.roles
         self._device = device
         self._clock = RealClock() if clock is None else clock
         self._began: int | None = None
         try:
-            self._file: TextIO | None = Path(path).open("w")  # noqa: SIM115 (closed by close)
+            self._file: TextIO | None = Path(path).open("w", encoding="utf-8")  # noqa: SIM115 (closed by close)
         except OSError as error:
             raise CommandRejected(
                 f"{path}: {error.strerror}", parameter="path", value=str(path), hint="choose another file"
@@ -181,17 +188,18 @@ def synthetic(
     return SyntheticDevice(function, roles=roles)
 
 
-def recording(device: InputDevice, path: str | Path) -> RecordingDevice:
+def recording(device: InputDevice, path: str | Path, *, overwrite: bool = False) -> RecordingDevice:
     """Write what a device reports to a file, while it is read as before; `recorded` replays it.
 
     Args:
         device: to read and record.
-        path: the file, a line of JSON for each reading; it is replaced.
+        path: the file, a line of JSON for each reading.
+        overwrite: replace a file that exists.
 
     Raises:
-        CommandRejected: the file cannot be written.
+        CommandRejected: the file exists or cannot be written.
     """
-    return RecordingDevice(device, instance(path, (str, Path), "path"))
+    return RecordingDevice(device, refuse_existing(path_of(path), overwrite=flag(overwrite, "overwrite")))
 
 
 def recorded(path: str | Path) -> RecordedDevice:
@@ -200,23 +208,21 @@ def recorded(path: str | Path) -> RecordedDevice:
     Raises:
         CommandRejected: the file cannot be read, or is no recording of inputs.
     """
-    file = Path(instance(path, (str, Path), "path"))
+    file = path_of(path)
+    lines, number, rows = read_text(file).splitlines(), 1, []
     try:
-        head, *lines = file.read_text().splitlines()
-        about = json.loads(head)
+        about = json.loads(lines[0] if lines else "")
         if about["format"] != _FORMAT:
             raise ValueError(f"its format is {about['format']}")
-        rows = [json.loads(line) for line in lines]
-        return RecordedDevice(
-            [(time, DeviceInput.of(twist, buttons)) for time, twist, buttons in rows],
-            roles=Roles(*about["roles"]),
-        )
-    except OSError as error:
-        raise CommandRejected(f"{file}: {error.strerror}", parameter="path", value=str(file)) from error
-    except (ValueError, KeyError, TypeError, HeptarmError) as error:
-        raise CommandRejected(
-            f"{file} is no recording of inputs: {error}",
-            parameter="path",
-            value=str(file),
+        for line in lines[1:]:
+            number += 1
+            time, twist, buttons = json.loads(line)
+            rows.append((time, DeviceInput.of(twist, buttons)))
+        return RecordedDevice(rows, roles=Roles(*about["roles"]))
+    except Exception as error:  # of any values in place of a reading's
+        raise unreadable(
+            file,
+            f"line {number}: {error or type(error).__name__}",
+            what="a recording of inputs",
             hint="heptarm.devices.recording writes one",
         ) from None

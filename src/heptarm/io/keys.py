@@ -18,6 +18,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote
 
 from heptarm.errors import CommandRejected
+from heptarm.values.files import open_regular, path_of
 
 #: Environment variable with a key.
 VARIABLE = "HEPTARM_KEY"
@@ -83,12 +84,12 @@ def read_key_file(file: Path) -> str:
         CommandRejected: the file cannot be read, other users may read it, or its content is no usable key.
     """
     try:
-        with file.open("rb") as opened:
+        with open_regular(file, name="key_file") as opened:
             mode = stat.S_IMODE(os.fstat(opened.fileno()).st_mode)
             content = opened.read(_MAX_FILE + 1)
-    except OSError as error:
+    except CommandRejected as error:
         raise CommandRejected(
-            f"the key file {file} cannot be read: {(error.strerror or str(error)).lower()}",
+            f"the key file {error.text}",
             parameter="key_file",
             value=str(file),
             hint="name a file with the key as its only line, or store the key with `heptarm key set --target ADDRESS`",
@@ -230,10 +231,12 @@ def find_key(
     if key is not None:
         return check_key(key, "the argument `key`") if key else None
     if key_file is not None:
-        return read_key_file(Path(key_file).expanduser())
+        return read_key_file(path_of(key_file, "key_file").expanduser())
     if value := os.environ.get(VARIABLE, ""):
         return check_key(value.strip(), f"the environment variable {VARIABLE}")
-    if host and (stored := stored_key(host, port)).file.exists():
+    if host and os.path.exists(
+        (stored := stored_key(host, port)).file
+    ):  # False, too, for names that no file can have
         return read_key_file(stored.file)
     return None
 

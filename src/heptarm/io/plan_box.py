@@ -15,7 +15,6 @@ import shutil
 import stat
 import tempfile
 import time
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -164,7 +163,9 @@ def _read(file: Path) -> PlanOutline | None:
                 str(found["robot"]),
                 *(np.asarray(found[name], float) for name in ("t", "q", "path", "touches")),
             )
-    except (KeyError, ValueError, EOFError, zipfile.BadZipFile):
+    except Exception:  # of any bytes in place of a plan
+        return None
+    if plan.t.ndim != 1:
         return None
     count = len(plan.t)
     shapes = plan.t.shape == (count,) and plan.q.shape == (count, 7) and plan.path.shape == (count, 3)

@@ -6,7 +6,8 @@ The file is heptarm/targets.toml in the folder of the user's settings, one table
     address = "172.31.1.147"
     key_file = "~/keys/lab1"     # otherwise the key is looked up as for any address
     tool = "gripper"             # attached when a client takes control
-    speed = 0.3                  # ceiling of the speed
+    speed = 0.3                  # ceiling of the speed; otherwise 0.25 of a real robot, 1 of a simulator
+    flange = "touch"             # media flange of the robot
 
 When a target was last used is the time of a file of its name in the folder beside it.
 """
@@ -15,7 +16,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import re
 from dataclasses import dataclass
@@ -24,6 +24,9 @@ from typing import Any
 
 from heptarm.errors import CommandRejected
 from heptarm.io.keys import settings_folder
+from heptarm.values.arrays import shown
+from heptarm.values.files import read_text
+from heptarm.values.robot import flange
 
 try:
     import tomllib
@@ -32,9 +35,11 @@ except ModuleNotFoundError:  # Python 3.10
 
 #: Names of targets: no name of a host that has a dot, and no address.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+#: Longest name of a target [characters].
+_LONGEST_NAME = 64
 #: Names that mean something else.
 _TAKEN = ("localhost", "sim")
-_KEYS = ("address", "key_file", "tool", "speed")
+_KEYS = ("address", "key_file", "tool", "speed", "flange")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +51,16 @@ class SavedTarget:
         address: what to connect to, as in `heptarm.connect`.
         key_file: file with the key; "": the key is looked up elsewhere.
         tool: attached when a client takes control; "": none.
-        speed: ceiling of the speed of all motions, (0, 1].
+        speed: ceiling of the speed of all motions, (0, 1]; None: 0.25 of a real robot, 1 of a simulator.
+        flange: media flange of the robot: "plain", "touch", or its height [m]; "": not stated.
     """
 
     name: str
     address: str
     key_file: str = ""
     tool: str = ""
-    speed: float = 1.0
+    speed: float | None = None
+    flange: str = ""
 
     @property
     def last_used(self) -> float | None:
@@ -87,10 +94,12 @@ def saved_targets() -> dict[str, SavedTarget]:
     """
     file = targets_file()
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError) as error:
+        tables = tomllib.loads(_content())
+    except CommandRejected as error:
+        raise CommandRejected(
+            f"the file of saved targets {error.text}", parameter="target", hint=error.hint
+        ) from None
+    except (ValueError, RecursionError) as error:
         raise CommandRejected(
             f"the file of saved targets {file} cannot be read: {error}",
             parameter="target",
@@ -120,7 +129,10 @@ def _read(name: str, table: Any) -> SavedTarget:
             allowed=", ".join(_KEYS),
             hint=f"it may have {', '.join(_KEYS)}",
         )
-    return check_target(SavedTarget(name, **{key: table[key] for key in _KEYS if key in table}), where)
+    values = {key: table[key] for key in _KEYS if key in table}
+    if isinstance(values.get("flange"), float):  # a height may be a number
+        values["flange"] = f"{values['flange']:g}"
+    return check_target(SavedTarget(name, **values), where)
 
 
 def check_target(target: SavedTarget, where: str) -> SavedTarget:
@@ -134,17 +146,24 @@ def check_target(target: SavedTarget, where: str) -> SavedTarget:
         CommandRejected: its name or a value is not allowed.
     """
     name, speed = target.name, target.speed
-    if not _NAME.fullmatch(name) or name in _TAKEN:
+    if not _NAME.fullmatch(name) or name in _TAKEN or len(name) > _LONGEST_NAME:
         raise CommandRejected(
-            f"the name of a target must begin with a letter and have letters, digits, - and _ only, got {name!r}",
+            f"the name of a target must begin with a letter and have up to {_LONGEST_NAME} letters, digits, - and _, "
+            f"got {shown(name)}",
             parameter="name",
             value=name,
             hint=f"also {' and '.join(_TAKEN)} mean something else; choose a name such as lab1",
         )
-    for key in ("address", "key_file", "tool"):
+    for key in ("address", "key_file", "tool", "flange"):
         if not isinstance(getattr(target, key), str):
             raise CommandRejected(f"{where}: {key} must be a text", parameter=key)
-    if isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0:
+        if "\0" in getattr(target, key):
+            raise CommandRejected(
+                f"{where}: {key} must have no NUL, got {shown(getattr(target, key))}", parameter=key
+            )
+    if speed is not None and (
+        isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0
+    ):
         raise CommandRejected(
             f"{where}: speed must be in (0, 1], got {speed!r}",
             parameter="speed",
@@ -152,6 +171,13 @@ def check_target(target: SavedTarget, where: str) -> SavedTarget:
             allowed="(0, 1]",
             hint="it is a fraction of the full speed",
         )
+    if target.flange:
+        try:
+            flange(target.flange)
+        except CommandRejected as error:
+            raise CommandRejected(
+                f"{where}: {error.text}", parameter="flange", value=target.flange, hint=error.hint
+            ) from None
     return target
 
 
@@ -170,9 +196,11 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
         remove_target(target.name)
     lines = [f"[{target.name}]", f"address = {_text(target.address)}"]
     lines += [
-        f"{key} = {_text(getattr(target, key))}" for key in ("key_file", "tool") if getattr(target, key)
+        f"{key} = {_text(getattr(target, key))}"
+        for key in ("key_file", "tool", "flange")
+        if getattr(target, key)
     ]
-    if not math.isclose(target.speed, 1.0):
+    if target.speed is not None:
         lines.append(f"speed = {float(target.speed)!r}")
     before = _content().rstrip("\n")
     _write((f"{before}\n\n" if before else "") + "\n".join(lines) + "\n")
@@ -209,10 +237,13 @@ def _text(value: str) -> str:
 
 
 def _content() -> str:
-    try:
-        return targets_file().read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return ""
+    """The text of the file; empty: there is none.
+
+    Raises:
+        CommandRejected: it cannot be read.
+    """
+    file = targets_file()
+    return read_text(file, name="target") if os.path.lexists(file) else ""
 
 
 def _write(text: str) -> None:

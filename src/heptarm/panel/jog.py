@@ -18,7 +18,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
 from heptarm.values.arrays import Array, Value, array
 from heptarm.values.frames import BASE
-from heptarm.values.pose import Pose, multiply
+from heptarm.values.pose import Pose
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
@@ -263,10 +263,9 @@ def _axes(jog: Jog) -> str | None:
 def towards(jog: PoseJog, pose: Pose, age: float) -> Array:
     """The twist, base axes, with which a pose of an age [s] goes to that of a movement and stops there, shape (6,)."""
     gain = min(_GAIN, _GAIN_TIMES_AGE / max(age, 1e-3))
-    away = jog.pose.xyz - pose.xyz
-    around = Pose(np.zeros(3), multiply(jog.pose.quat, pose.quat * np.array([-1.0, -1.0, -1.0, 1.0]))).rotvec
+    left = pose.displacement(jog.pose)
     return np.concatenate(
-        [_slowed(away, jog.speed * LINE_SPEED, gain), _slowed(around, jog.speed * TURN_SPEED, gain)]
+        [_slowed(left[:3], jog.speed * LINE_SPEED, gain), _slowed(left[3:], jog.speed * TURN_SPEED, gain)]
     )
 
 

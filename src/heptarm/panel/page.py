@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import HeptarmError
 from heptarm.panel import texts
 from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
@@ -376,7 +376,7 @@ class ArmPage:
             )
         )
         load = gui.add_upload_button("Load", color="gray", mime_type="application/json")
-        load.on_upload(lambda event: self._do(lambda: self._load(event.target.value.content)))
+        load.on_upload(lambda event: self._do(lambda: self.model.points.load(event.target.value.content)))
 
     def _teach(self) -> None:
         point = self.model.teach(self._name.value)
@@ -415,12 +415,6 @@ class ArmPage:
         self._run_chosen()
         names, chosen = self.model.points.names, self._chosen.value
         self._chosen.value = names[(self.model.points.index(chosen) + 1) % len(names)]
-
-    def _load(self, content: bytes) -> None:
-        try:
-            self.model.points.load(content.decode("utf-8-sig"))
-        except UnicodeDecodeError as error:
-            raise CommandRejected(f"this file has no taught points: {error}", parameter="file") from None
 
     # ----------------------------------------------------------------------------- signals, tools
 

@@ -14,7 +14,7 @@ from heptarm.values.motion.line import lin
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import RobotModel, known_robot
 
 #: What the file begins with, and its version.
 _KIND, _VERSION = "heptarm points", 1
@@ -166,27 +166,31 @@ class PointList:
         content = {"kind": _KIND, "version": _VERSION, "robot": self._robot.name, "points": points}
         return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
-    def load(self, text: str) -> None:
+    def load(self, content: str | bytes) -> None:
         """Take the points of a file in place of those of the list; after an error the list is as before.
 
         Raises:
             CommandRejected: it is no such file, is of another robot, or a point is outside the joint limits.
         """
-        found = PointList(self._robot)
+        found, where = PointList(self._robot), ""
         try:
-            content = json.loads(text)
-            if not isinstance(content, dict) or content.get("kind") != _KIND:
-                raise _unreadable(f'its "kind" is not "{_KIND}"')
-            if content.get("version") != _VERSION:
-                raise _unreadable(f"its version is {content.get('version')!r}, known is {_VERSION}")
-            if content.get("robot") != self._robot.name:
-                raise _unreadable(f"its robot is {content.get('robot')!r}, this one is {self._robot.name!r}")
-            for one in content["points"]:
+            file = json.loads(content if isinstance(content, str) else content.decode("utf-8-sig"))
+            if not isinstance(file, dict) or file.get("kind") != _KIND:
+                raise ValueError(f'its "kind" is not "{_KIND}"')
+            if file.get("version") != _VERSION:
+                raise ValueError(f"its version is {shown(file.get('version'))}, known is {_VERSION}")
+            robot = known_robot(file.get("robot", ""))  # what is mounted on it moves no joint
+            if robot is None or robot.base_name != self._robot.base_name:
+                raise ValueError(f"its robot is {shown(file.get('robot'))}, this one is {self._robot.name!r}")
+            for number, one in enumerate(file["points"], 1):
+                where = f"point {number}: "
                 found.add(_point(one))
-        except HeptarmError:
+        except HeptarmError as error:
+            error.text = f"{where}{error.text}"
             raise
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
-            raise _unreadable(str(error) or type(error).__name__) from None
+        except Exception as error:  # of any values in place of a point's
+            why = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+            raise _unreadable(f"{where}{why}") from None
         self._points = tuple(found)
 
     def motions(self, names: Sequence[str]) -> list[Motion]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from math import inf, sqrt
+from math import inf, sqrt, tau
 
 import numpy as np
 
@@ -154,20 +155,44 @@ class PathSamples:
     rotations: list[Array]
 
 
+def check_limits(robot: RobotModel, q: Array, where: str = "") -> None:
+    """Refuse joint positions that the robot cannot have; `where` goes into the error's text."""
+    outside = [i for i in range(7) if not robot.q_min[i] - 1e-9 <= q[i] <= robot.q_max[i] + 1e-9]
+    if outside:
+        axes = " ".join(f"A{i + 1}" for i in outside)
+        values = ", ".join(
+            f"A{i + 1} = {value:.2f} deg of [{low:.0f}, {high:.0f}]"
+            for i in outside
+            for value, low, high in [np.degrees([q[i], robot.q_min[i], robot.q_max[i]])]
+        )
+        raise PlanError(
+            "joint_limit", f"Can not plan motion: Command Position violates limit {axes}{where} ({values})"
+        )
+
+
 def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> PathSamples:
     """Follow a path once from joint positions of shape (7,) [rad].
 
     Raises:
-        PlanError: it leaves the workspace, or passes a singularity.
+        PlanError: it leaves the workspace or the joint limits, or passes a singularity: what comes first on the way.
     """
     result, near = PathSamples([], [], []), start
+    # an axis that is outside, after its drive has tripped, may come back
+    lowest, highest = np.minimum(robot.q_min, start) - 1e-9, np.maximum(robot.q_max, start) + 1e-9
+
+    def check(joints: Array) -> None:
+        outside = ((joints < lowest) | (joints > highest)).any(axis=1)
+        if outside.any():
+            check_limits(robot, joints[int(outside.argmax())], " on the path")
+
     for segment, span in zip(path.segments, pairwise(path.marks), strict=True):
         fractions = np.linspace(0.0, 1.0, segment.samples)
         line = segment.path.line
         if line is not None:
             joints = line[0] + fractions[:, None] * line[1]
         else:
-            joints = _followed(segment.path, near, fractions, span)
+            joints = _followed(segment.path, near, fractions, span, check)
+        check(joints)
         near = joints[-1]
         frames = forward_batch(robot, joints)
         result.q.append(joints)
@@ -176,7 +201,13 @@ def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> P
     return result
 
 
-def _followed(path: JointPath, near: Array, fractions: Array, span: tuple[float, float]) -> Array:
+def _followed(
+    path: JointPath,
+    near: Array,
+    fractions: Array,
+    span: tuple[float, float],
+    check: Callable[[Array], None],
+) -> Array:
     """Joint positions at fractions of a segment, each next to the one before, shape (n, 7) [rad].
 
     Args:
@@ -184,6 +215,7 @@ def _followed(path: JointPath, near: Array, fractions: Array, span: tuple[float,
         near: joint positions at its start, shape (7,) [rad].
         fractions: of it, shape (n,).
         span: s at which it begins and ends.
+        check: refuses joint positions outside the limits, shape (n, 7).
 
     Raises:
         PlanError: see `sample`.
@@ -194,12 +226,16 @@ def _followed(path: JointPath, near: Array, fractions: Array, span: tuple[float,
         try:
             joints[index] = path.at(fraction, near)
         except Unreachable as error:
+            check(joints[:index])
             raise PlanError(
                 "unreachable",
                 f"Can not plan motion: the path is not reachable at {percent:.0f} %: {error.text}",
             ) from None
+        # a joint that passes half a turn goes on: its limit is the reason why the path cannot be followed, not a jump
+        joints[index] -= tau * np.round((joints[index] - near) / tau)
         step = np.abs(joints[index] - near)
         if step.max() > LARGEST_STEP:
+            check(joints[:index])
             raise PlanError(
                 "planning",
                 f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {percent:.0f} % of the path "

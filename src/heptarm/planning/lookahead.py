@@ -191,7 +191,9 @@ def _planned(
     try:
         parts = tuple(_order(robot, motions[index], frames) for index in which)
     except CommandRejected as error:
-        raise _named(error, which, motions) from None
+        if place := _place(which, motions):
+            error.parameter = ""  # it is the whole motion
+        raise error.inside(place) from None
     order = parts[0]
     if len(parts) > 1:
         order = Order(0, "batch", tcp=parts[0].tcp, parts=parts)
@@ -199,17 +201,16 @@ def _planned(
         return plan(robot, order, start)
     except PlanError as error:
         kind = _ERRORS.get(error.kind, CommandRejected)
-        raise _named(kind(str(error), parameter="motion", hint=_REMEDIES[kind]), which, motions) from None
+        place = _place(which, motions)
+        parameter = "" if place else "motion"
+        raise kind(str(error), parameter=parameter, hint=_REMEDIES[kind]).inside(place) from None
 
 
-def _named(error: CommandRejected, which: range, motions: Sequence[Motion]) -> CommandRejected:
-    """The same error, naming the motion of a program of several."""
-    if len(motions) > 1:
-        name = f"motions[{which[0]}]" if len(which) == 1 else f"motions[{which[0]}:{which[-1] + 1}]"
-        error.text = f"{name}: {error.text}"
-        error.args = (error.text,)
-        error.parameter = name
-    return error
+def _place(which: range, motions: Sequence[Motion]) -> str:
+    """The motions of a program of several; "": it has only one."""
+    if len(motions) == 1:
+        return ""
+    return f"motions[{which[0]}]" if len(which) == 1 else f"motions[{which[0]}:{which[-1] + 1}]"
 
 
 def _order(robot: RobotModel, motion: Motion, frames: FramesOfArm) -> Order:

@@ -13,7 +13,6 @@ from heptarm.planning.command import Order
 from heptarm.planning.composite_path import CompositePath, constraints, sample
 from heptarm.planning.path import JointPath, PathLengths
 from heptarm.planning.table import MotionTable
-from heptarm.planning.targets import check_limits
 from heptarm.planning.time_scaling import PathTiming
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -96,12 +95,6 @@ def timed(
         PlanError: the path leaves the workspace or the joint limits, or passes a singularity.
     """
     samples = sample(robot, path, start, Pose.of(order.tcp[:3], order.tcp[3:]))
-    # an axis that is outside, after its drive has tripped, may come back
-    lowest, highest = np.minimum(robot.q_min, start) - 1e-9, np.maximum(robot.q_max, start) + 1e-9
-    for q in samples.q:
-        outside = (q < lowest) | (q > highest)
-        if outside.any():
-            check_limits(robot, q[int(outside.any(axis=1).argmax())], " on the path")
     edges = [0, *(index + 1 for index in rests)]
     sections = tuple(constraints(robot, path, samples, a, b) for a, b in pairwise(edges))
     timing = PathTiming(tuple(path.marks[edge] for edge in edges[1:]), sections)

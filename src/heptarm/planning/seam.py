@@ -531,7 +531,7 @@ class CartesianImpedance:
     #: NaN: off [N, Nm]
     max_force: tuple[float, ...] = (nan,) * 6
     max_force_stops: bool = False
-    #: exceeding it stops; NaN: off [m/s, rad/s]
+    #: exceeding it stops; NaN: off, but 0.3125 m/s and 1.25 rad/s in a direction of less than 10 N/m or 0.5 Nm/rad, which a hand can guide [m/s, rad/s]
     max_velocity: tuple[float, ...] = (nan,) * 6
     #: exceeding it stops; NaN: off [m, rad]
     max_deviation: tuple[float, ...] = (nan,) * 6
@@ -1184,9 +1184,9 @@ class HandGuiding:
     q_min: tuple[float, ...] = (nan,) * 7
     #: NaN: the axis' own limit [rad]
     q_max: tuple[float, ...] = (nan,) * 7
-    #: NaN: unlimited [rad/s]
+    #: NaN: half of each axis' maximum [rad/s]
     joint_velocity: float = nan
-    #: Of the motion frame; NaN: unlimited [m/s]
+    #: Of the motion frame; NaN: 0.25 m/s [m/s]
     cartesian_velocity: float = nan
     at_limit: AtLimit = AtLimit.AXIS
     outside: OutsideLimit = OutsideLimit.FREE

@@ -13,10 +13,10 @@ from typing import NoReturn
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model import inverse_kinematics
+from heptarm.model.inverse_kinematics import PathInverse, solve
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import Order, PlanError
-from heptarm.planning.composite_path import SegmentLimits
+from heptarm.planning.composite_path import SegmentLimits, check_limits
 from heptarm.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
 from heptarm.planning.path import CartesianPath
 from heptarm.values.arrays import Array
@@ -74,7 +74,7 @@ def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
         assert order.pose is not None
         e1, status, _ = order.redundancy
         try:
-            target = inverse_kinematics.solve(
+            target = solve(
                 robot,
                 _pose(order.pose) @ _pose(order.tcp).inverse(),
                 e1=None if isnan(e1) else e1,
@@ -87,21 +87,6 @@ def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
             ) from None
     check_limits(robot, target)
     return target
-
-
-def check_limits(robot: RobotModel, q: Array, where: str = "") -> None:
-    """Refuse joint positions that the robot cannot have; `where` goes into the error's text."""
-    outside = [i for i in range(7) if not robot.q_min[i] - 1e-9 <= q[i] <= robot.q_max[i] + 1e-9]
-    if outside:
-        axes = " ".join(f"A{i + 1}" for i in outside)
-        values = ", ".join(
-            f"A{i + 1} = {value:.2f} deg of [{low:.0f}, {high:.0f}]"
-            for i in outside
-            for value, low, high in [np.degrees([q[i], robot.q_min[i], robot.q_max[i]])]
-        )
-        raise PlanError(
-            "joint_limit", f"Can not plan motion: Command Position violates limit {axes}{where} ({values})"
-        )
 
 
 def _target(order: Order, origin: Pose) -> Pose:
@@ -147,15 +132,12 @@ def _joint_orientation(robot: RobotModel, order: Order, start: Array, target: Po
     """The orientation as a PTP to the target would turn it."""
     tcp = _pose(order.tcp)
     e1, _, _ = order.redundancy
-    own = inverse_kinematics.redundancy(robot, start.tolist())
-    r, p = inverse_kinematics.rows(target @ tcp.inverse())
+    place = target @ tcp.inverse()
     try:
-        end = inverse_kinematics.raw(
-            robot, r, p, own.e1 if isnan(e1) else e1, own.status, start.tolist(), continuous=True
-        )
+        end = PathInverse(robot, Pose()).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
-    return JointOrientation(robot, start, np.array(end), tcp.quat)
+    return JointOrientation(robot, start, end, tcp.quat)
 
 
 def cartesian_path(robot: RobotModel, order: Order, start: Array) -> CartesianPath:

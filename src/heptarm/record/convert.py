@@ -9,24 +9,31 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recording import FRI, Recording
+from heptarm.values.arrays import flag
+from heptarm.values.files import path_of, refuse_existing
 
 
-def convert(recording: Recording, out: str | Path) -> list[Path]:
+def convert(recording: Recording, out: str | Path, *, overwrite: bool = False) -> list[Path]:
     """Write the signals of a recording to a file; its suffix chooses the format: .parquet, .csv or .npz.
 
     A table has a column per number; FRI cycles, which have times of their own, go to a second file beside it. A .npz
     has all arrays by name. None of them has the pictures of a camera; a path without a suffix is a folder for these.
 
+    Args:
+        recording: to convert.
+        out: the file.
+        overwrite: replace files that exist.
+
     Returns:
         The files.
 
     Raises:
-        CommandRejected: another suffix, the file cannot be written, or there are no pictures for a folder.
+        CommandRejected: another suffix, the file exists or cannot be written, or there are no pictures for a folder.
         MissingExtra: pandas or pyarrow is not installed.
     """
-    path = Path(out)
+    path = path_of(out, "out")
     if not path.suffix:
-        return _pictures(recording, path)
+        return _pictures(recording, path, overwrite=overwrite)
     write = _WRITERS.get(path.suffix.lower())
     if write is None:
         allowed = ", ".join(_WRITERS)
@@ -37,6 +44,8 @@ def convert(recording: Recording, out: str | Path) -> list[Path]:
             allowed=allowed,
             hint="a folder for the pictures of a camera has none",
         )
+    for _, one in _tables(recording, path):
+        refuse_existing(one, overwrite=flag(overwrite, "overwrite"), name="out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         return write(recording, path)
@@ -46,7 +55,7 @@ def convert(recording: Recording, out: str | Path) -> list[Path]:
         ) from error
 
 
-def _pictures(recording: Recording, folder: Path) -> list[Path]:
+def _pictures(recording: Recording, folder: Path, *, overwrite: bool) -> list[Path]:
     if not len(recording.pictures):
         allowed = ", ".join(_WRITERS)
         raise CommandRejected(
@@ -55,7 +64,7 @@ def _pictures(recording: Recording, folder: Path) -> list[Path]:
             value=str(folder),
             allowed=allowed,
         )
-    return recording.pictures.save(folder)
+    return recording.pictures.save(folder, overwrite=overwrite)
 
 
 def _npz(recording: Recording, path: Path) -> list[Path]:

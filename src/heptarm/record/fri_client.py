@@ -13,6 +13,7 @@ from heptarm.record.journal import FRI, Journal
 from heptarm.record.recorder import Recorder
 from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.arrays import instance
+from heptarm.values.files import path_of
 
 
 class ClientSource:
@@ -90,7 +91,7 @@ class ClientSource:
         return []
 
 
-def record_client(client: Client, path: str | Path) -> Recorder:
+def record_client(client: Client, path: str | Path, *, overwrite: bool = False) -> Recorder:
     """A recording of an FRI client while the `with` block runs: every message, every answer, and events.
 
     The cycles are signals such as "fri.q" and "fri.q_sent", at up to 1 kHz. Sessions of `arm.fri` are in the recording
@@ -98,11 +99,12 @@ def record_client(client: Client, path: str | Path) -> Recorder:
 
     Args:
         client: open during the block.
-        path: the file, MCAP; it is replaced.
+        path: the file, MCAP.
+        overwrite: replace a file that exists.
 
     Raises:
-        CommandRejected: the file cannot be written (when the block begins).
+        CommandRejected: the file exists; or it cannot be written (when the block begins).
         MissingExtra: the package mcap is not installed (when the block begins).
     """
     source = ClientSource(instance(client, Client, "client"))
-    return Recorder({"": source}, Path(instance(path, (str, Path), "path")))
+    return Recorder({"": source}, path_of(path), overwrite=overwrite)

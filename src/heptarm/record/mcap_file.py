@@ -44,7 +44,7 @@ from heptarm.record.layout import (
 )
 from heptarm.record.samples import RestWatch, StateSample, state_rows
 from heptarm.values.camera import Camera
-from heptarm.values.robot import ROBOTS, robot
+from heptarm.values.robot import known_robot
 from heptarm.wire import messages as wire
 
 #: Name of the metadata at the beginning of a file, and of those at its end.
@@ -75,7 +75,7 @@ class RecordingFile:
     """Writer of a recording; not to be used by several threads at once.
 
     Args:
-        path: the file; it is replaced.
+        path: the file; one that exists is replaced, see `Recorder`.
         facts: texts about robot and connection, by name.
         epoch: nanoseconds since 1970 at our clock's zero.
         chunk: size of a chunk [bytes]: what is lost if the process ends at any time.
@@ -256,7 +256,7 @@ class _LinkFrames:
     """Frames of an arm's links, each in the one before, as in the URDF of `heptarm_description`.
 
     Args:
-        model: of the arm, such as "iiwa14"; an unknown one has no links.
+        model: of the arm, such as "iiwa14" or "iiwa14+touch"; an unknown one has no links.
         prefix: before all names.
     """
 
@@ -264,8 +264,8 @@ class _LinkFrames:
         self.base = f"{prefix}base"
         names = [self.base, *(f"{prefix}link_{index}" for index in range(8)), f"{prefix}flange"]
         self._heads: list[bytes] = []
-        if model in ROBOTS:
-            links = robot(model).links
+        if (arm := known_robot(model)) is not None:
+            links = arm.links
             places = [np.zeros(3), *links.origin, links.flange]
             self._heads = [
                 transform_head(parent, child, place.tolist())

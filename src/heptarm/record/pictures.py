@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.values.arrays import Array, finite, frozen, instance, integer, scalar
+from heptarm.values.arrays import Array, finite, flag, frozen, integer, scalar
+from heptarm.values.files import path_of, refuse_existing
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +84,20 @@ class Pictures:
         files = tuple(file for file, is_in in zip(self.files, inside.tolist(), strict=True) if is_in)
         return Pictures(self.t[inside], files, self.dropped)
 
-    def save(self, folder: str | Path) -> list[Path]:
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
         """Write each to a file named after its number and its time, such as "00012-3.400s.jpg"; returns the files.
 
         Args:
             folder: is made if it is not there.
+            overwrite: replace files of these names that exist.
 
         Raises:
-            CommandRejected: it cannot be written.
+            CommandRejected: one of the files exists, or cannot be written.
         """
-        where = Path(instance(folder, (str, Path), "folder"))
+        where = path_of(folder, "folder")
         files = [where / f"{i:05d}-{t:.3f}s.jpg" for i, t in enumerate(self.t.tolist())]
+        for path in files:
+            refuse_existing(path, overwrite=flag(overwrite, "overwrite"), name="folder")
         try:
             where.mkdir(parents=True, exist_ok=True)
             for path, data in zip(files, self.files, strict=True):

@@ -16,6 +16,8 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recording import FRI, Recording
 from heptarm.record.samples import labels
+from heptarm.values.arrays import flag
+from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.robot import RobotModel
 
 if TYPE_CHECKING:
@@ -113,13 +115,18 @@ def compare(first: Recording, second: Recording, signals: Sequence[str] = ()) ->
     return figure
 
 
-def save(figure: Figure, out: str | Path) -> Path:
+def save(figure: Figure, out: str | Path, *, overwrite: bool = False) -> Path:
     """Write a figure: .png, .svg, .pdf, or .html, a page with the figure in it.
 
+    Args:
+        figure: to write.
+        out: the file; its suffix chooses the format.
+        overwrite: replace a file that exists.
+
     Raises:
-        CommandRejected: another suffix, or the file cannot be written.
+        CommandRejected: another suffix, or the file exists or cannot be written.
     """
-    path = Path(out)
+    path = path_of(out, "out")
     suffix = path.suffix.lower()
     if suffix not in (".png", ".svg", ".pdf", ".html"):
         raise CommandRejected(
@@ -128,6 +135,7 @@ def save(figure: Figure, out: str | Path) -> Path:
             value=str(out),
             allowed=".png, .svg, .pdf, .html",
         )
+    refuse_existing(path, overwrite=flag(overwrite, "overwrite"), name="out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if suffix == ".html":

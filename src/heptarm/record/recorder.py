@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,9 @@ from heptarm.record.journal import NOTE, Journal, JournalEntry, Record
 from heptarm.record.layout import STATE
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.samples import SampleQueue, StateSample, state_rows
-from heptarm.values.arrays import instance, within
+from heptarm.values.arrays import flag, instance, within
+from heptarm.values.files import refuse_existing
+from heptarm.values.sealed import Sealed
 
 _log = logging.getLogger("heptarm.record")
 
@@ -235,7 +237,7 @@ class _Tap:
         self._source.journal.close(self._entries)
 
 
-class Recorder:
+class Recorder(Sealed):
     """Records one arm or several to a file while a `with` block runs; made by `Arm.record` and `Arms.record`.
 
     Args:
@@ -245,14 +247,17 @@ class Recorder:
         sinks: makes what is written to, one for each arm in their order; None: the file.
         period: time between two looks at what has arrived [s].
         cameras: what draws pictures for the file, by the name of the arm.
+        overwrite: replace a file that exists.
 
     Attributes:
         path: the file.
-        states: pushed states written so far, of all arms.
 
     Raises:
         LimitError: a rate outside its range.
+        CommandRejected: the file exists.
     """
+
+    path: Final[Path]
 
     def __init__(
         self,
@@ -263,11 +268,13 @@ class Recorder:
         sinks: Callable[[Mapping[str, RecordSource]], Sequence[RecordSink]] | None = None,
         period: float = _PERIOD,
         cameras: Mapping[str, CameraFeed] | None = None,
+        overwrite: bool = False,
     ) -> None:
         self._sources = dict(sources)
+        self._overwrite = flag(overwrite, "overwrite") or sinks is not None
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
-        self.path = path
-        self.states = 0
+        self.path = refuse_existing(path, overwrite=self._overwrite)
+        self._states = 0
         self._open_sinks = self._open_files if sinks is None else sinks
         self._period = period
         self._cameras = dict(cameras or {})
@@ -315,6 +322,7 @@ class Recorder:
     def _open_files(self, sources: Mapping[str, RecordSource]) -> list[RecordingFile]:
         """The file, and its writer for each arm."""
         (name, first), *others = sources.items()
+        refuse_existing(self.path, overwrite=self._overwrite)  # it may have appeared meanwhile
         size = chunk_size(sum(source.state_rate for source in sources.values()))
         file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
         files = [file, *(file.beside(source.facts, name) for name, source in others)]
@@ -322,6 +330,11 @@ class Recorder:
             if name in self._cameras:
                 self._films[name] = _Film(self._cameras[name], one)
         return files
+
+    @property
+    def states(self) -> int:
+        """Pushed states written so far, of all arms."""
+        return self._states
 
     def note(self, text: str) -> None:
         """Put a mark on the time line; `Recording.between` finds it by its text.
@@ -410,7 +423,7 @@ class Recorder:
             while True:
                 is_last = self._ended.wait(self._period)
                 for tap in self._taps:
-                    self.states += tap.write()
+                    self._states += tap.write()
                 file.flush()
                 if is_last:
                     break

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import struct
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +19,10 @@ from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import signals_of, to_frame
 from heptarm.values.arrays import Array, finite, flag, frozen, instance, shown
+from heptarm.values.files import open_regular, path_of
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
-from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.text import lines
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 #: Before the names of signals of FRI cycles, which have their own times: "fri.t".
 FRI = "fri."
 _MAGIC = b"\x89MCAP0\r\n"
+#: Largest chunk that is unpacked [bytes]; heptarm writes chunks of up to some megabytes.
+_LARGEST_CHUNK = 2**28
 #: Fields of rows that are no signals of their own.
 _HIDDEN = ("received",)
 
@@ -101,6 +104,7 @@ class Recording:
         events: what happened, in order.
         complete: the file has its end; otherwise it was cut off, and what is here is all up to its last whole chunk.
         lost: states and FRI cycles that could not be recorded; only known of a complete file.
+        damage: where and how the file is damaged; what is here is all before that. Empty: it is not.
         pictures: of a simulated camera, if there was one.
     """
 
@@ -112,6 +116,7 @@ class Recording:
     complete: bool
     lost: int = 0
     pictures: Pictures = field(default_factory=Pictures)
+    damage: str = ""
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """Array of a signal, such as "q", "fri.tau" or "t".
@@ -157,7 +162,7 @@ class Recording:
     @property
     def robot(self) -> RobotModel | None:
         """The robot, with its limits; None: unknown to this version."""
-        return ROBOTS.get(self.facts.get("robot", ""))
+        return known_robot(self.facts.get("robot", ""))
 
     @property
     def notes(self) -> tuple[RecordedEvent, ...]:
@@ -263,7 +268,9 @@ class Recording:
     def __str__(self) -> str:
         """A few lines: what is in it."""
         rate = (len(self) - 1) / self.duration if self.duration else 0.0
-        ending = "" if self.complete else ", cut off at its end"
+        ending = (
+            f", damaged {self.damage}" if self.damage else "" if self.complete else ", cut off at its end"
+        )
         title = f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}"
         rows = {
             "states": f"{len(self)} at {rate:.0f} Hz, {self.lost} lost",
@@ -312,30 +319,28 @@ class _Content:
     earliest: int | None = None
 
 
-def load(path: str | Path, *, arm: str = "") -> Recording:
+def load(path: str | Path, *, arm: str = "", damaged: bool = False) -> Recording:
     """Read a recording; one that was cut off is read to its last whole chunk.
 
     Args:
         path: the file.
         arm: which one, in a recording of several arms. Time zero is then the first pushed state of all of them.
+        damaged: of a damaged file, read what is before the damage; otherwise it is refused.
 
     Raises:
-        CommandRejected: the file cannot be read, or is no recording of heptarm, or has no such arm.
+        CommandRejected: the file cannot be read, or is no recording of heptarm, or has no such arm. Or it is damaged:
+            the text has the place, and how much is before it.
         MissingExtra: the package mcap is not installed.
     """
-    where = Path(instance(path, (str, Path), "path"))
+    where = path_of(path)
     content = _Content(arm=instance(arm, str, "arm"))
-    try:
-        with where.open("rb") as file:
-            if file.read(len(_MAGIC)) != _MAGIC:
-                raise _no_recording(where, "it does not begin as an MCAP file does")
-            file.seek(0)
-            for record in _whole_records(file):
-                _take(record, content)
-    except OSError as error:
-        raise CommandRejected(
-            f"{where} cannot be read: {error.strerror}", parameter="path", value=str(where)
-        ) from error
+    flag(damaged, "damaged")
+    with open_regular(where) as file:
+        if file.read(len(_MAGIC)) != _MAGIC:
+            raise _no_recording(where, "it does not begin as an MCAP file does")
+        damage = _read(file, content)
+    if not content.facts and damage:
+        raise _no_recording(where, f"it is damaged {damage}, before its description of the robot")
     if (arm or content.arms) and arm not in content.arms:
         known = ", ".join(content.arms) or "none: the recording is of a single arm"
         raise CommandRejected(
@@ -343,7 +348,18 @@ def load(path: str | Path, *, arm: str = "") -> Recording:
         )
     if not content.facts:
         raise _no_recording(where, "it has no description of the robot")
-    return _recording(where, content)
+    try:
+        found = replace(_recording(where, content), damage=damage)
+    except Exception as error:  # its chunks are whole, their content is not what heptarm writes
+        raise _no_recording(where, f"its content cannot be read: {error or type(error).__name__}") from error
+    if damage and not damaged:
+        raise CommandRejected(
+            f"{where} is damaged {damage}; before that are {len(found)} states, {found.duration:.2f} s",
+            parameter="path",
+            value=str(where),
+            hint="load(path, damaged=True) reads what is before the damage",
+        )
+    return found
 
 
 def _no_recording(path: Path, why: str) -> CommandRejected:
@@ -355,19 +371,65 @@ def _no_recording(path: Path, why: str) -> CommandRejected:
     )
 
 
-def _whole_records(file: Any) -> Iterator[Any]:
-    """All records up to the end, or to where the file was cut off."""
+class _Bounded:
+    """A file of which nobody reads more than there is, however much a length in it claims."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file, self._left = file, size
+
+    def read(self, count: int) -> bytes:
+        """Up to so many bytes; fewer only at the end."""
+        data = self._file.read(min(count, self._left))
+        self._left -= len(data)
+        return data
+
+
+def _read(file: BinaryIO, content: _Content) -> str:
+    """Take all records up to the end, or to where the file was cut off or is damaged.
+
+    Returns:
+        Where and how it is damaged; empty: it is whole, or was cut off.
+    """
     reader = require("mcap.stream_reader", extra="record")
-    exceptions = require("mcap.exceptions", extra="record")
-    stream = reader.StreamReader(file, record_size_limit=None)
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - len(_MAGIC)))
+    has_end = size > 2 * len(_MAGIC) and file.read() == _MAGIC
+    file.seek(0)
+    stream = reader.StreamReader(_Bounded(file, size), emit_chunks=True, record_size_limit=size)
+    place = 0
     try:
-        yield from stream.records
-    except (exceptions.McapError, struct.error, ValueError, EOFError, RuntimeError, IndexError):
-        return  # an incomplete record at the end
-    except Exception as error:
-        if type(error).__module__.partition(".")[0] not in ("zstandard", "lz4"):
-            raise
-        return  # an incomplete chunk
+        for record in stream.records:
+            if type(record).__name__ == "Chunk":
+                for one in _of_chunk(reader, record):
+                    _take(one, content)
+            else:
+                _take(record, content)
+            if type(record).__name__ == "DataEnd":
+                break  # behind it are indices, which nobody needs here
+            place = file.tell()
+    except Exception as error:  # of any decoder over any bytes
+        if has_end:
+            return f"at byte {place} of {size}: {' '.join(str(error).split()) or type(error).__name__}"
+    return ""
+
+
+def _of_chunk(reader: Any, chunk: Any) -> list[Any]:
+    """The records of a chunk.
+
+    Raises:
+        ValueError: it is too large, or its check sum is wrong.
+        Exception: of its decoders.
+    """
+    size = chunk.uncompressed_size
+    if size > _LARGEST_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes is larger than {_LARGEST_CHUNK} bytes")
+    if chunk.compression == "zstd":
+        claimed = require("zstandard", extra="record").frame_content_size(chunk.data)
+        if claimed > size:
+            raise ValueError(f"a chunk of {size} bytes claims to have {claimed}")
+    elif chunk.compression not in ("", "lz4"):
+        raise ValueError(f"the compression {shown(chunk.compression)} is unknown")
+    return list(reader.breakup_chunk(chunk, validate_crc=True))
 
 
 def _take(record: Any, content: _Content) -> None:

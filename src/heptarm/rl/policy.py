@@ -6,14 +6,14 @@ import json
 import os
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, HeptarmError, ShapeError
+from heptarm.errors import CommandRejected, ShapeError
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import flag
+from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
 Weights = npt.NDArray[np.float32]
 
@@ -95,17 +95,18 @@ class Policy:
         np.minimum(x, 1.0, out=x)
         return x
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write to a `.npz` file atomically; return its path.
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write to a `.npz` file atomically, one that exists only with `overwrite`; return its path.
 
         Raises:
-            CommandRejected: the name does not end in `.npz`.
+            CommandRejected: the name does not end in `.npz`, or the file exists.
         """
         target = Path(path)
         if target.suffix != ".npz":
             raise CommandRejected(
                 f"path must end in .npz, got {target.name!r}", parameter="path", value=str(path)
             )
+        refuse_existing(target, overwrite=flag(overwrite, "overwrite"))
         about = {"format": _FORMAT, "task": self.task.as_dict(), "facts": self.facts}
         arrays: dict[str, Any] = {"about": np.array(json.dumps(about)), "mean": self.mean, "std": self.std}
         for index, (w, b) in enumerate(self.layers):
@@ -121,18 +122,20 @@ class Policy:
         """Read a file written by `save`.
 
         Raises:
-            HeptarmError: the file does not exist, or is not a policy.
+            CommandRejected: the file does not exist, or is not a policy of this version.
         """
+        where, what, hint = Path(path), "a policy", "train one with `heptarm rl train`"
+        entries = read_arrays(where, what, hint=hint)
         try:
-            with np.load(path, allow_pickle=False) as file:
-                entries = {name: file[name] for name in file.files}
             about = json.loads(str(entries["about"]))
             if about["format"] != _FORMAT:
-                raise HeptarmError(
-                    f"{path} must have format {_FORMAT} for this heptarm, got format {about['format']}"
+                raise ValueError(
+                    f"it must have format {_FORMAT} for this heptarm, got format {about['format']}"
                 )
             count = sum(name.startswith("w") for name in entries)
-            layers = [(entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)]
+            layers: list[tuple[npt.ArrayLike, npt.ArrayLike]] = [
+                (entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)
+            ]
             return cls(
                 ReachTask.from_dict(about["task"]),
                 layers=layers,
@@ -140,16 +143,9 @@ class Policy:
                 std=entries["std"],
                 facts=about["facts"],
             )
-        except FileNotFoundError:
-            raise HeptarmError(
-                f"policy file {path} does not exist", hint="train one with `heptarm rl train`"
-            ) from None
-        except (KeyError, ValueError, TypeError, OSError, EOFError, BadZipFile) as error:
-            if isinstance(error, HeptarmError):
-                raise
-            raise HeptarmError(
-                f"{path} must be a policy file (.npz) written by heptarm, got: {error}"
-            ) from error
+        except Exception as error:  # of any numbers and texts in place of a policy's
+            why = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+            raise unreadable(where, why, what=what, hint=hint) from None
 
 
 def shipped(*, feature: bool = False) -> Policy:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, require
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.arrays import Array, flag, frozen
+from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,13 +127,18 @@ class EpisodeReport:
             ]
         )
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write to a `.json` file (figures and per-target numbers) or a `.npz` file (everything).
 
+        Args:
+            path: the file.
+            overwrite: replace a file that exists.
+
         Raises:
-            CommandRejected: another kind of file.
+            CommandRejected: another kind of file, or the file exists.
         """
         target = Path(path)
+        refuse_existing(target, overwrite=flag(overwrite, "overwrite"))
         if target.suffix == ".json":
             reached = [None if np.isinf(t) else float(t) for t in self.time_to_reach]
             per_target = {
@@ -158,8 +164,14 @@ class EpisodeReport:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> EpisodeReport:
-        """Read a `.npz` file of `save`."""
-        with np.load(path, allow_pickle=False) as file:
+        """Read a `.npz` file of `save`.
+
+        Raises:
+            CommandRejected: it cannot be read, or is no report.
+        """
+        where, what = Path(path), "a report of episodes"
+        file = read_arrays(where, what)
+        try:
             about = json.loads(str(file["about"]))
             return cls(
                 ReachTask.from_dict(about["task"]),
@@ -169,6 +181,8 @@ class EpisodeReport:
                 joints=file["joints"],
                 facts=about["facts"],
             )
+        except Exception as error:  # of any numbers and texts in place of a report's
+            raise unreadable(where, f"{type(error).__name__}: {error}", what=what) from None
 
     def plot(self, path: str | os.PathLike[str], *, most: int = 60) -> Path:
         """Plot paths, and distance over time; return the path of the picture.

@@ -17,6 +17,7 @@ from heptarm.errors import CommandRejected, ShapeError, require
 from heptarm.values.arrays import Array, array, finite_entries, instance, numbers, shown, within
 from heptarm.values.clearance import Clearance, TouchOnPath
 from heptarm.values.pose import Pose, check_pose
+from heptarm.values.sealed import Sealed
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ STEP = 0.02
 _MOST_KEPT = 8
 
 
-class CollisionModel:
+class CollisionModel(Sealed):
     """The collision model of an arm, its tool and its scene; needs `pip install 'heptarm[sim]'`.
 
     It reads joint positions and nothing else, so it serves a robot as well as a simulator. Bodies of the scene stay

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from heptarm.errors import CommandRejected, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.io import SignalValues, find_signal
+from heptarm.values.sealed import Sealed
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
@@ -76,7 +77,7 @@ def _wired(arm: Arm, role: str, name: str, others: Mapping[str, str]) -> str:
     return signal.name
 
 
-class TwoSignalGripper:
+class TwoSignalGripper(Sealed):
     """A gripper that one output opens and another one closes, confirmed by two end switches.
 
     The switch of the closed end is on when the gripper is closed with nothing between its fingers. Where they hold

@@ -17,7 +17,7 @@ from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.result import Cause, Result
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.text import degrees, fixed, lines
 
 if TYPE_CHECKING:
@@ -223,7 +223,8 @@ def _check(trajectory: Trajectory, robot: RobotModel) -> None:
             parameter="trajectory",
             hint="Trajectory.load(...), or arm.teach()",
         )
-    if trajectory.robot and trajectory.robot != robot.name:
+    taught_on = known_robot(trajectory.robot)  # joint positions are the same whatever the flange
+    if trajectory.robot and (taught_on is None or taught_on.base_name != robot.base_name):
         raise CommandRejected(
             f"trajectory must be taught on an {robot.name}, got one of an {trajectory.robot}",
             parameter="trajectory",

@@ -36,6 +36,7 @@ def guide_precisely(
     frame: str = TOOL,
     seconds: float = 60.0,
     until: Condition | None = None,
+    speed: float | None = None,
 ) -> Result:
     """Let a person guide the arm by hand along some directions only, and hold it stiffly in all others.
 
@@ -48,8 +49,9 @@ def guide_precisely(
         frame: whose axes: "tool" (the motion frame's own at the start), "base", or the name of a frame.
         seconds: duration [s].
         until: break condition that ends it earlier, such as `io.user_button`.
+        speed: bound of the speed along the free axes [m/s]; None: 0.25.
     """
-    return arm.move(hold(seconds), mode=compliance(free, frame=frame), until=until)
+    return arm.move(hold(seconds), mode=compliance(free, frame=frame, speed=speed), until=until)
 
 
 def teach(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from math import isnan, nan
 from typing import Any, cast
 
 import numpy as np
@@ -31,6 +30,8 @@ _FRAMES = ("base", "tool")
 #: Largest angle; more is degrees [rad].
 _TURN = 2.0 * math.pi + 1e-9
 
+#: E1 that is not given. A NaN of a computation is not this one, and is refused.
+NOT_GIVEN = float("nan")
 #: Largest arm angle that is accepted [rad].
 _LARGEST = 1000.0
 
@@ -41,22 +42,21 @@ class Redundancy(Value):
 
     Attributes:
         e1: arm angle [rad]: that of the elbow about the shoulder-wrist line, from the arm with A3 = 0 in the
-            same Status. NaN: not given.
+            same Status. NaN, the default: not given.
         status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0; bit 2, A6 <= 0. -1: not given.
         turn: bit i, A(i+1) < 0. -1: not given. An LBR does not need it: its joints turn less than once.
 
     Raises:
-        LimitError: E1 is infinite, or Status or Turn has bits that do not exist.
+        LimitError: E1 is infinite or another NaN than the default, or Status or Turn has bits that do not exist.
     """
 
-    e1: float = nan
+    e1: float = NOT_GIVEN
     status: int = -1
     turn: int = -1
 
     def __post_init__(self) -> None:
-        e1 = scalar(self.e1, "e1")
-        if not isnan(e1):
-            within(e1, "e1", -_LARGEST, _LARGEST, unit="rad")
+        if self.e1 is not NOT_GIVEN:
+            within(scalar(self.e1, "e1"), "e1", -_LARGEST, _LARGEST, unit="rad")
         for name, value, last in (("status", self.status, 7), ("turn", self.turn, 127)):
             if isinstance(value, bool) or not (isinstance(value, int) and -1 <= value <= last):
                 raise LimitError(
@@ -245,6 +245,11 @@ class Pose(Value):
         check_pose(other, "other")
         difference = multiply(self.quat * np.array([-1.0, -1.0, -1.0, 1.0]), other.quat)
         return 2.0 * math.atan2(float(np.linalg.norm(difference[:3])), abs(float(difference[3])))
+
+    def displacement(self, other: Pose) -> Array:
+        """Way to another pose in the axes of the base: x y z [m] and the rotation vector of the smaller turn [rad], shape (6,)."""
+        turn = Pose(np.zeros(3), multiply(other.quat, self.quat * np.array([-1.0, -1.0, -1.0, 1.0])))
+        return np.concatenate([other.xyz - self.xyz, turn.rotvec])
 
     @property
     def rpy(self) -> Array:

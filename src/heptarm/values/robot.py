@@ -1,8 +1,8 @@
-"""The LBR robots: dimensions, limits, masses and inertias."""
+"""The LBR robots: dimensions, limits, masses and inertias, and the media flanges that KUKA mounts on them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -137,6 +137,72 @@ def _entries(inertia: Array) -> Array:
     return np.array([*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2]])
 
 
+#: Radius of the last link, and of what KUKA mounts on it [m].
+FLANGE_RADIUS = 0.047
+#: Assumed mean density of a media flange, aluminium with hollows [kg/m³]: KUKA publishes no masses.
+_FLANGE_DENSITY = 1800.0
+#: Highest media flange [m].
+_HIGHEST_FLANGE = 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flange(Value):
+    """What KUKA mounts between the last link and the frame that Sunrise calls flange.
+
+    Attributes:
+        name: "plain", "touch", or the height in metres where it is another one.
+        title: KUKA's name.
+        height: of the flange frame above that of a plain flange [m].
+    """
+
+    name: str
+    title: str
+    height: float
+
+    @property
+    def body(self) -> Body:
+        """Its mass and inertia, in the frame of a plain flange: a disc of assumed density."""
+        mass = _FLANGE_DENSITY * np.pi * FLANGE_RADIUS**2 * self.height
+        across = mass * (3.0 * FLANGE_RADIUS**2 + self.height**2) / 12.0
+        along = 0.5 * mass * FLANGE_RADIUS**2
+        return Body(mass, np.array([0.0, 0.0, 0.5 * self.height]), np.array([across, across, along, 0, 0, 0]))
+
+
+#: The flanges whose height is established, by name; from frames taught on real robots.
+FLANGES: dict[str, Flange] = {
+    one.name: one
+    for one in (Flange("plain", "no media flange", 0.0), Flange("touch", "Media Flange Touch", 0.026))
+}
+_PLAIN = FLANGES["plain"]
+
+
+def flange(name: str | float) -> Flange:
+    """A flange by its name, "plain" or "touch", or by its height above a plain flange [m], [0, 0.2].
+
+    Raises:
+        CommandRejected: there is no such flange; the text lists the names.
+        LimitError: the height is out of range.
+    """
+    if isinstance(name, str) and name in FLANGES:
+        return FLANGES[name]
+    try:
+        if isinstance(name, bool):
+            raise ValueError
+        height = float(name)
+    except (TypeError, ValueError):
+        names = ", ".join(FLANGES)
+        raise CommandRejected(
+            f"flange must be one of {names}, or its height above a plain flange in metres, got {shown(name)}",
+            parameter="flange",
+            value=name,
+            allowed=f"{names}, [0, {_HIGHEST_FLANGE:g}] m",
+            hint='for example flange="touch", for the Media Flange Touch of the station setup',
+        ) from None
+    within(height, "flange", 0.0, _HIGHEST_FLANGE, unit="m")
+    same = [one for one in FLANGES.values() if one.height == height]
+    return same[0] if same else Flange(f"{height:g}", f"a flange {1e3 * height:g} mm high", height)
+
+
 #: Acceleration and jerk of every joint in the virtual cabinet; MoveIt configurations have this acceleration.
 ACCELERATION = 10.0
 JERK = 100.0
@@ -147,19 +213,20 @@ class RobotModel:
     """A robot of the LBR family. Chain: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7).
 
     Attributes:
-        name: short name, as in targets: "iiwa14".
+        name: short name: "iiwa14", with a media flange "iiwa14+touch".
         title: KUKA's name.
-        links: dimensions, masses and inertias of the links.
+        links: dimensions, masses and inertias of the links; the last one's include the media flange.
         d_bs: base to shoulder [m].
         d_se: shoulder to elbow [m].
         d_ew: elbow to wrist [m].
-        d_wf: wrist to flange [m].
+        d_wf: wrist to flange, with the media flange [m].
         q_min: shape (7,) [rad].
         q_max: shape (7,) [rad].
         dq_max: shape (7,) [rad/s].
         ddq_max: shape (7,) [rad/s²].
         dddq_max: shape (7,) [rad/s³].
         tau_max: shape (7,) [Nm].
+        flange: the media flange.
     """
 
     name: str
@@ -175,6 +242,40 @@ class RobotModel:
     ddq_max: Array
     dddq_max: Array
     tau_max: Array
+    flange: Flange = _PLAIN
+
+    @property
+    def base_name(self) -> str:
+        """Its name without the media flange, as in targets: "iiwa14"."""
+        return self.name.partition(_SEPARATOR)[0]
+
+    def with_flange(self, flange: Flange) -> RobotModel:
+        """The same robot with another flange: its kinematics and the mass of its last link follow."""
+        if flange == self.flange:
+            return self
+        bare = self._links_without_flange()
+        mass, com, inertia = bare.mass.copy(), bare.com.copy(), bare.inertia.copy()
+        if flange.height:
+            added = flange.body.placed(Pose.of(bare.flange))
+            last = Body(float(mass[6]), com[6], _entries(inertia[6])).joined(added)
+            mass[6], com[6], inertia[6] = last.mass, last.com, symmetric(last.inertia)
+        links = Links(
+            bare.origin,
+            frozen(mass),
+            frozen(com),
+            frozen(inertia),
+            frozen(bare.flange + [0.0, 0.0, flange.height]),
+        )
+        return replace(
+            self,
+            name=self.base_name + (f"{_SEPARATOR}{flange.name}" if flange.height else ""),
+            links=links,
+            d_wf=round(self.d_wf - self.flange.height + flange.height, 6),
+            flange=flange,
+        )
+
+    def _links_without_flange(self) -> Links:
+        return self.links if not self.flange.height else ROBOTS[self.base_name].links
 
     def __str__(self) -> str:
         """A few lines: its name, its dimensions, and the limits of its joints."""
@@ -182,6 +283,7 @@ class RobotModel:
         lengths = ", ".join(fixed(1e3 * one, 0) for one in (self.d_bs, self.d_se, self.d_ew, self.d_wf))
         rows = {
             "links": f"{lengths} mm: base, shoulder, elbow, wrist, flange",
+            "flange": f"{self.flange.name}: {self.flange.title}",
             "joint": "".join(f"{f'A{i + 1}':>8}" for i in range(7)),
             "lowest [deg]": columns(low, 1),
             "highest [deg]": columns(high, 1),
@@ -372,13 +474,19 @@ ROBOTS: dict[str, RobotModel] = {
 }
 
 
-def robot(name: str) -> RobotModel:
+def robot(name: str, *, flange: str | float | None = None) -> RobotModel:
     """The robot of that name.
 
+    Args:
+        name: "iiwa7", "iiwa14", "med7" or "med14", with a media flange "iiwa14+touch".
+        flange: its media flange, see `flange`; None: the one in the name, otherwise a plain one.
+
     Raises:
-        CommandRejected: there is none; the text lists the names.
+        CommandRejected: there is none; the text lists the names. Or name and flange contradict each other.
+        LimitError: the height of the flange is out of range.
     """
-    known = ROBOTS.get(name)
+    base, plus, named = name.partition(_SEPARATOR) if isinstance(name, str) else ("", "", "")
+    known = ROBOTS.get(base)
     if known is None:
         names = ", ".join(ROBOTS)
         raise CommandRejected(
@@ -386,6 +494,31 @@ def robot(name: str) -> RobotModel:
             parameter="model",
             value=name,
             allowed=names,
-            hint="for example robot('iiwa14')",
+            hint="for example robot('iiwa14'), or robot('iiwa14', flange='touch')",
         )
-    return known
+    mounted = _flange_of(named) if plus else None
+    if flange is not None:
+        given = _flange_of(flange)
+        if mounted is not None and mounted != given:
+            raise CommandRejected(
+                f"flange must be {mounted.name}, which the robot {name} has, got {given.name}",
+                parameter="flange",
+                value=flange,
+                hint="leave out one of them",
+            )
+        mounted = given
+    return known if mounted is None else known.with_flange(mounted)
+
+
+def known_robot(name: str) -> RobotModel | None:
+    """The robot of a name from elsewhere, such as a recording; None: this version does not know it."""
+    try:
+        return robot(name)
+    except CommandRejected:
+        return None
+
+
+#: In the `flange` argument of `robot` the function of this name is hidden.
+_flange_of = flange
+#: Between the name of a robot and that of its media flange.
+_SEPARATOR = "+"

@@ -6,6 +6,8 @@ from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from heptarm.values.robot import flange
+
 #: When a virtual cabinet asks for real-time priority: while an FRI client has to answer each tick, always, never.
 RealTime: TypeAlias = Literal["fri", "on", "off"]
 
@@ -28,7 +30,18 @@ def _about(
 class SimulatorOptions:
     """Options of a virtual cabinet; a new one is declared here and used in `heptarm.sim.runtime.cabinet`."""
 
-    model: str = field(default="iiwa14", metadata=_about("name of the robot"))
+    model: str = field(
+        default="",
+        metadata=_about("name of the robot; default: that of the project's station setup, or iiwa14"),
+    )
+    flange: str = field(
+        default="",
+        metadata=_about(
+            "media flange: plain, touch, or its height [m]; default: that of the project's station setup, or plain",
+            metavar="plain|touch|HEIGHT",
+            in_target=True,
+        ),
+    )
     host: str = field(default="127.0.0.1", metadata=_about("address to listen on"))
     port: int = field(default=30001, metadata=_about("TCP port; 0: any free port"))
     speed: float = field(
@@ -68,6 +81,12 @@ class SimulatorOptions:
     project: Path | None = field(
         default=None,
         metadata=_about("RoboticsAPI.data.xml with process data, tool templates and frames", in_target=True),
+    )
+    station: Path | None = field(
+        default=None,
+        metadata=_about(
+            "StationSetup.cat with the project's robot; default: the one beside the project's data"
+        ),
     )
     box: tuple[str, ...] = field(
         default=(),
@@ -189,6 +208,8 @@ def check_target_option(name: str, value: str) -> None:
     }
     if name not in known:
         raise ValueError(f"option must be one of {', '.join(known)}; got {name!r}")
+    if name == "flange":
+        flange(value)
     allowed = known[name].metadata["allowed"]
     if allowed is None:
         return

@@ -16,6 +16,7 @@ from heptarm.arm.several import Arms
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recorder import Recorder, RecordSource, epoch_of
 from heptarm.values.arrays import flag, instance, within
+from heptarm.values.sealed import Sealed
 
 if TYPE_CHECKING:
     from heptarm.viewers.rerun_stream import RerunStream
@@ -30,7 +31,7 @@ _APART = 1.4
 _PLOTTED = ("q", "dq", "tau_ext", "force")
 
 
-class LiveView:
+class LiveView(Sealed):
     """Shows what one arm or several report; made by `live`. A `with` block ends it.
 
     Args:

@@ -13,9 +13,11 @@ from heptarm.errors import CommandRejected
 from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import LAW_FAILED, describe
 from heptarm.fri.loop.native import COLLIDED, GAP_PERIODS, GRACE, MIN_GAP, REPEATS, REPEATS_ANALOG
+from heptarm.fri.loop.parameters import Follower
 from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import chain_of
@@ -368,11 +370,15 @@ class Cycle:
             fastest=arm.dq_max.tolist(),
         )
         self.guard = JointGuard(settings.limits or Limits.of(arm))
+        self.torque_guard = TorqueGuard(
+            settings.limits or Limits.of(arm), settings.bodies, report=self.guard.report
+        )
         self.pose_commander = PoseCommander(settings.pose_limits or PoseLimits())
         self.fallback = CommandFallback(settings.policy or Policy())
         self.is_ending = False
         self.law = settings.law
         self._params = Params(values.copy(), schema)
+        self._follower = Follower(self._params.words, settings.law_rates)
         self._param_tick = -1
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)
@@ -546,6 +552,7 @@ class Cycle:
                     guard.start(self.mirrored[0], self.slope, period=period)
                 elif sample.q_ipo is not None:  # the client connected after commanding had started
                     guard.start(sample.q_ipo, _ZEROS7, period=period)
+                self.torque_guard.start()
                 self.fallback.start()
                 record.ticks = -1
                 # a command given just before the start counts, an older one does not
@@ -628,11 +635,24 @@ class Cycle:
         q = tuple(guard.position(target, reach))
         mode = self.session.mode
         limited |= guard.was_limited
-        sent_tau = tuple(guard.torque(tau or _ZEROS7)) if mode is m.CommandMode.TORQUE else None
+        sent_tau = self._torques(sample, tau or _ZEROS7) if mode is m.CommandMode.TORQUE else None
         sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
         guard.was_limited |= limited
         self.record.sent = Sent(q, sent_tau or NAN7, sent_wrench or NAN6)
         return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
+
+    def _torques(self, sample: Sample, target: Sequence[float]) -> tuple[float, ...]:
+        """Limit target torques; while the arm brakes, they bring it to rest."""
+        guard, by_motion = self.guard, self.torque_guard
+        tau = by_motion.limit(
+            guard.torque(target),
+            q=sample.q or NAN7,
+            dq=self.record.dq,
+            period=guard.period,
+            is_braking=bool(self.record.flags & at.BRAKING),
+        )
+        guard.was_limited |= by_motion.was_limited
+        return tuple(tau)
 
     def _pose_setpoint(self, sample: Sample, now: int) -> Setpoint:
         """Make the setpoint of a session that commands poses."""
@@ -713,8 +733,11 @@ class Cycle:
         assert callable(self.law)
         ring = self.layout.params
         if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
+            if self._param_tick < 0:
+                self._follower.begin(words[1:])
+            self._follower.target[:] = words[1:]
             self._param_tick = ring.count
-            self._params.replace(words[1:])
+        self._follower.step(state.dt)
         try:
             self.law(state, out, self._params)
         except BaseException as error:

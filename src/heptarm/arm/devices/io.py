@@ -9,6 +9,7 @@ from heptarm.arm.translate.triggers import output_message
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import finite, shown, within, word
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
+from heptarm.values.sealed import Sealed
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
@@ -20,7 +21,7 @@ _LAMPS = {"red": "LEDRed", "green": "LEDGreen", "blue": "LEDBlue"}
 _COLOURS = (*_LAMPS, "off")
 
 
-class Io(Mapping[str, SignalValue]):
+class Io(Sealed, Mapping[str, SignalValue]):
     """The cabinet's signals; `arm.io`.
 
     A name is "Group.Name", or the part after a point if only one signal has it; case and underscores do not matter:

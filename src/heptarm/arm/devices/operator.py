@@ -11,6 +11,7 @@ from heptarm.errors import CommandRejected
 from heptarm.values.arrays import array, finite, instance, integer, within, word
 from heptarm.values.frames import check_name
 from heptarm.values.pose import Pose
+from heptarm.values.sealed import Sealed
 
 Fault: TypeAlias = Literal[
     "emergency_stop",
@@ -23,7 +24,7 @@ Fault: TypeAlias = Literal[
 ]
 
 
-class Operator:
+class Operator(Sealed):
     """Does to a private simulator what a person beside the robot does; `Arm.operator`.
 
     The terminal of `heptarm sim` takes the same commands as `do`.

@@ -11,6 +11,7 @@ from heptarm.errors import CommandRejected, ShapeError, Timeout
 from heptarm.values.arrays import callback as check_callback
 from heptarm.values.arrays import finite, flag, instance, integer, shown, within, word
 from heptarm.values.frames import check_name
+from heptarm.values.sealed import Sealed
 from heptarm.wire import messages as wire
 
 _SLOTS = 4
@@ -23,7 +24,7 @@ _SEVERITIES = {one.name.lower(): one for one in wire.Severity}
 _LEDS = {one.name.lower(): one for one in wire.KeyLed}
 
 
-class Pad:
+class Pad(Sealed):
     """The part of the smartPAD that a program may use; `arm.pad`. The keys are those of the bar "client"."""
 
     def __init__(self, connection: Connection) -> None:

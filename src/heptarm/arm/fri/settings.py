@@ -23,6 +23,7 @@ from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.robot import Body
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
@@ -90,6 +91,7 @@ def request(
     connection: Connection,
     kind: str,
     *,
+    load: Body | None = None,
     period_ms: int | None = None,
     multiplier: int = 1,
     mode: Mode | None = None,
@@ -127,7 +129,7 @@ def request(
     if port is not None:
         integer(port, "port", 0, 65535)
     instance(host, str, "host")
-    settings = LoopSettings(model=connection.robot, **loop)
+    settings = LoopSettings(model=connection.robot, load=load, **loop)
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,

@@ -27,6 +27,7 @@ from heptarm.errors import (
     ConnectFailed,
     ConnectionLost,
     HeptarmError,
+    LimitError,
     LocalProtocolError,
     ModeConflict,
     NotInControl,
@@ -42,7 +43,7 @@ from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.arrays import within
 from heptarm.values.io import Signal
 from heptarm.values.result import Result
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import FLANGES, Flange, RobotModel
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import Message
@@ -69,6 +70,7 @@ class Options:
         watchdog: silence after which the cabinet counts this client as lost [s].
         datagrams: send servo targets and receive states by UDP as far as it gets through.
         black_box: the last 30 s are written to a file after an error.
+        flange: media flange of the robot, which no cabinet reports.
     """
 
     name: str = "heptarm"
@@ -80,6 +82,7 @@ class Options:
     watchdog: float = CONNECTION.default
     datagrams: bool = False
     black_box: bool = True
+    flange: Flange = FLANGES["plain"]
 
 
 #: FRI sessions whose last change is kept.
@@ -388,7 +391,7 @@ class Connection:
         self.events.forget_unclaimed()
         self._link = link
         try:
-            self._robot = read_robot(self._welcome.robot)
+            self._robot = read_robot(self._welcome.robot, self.options.flange)
             self.signals = read_signals(self._welcome.signals)
             if self.options.datagrams:
                 missing = link.open_datagrams(timeout=self.options.timeout)
@@ -529,10 +532,22 @@ class Connection:
     def subscribe(self, rate: float, groups: Sequence[str]) -> None:
         """Choose what is pushed, now and after a reconnection."""
         chosen = groups_of(groups, self.welcome.groups)
-        within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
+        self._check_rate(rate)
         self.request(wire.Subscribe(groups=chosen, rate=rate))
         self.link.expect_states(rate * self.real_time_factor)
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
+
+    def _check_rate(self, rate: float) -> None:
+        """Refuse a rate of states that the cabinet does not push; raises LimitError."""
+        try:
+            within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
+        except LimitError as error:
+            if error.code == 2 and rate > 0:
+                error.hint = (
+                    "the cabinet's process data heptarm.max_rate is the most that it pushes; for more, up to 1000 Hz, "
+                    'use FRI: arm.fri("monitor")'
+                )
+            raise
 
     def run(self, message: wire.Run | wire.ServoOpen | wire.FriOpen, program: SentProgram) -> None:
         """Send a program, a servo motion or an FRI overlay; from its acceptance on `program` receives its events."""
@@ -619,12 +634,20 @@ class Connection:
         try:
             yield
         except KeyboardInterrupt:
-            if self.in_control and not self.closed.is_set():
-                try:
-                    self.stop(wire.StopKind.PATH)
-                except HeptarmError as error:
-                    _log.error("Ctrl-C: the arm could not be stopped: %s", error)
+            self.brake("Ctrl-C")
             raise
+
+    def brake(self, why: str) -> None:
+        """Stop the arm, if this client controls it; an error is only logged.
+
+        Args:
+            why: for the log.
+        """
+        if self.in_control and not self.closed.is_set():
+            try:
+                self.stop(wire.StopKind.PATH)
+            except HeptarmError as error:
+                _log.error("%s: the arm could not be stopped: %s", why, error)
 
     # ------------------------------------------------------------------------------------ states
 

@@ -19,6 +19,7 @@ import tempfile
 import threading
 import weakref
 from collections import deque
+from dataclasses import dataclass
 from pathlib import Path
 
 from heptarm.arm.link.target import Target
@@ -32,6 +33,17 @@ _log = logging.getLogger("heptarm.sim")
 READY_TIMEOUT = 60.0
 _END_TIMEOUT = 5.0
 _REPLY_TIMEOUT = 20.0
+#: It draws nothing: without a library for windows MuJoCo is imported a quarter of a second sooner.
+_NO_WINDOW = {"MUJOCO_GL": "disable"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Ready:
+    """What a virtual cabinet reports when it accepts clients: its port, its robot, and what of that is doubtful."""
+
+    port: int
+    model: str
+    notes: tuple[str, ...]
 
 
 class PrivateCabinet:
@@ -42,6 +54,7 @@ class PrivateCabinet:
         port: TCP port on which it listens.
         pid: its process id.
         scene: what is around the arm; "": nothing.
+        model: name of its robot, with its media flange.
         positions: file in which it writes the positions of arm and scene; None: there is no scene.
     """
 
@@ -51,6 +64,7 @@ class PrivateCabinet:
         self,
         process: subprocess.Popen[str],
         port: int,
+        model: str,
         readers: list[threading.Thread],
         replies: queue.SimpleQueue[tuple[str, str]],
         scene: str,
@@ -59,7 +73,7 @@ class PrivateCabinet:
         self.scene, self.positions = scene, positions
         self._replies = replies
         self._command_lock = threading.Lock()
-        self.port = port
+        self.port, self.model = port, model
         self.pid = process.pid
         self._process = process
         self._readers = readers
@@ -124,10 +138,10 @@ class PrivateCabinet:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
-            env=environment(key),  # never an argument, which all users of the machine can read
+            env=_NO_WINDOW | environment(key),  # never an argument, which all users of the machine can read
         )
         output: deque[str] = deque(maxlen=20)
-        ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
+        ready: queue.SimpleQueue[_Ready | None] = queue.SimpleQueue()
         replies: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         wrong_option = threading.Event()
         readers = [
@@ -143,13 +157,13 @@ class PrivateCabinet:
             reader.start()
         is_slow = False
         try:
-            port = ready.get(timeout=timeout)
+            found = ready.get(timeout=timeout)
         except queue.Empty:
-            port, is_slow = None, True
+            found, is_slow = None, True
         except BaseException:
             _end(process, readers, positions)
             raise
-        if port is None:
+        if found is None:
             _end(process, readers, positions)
             if is_slow:
                 raise ConnectFailed(
@@ -162,7 +176,9 @@ class PrivateCabinet:
             raise ConnectFailed(
                 f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}", hint=hint
             )
-        return cls(process, port, readers, replies, scene, positions)
+        for note in found.notes:
+            _log.warning("%s", note)
+        return cls(process, found.port, found.model, readers, replies, scene, positions)
 
     @property
     def is_running(self) -> bool:
@@ -212,7 +228,7 @@ if hasattr(os, "register_at_fork"):  # not on Windows, where no process forks
 
 def _read_output(
     process: subprocess.Popen[str],
-    ready: queue.SimpleQueue[int | None],
+    ready: queue.SimpleQueue[_Ready | None],
     replies: queue.SimpleQueue[tuple[str, str]],
     output: deque[str],
     wrong_option: threading.Event,
@@ -225,7 +241,8 @@ def _read_output(
             if "operator" in message:
                 replies.put((str(message["error"]), str(message["shown"])))
             elif message["ready"]:
-                ready.put(int(message["port"]))
+                notes = tuple(map(str, message["notes"]))
+                ready.put(_Ready(int(message["port"]), str(message["model"]), notes))
             else:
                 output.append(str(message["error"]))
                 if message.get("options"):

@@ -14,6 +14,7 @@ from heptarm.errors import CommandRejected, HeptarmError, ShapeError, require
 from heptarm.io.clock import Clock
 from heptarm.record.samples import SampleQueue, StateSample, states_to_numpy, to_frame
 from heptarm.values.arrays import shown
+from heptarm.values.sealed import Sealed
 from heptarm.values.state import GROUP_NAMES, State
 from heptarm.wire import messages as wire
 
@@ -214,7 +215,7 @@ class Followed(Protocol):
         ...
 
 
-class States(Iterator[State]):
+class States(Sealed, Iterator[State]):
     """An iterator over pushed states that returns each at most once; made by `Arm.states` and `MotionHandle.states`.
 
     Every state that was received before the stream's end is returned, however late the loop takes it, unless more wait

@@ -6,14 +6,18 @@ import os
 from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl, urlsplit
 
-from heptarm.errors import ConnectFailed
+from heptarm.errors import CommandRejected, ConnectFailed
 from heptarm.io.targets import SavedTarget, saved_target
-from heptarm.values.robot import ROBOTS
+from heptarm.values.arrays import shown
+from heptarm.values.robot import ROBOTS, Flange, flange
 from heptarm.values.simulator_options import check_target_option
 from heptarm.wire.messages import PORT
 
 #: Environment variable that names the default target.
 VARIABLE = "HEPTARM_TARGET"
+
+#: Longest name of a host, and of a part of it (RFC 1035) [characters].
+_LONGEST_HOST, _LONGEST_LABEL = 253, 63
 
 _EXAMPLES = (
     'examples: "172.31.1.147" or "172.31.1.147:30001" (a cabinet), "sim://iiwa14" or "sim://iiwa7?speed=5" '
@@ -48,6 +52,31 @@ class Target:
     def key_file(self) -> str | None:
         """File with the key of the saved target; None: it has none of its own."""
         return None if self.saved is None else self.saved.key_file or None
+
+    @property
+    def flange(self) -> Flange | None:
+        """Media flange of the private virtual cabinet or of the saved target; None: neither names one."""
+        named = dict(self.options).get("flange", "") or ("" if self.saved is None else self.saved.flange)
+        return flange(named) if named else None
+
+    def with_flange(self, given: str | float | None) -> Target:
+        """The target with a media flange; None: as it is.
+
+        Raises:
+            CommandRejected: there is no such flange, or the target has another one.
+        """
+        named, mounted = None if given is None else flange(given), self.flange
+        if named is not None and mounted is not None and named != mounted:
+            raise CommandRejected(
+                f'flange must be "{mounted.name}", which the target {self} has, got "{named.name}"',
+                parameter="flange",
+                value=given,
+                hint="leave out one of them",
+            )
+        chosen = named or mounted
+        if chosen is None or not self.is_private or "flange" in dict(self.options):
+            return self
+        return replace(self, options=(*self.options, ("flange", chosen.name)))
 
     @property
     def is_private(self) -> bool:
@@ -112,7 +141,7 @@ def _parsed(text: str) -> Target:
         return _address(parts.netloc)
     except ValueError as error:
         raise ConnectFailed(
-            f"target must be an address or a simulator, got {text!r}: {error}", hint=_EXAMPLES
+            f"target must be an address or a simulator, got {shown(text)}: {error}", hint=_EXAMPLES
         ) from None
 
 
@@ -121,8 +150,12 @@ def _address(text: str) -> Target:
         raise ValueError("the only scheme is sim://")
     parts = urlsplit(f"//{text}")
     port = parts.port  # raises ValueError unless it is a number in range
-    if not parts.hostname or any(character.isspace() for character in text):
+    if not parts.hostname or any(character.isspace() or not character.isprintable() for character in text):
         raise ValueError("it has no host")
+    if any(not 0 < len(label) <= _LONGEST_LABEL for label in parts.hostname.rstrip(".").split(".")) or (
+        len(parts.hostname) > _LONGEST_HOST
+    ):
+        raise ValueError(f"a host has at most {_LONGEST_HOST} characters, {_LONGEST_LABEL} between two dots")
     if parts.username is not None or parts.query or port == 0:
         raise ValueError("an address is HOST or HOST:PORT with a port of 1 to 65535")
     return Target(host=parts.hostname, port=PORT if port is None else port)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, isnan, nan
 from types import TracebackType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
 from heptarm.values.condition.trigger import Trigger
 from heptarm.values.result import Cause, MotionEvent, Result
+from heptarm.values.sealed import Sealed
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import MEANINGS
 from heptarm.wire.messages import (
@@ -70,14 +71,14 @@ def check_timeout(timeout: float) -> float:
     return within(scalar(timeout, "timeout"), "timeout", 0.0, MAX_TIMEOUT, unit="s")
 
 
-class Block(ABC):
+class Block(Sealed, ABC):
     """Base of what is used in a `with` block: leaving the block closes it.
 
     Attributes:
         what: its name in the log.
     """
 
-    what: str
+    what: ClassVar[str]
 
     @abstractmethod
     def close(self) -> None:
@@ -124,6 +125,8 @@ STREAM_SIZE = 100_000
 LONGEST_STREAM = 1_000_000
 #: States that may overtake the event that a motion has begun.
 _OVERTAKING = 20
+#: Longest wait for the end of a motion whose await was cancelled [s].
+_BRAKING = 10.0
 #: In position control a motion that ends farther from its target than this has not arrived [rad].
 ARRIVAL_TOLERANCE = 0.02
 
@@ -137,10 +140,10 @@ _ABORTED = {
 }
 
 
-class MotionHandle:
+class MotionHandle(Sealed):
     """A program that was sent to the cabinet; made by `Arm.start`.
 
-    It can be awaited in asyncio. Its id is the cabinet's.
+    It can be awaited in asyncio; a cancelled await stops the arm. Its id is the cabinet's.
     """
 
     def __init__(
@@ -400,11 +403,27 @@ class MotionHandle:
         self._future.add_done_callback(lambda _: callback(self))
 
     def __await__(self) -> Generator[Any, None, Result]:
-        """Wait in asyncio; cancelling the wait does not cancel the motion."""
+        """Wait in asyncio, as `wait` does without a timeout.
+
+        If the wait is cancelled or times out, the arm brakes on its path and waiting motions are dropped, as with
+        Ctrl-C; the wait then lasts until the motion has ended. `asyncio.shield(handle)` lets the motion go on.
+        """
         future = asyncio.wrap_future(self._future)
         # nobody else looks at its error when the wait was cancelled
         future.add_done_callback(lambda ended: ended.cancelled() or ended.exception())
-        return asyncio.shield(future).__await__()
+        try:
+            return (yield from asyncio.shield(future).__await__())
+        except (asyncio.CancelledError, GeneratorExit) as error:
+            if not self.done:
+                # in a thread: the event loop must not wait for the cabinet
+                threading.Thread(target=self._brake, name="heptarm-brake", daemon=True).start()
+                if isinstance(error, asyncio.CancelledError):
+                    yield from asyncio.wait((future,), timeout=_BRAKING).__await__()
+            raise
+
+    def _brake(self) -> None:
+        if not self.done:
+            self._connection.brake("a cancelled await")
 
     # ---------------------------------------------------------------------------- from the link
 

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +24,10 @@ from heptarm.model.kinematics import forward, jacobian
 from heptarm.model.velocity import (
     FREE,
     MARGIN,
+    ElbowTask,
     Slowdown,
     VelocityPath,
+    joint_velocity,
     limited_twist,
     ramped_twist,
     resolved_twist,
@@ -116,6 +119,7 @@ class JogServo(Servo):
     #: Numbers of a command, and the name of its parameter.
     size = 7
     name = "dq"
+    timeout: Final[float]
 
     def __init__(self, connection: Connection, terms: StreamTerms, limits: JogLimits) -> None:
         super().__init__(connection, terms)
@@ -143,10 +147,22 @@ class JogServo(Servo):
             acceleration=limits.acceleration * robot.ddq_max,
             q_min=low if boundary is None else np.maximum(low, boundary.q_min),
             q_max=high if boundary is None else np.minimum(high, boundary.q_max),
+            reaction=self._reaction,
         )
+        self._begin(self.start.q)
         self._thread = threading.Thread(target=self._run, name="heptarm-jog", daemon=True)
         self._thread.start()
         return self
+
+    @property
+    def _reaction(self) -> float:
+        """How long the arm goes on with the velocity of the last target [s]: to the target, behind it, and to brake."""
+        timing, robot = self._message.timing, self._connection.robot
+        jerk = float((robot.ddq_max / robot.dddq_max).max())
+        return timing.min_trajectory_time + timing.speed_timeout + jerk
+
+    def _begin(self, q: Array) -> None:
+        """What a subclass needs to know of the joint positions at the start, shape (7,) [rad]."""
 
     def _check_of_targets(self) -> None:
         """None: the path brakes before bodies, so no target of it is refused."""
@@ -191,7 +207,7 @@ class JogServo(Servo):
         boundary, path = self._boundary, self._path
         if boundary is not None and boundary.refuses and path is not None:
             now = path.q
-            ahead = now + self._unbounded(now, command) * _LOOK_AHEAD
+            ahead = now + self._unbounded(path, command) * _LOOK_AHEAD
             if boundary.excess(ahead) > max(boundary.excess(now), TOLERANCE):
                 self._command = None
                 raise boundary.refusal(ahead, "the velocity", parameter=self.name)
@@ -212,10 +228,10 @@ class JogServo(Servo):
         path = self._path
         assert path is not None
         command = self._command
-        wanted = np.zeros(self.size)
+        wanted = None
         if command is not None and (now - command[1]) * 1e-9 <= self.timeout:
             wanted = command[0]
-        dq, done = self._velocity(path.q, wanted, dt)
+        dq, done = self._velocity(path, wanted, dt)
         before = path.q
         sample = self._connection.feed.newest
         state = None if sample is None else self._connection.build(sample)
@@ -233,11 +249,11 @@ class JogServo(Servo):
         q, speed = path.target(self._message.timing.min_trajectory_time)
         self._send(now, wire.ServoJointsVelocity, q.tolist() + speed.tolist())
 
-    def _velocity(self, q: Array, wanted: Array, dt: float) -> tuple[Array, list[Slowdown]]:
-        """Joint velocities of a command [rad/s], and what has slowed them down already."""
-        return wanted, []
+    def _velocity(self, path: VelocityPath, wanted: Array | None, dt: float) -> tuple[Array, list[Slowdown]]:
+        """Joint velocities of a command, None: silence [rad/s], and what has slowed them down already."""
+        return np.zeros(7) if wanted is None else wanted, []
 
-    def _unbounded(self, q: Array, command: Array) -> Array:
+    def _unbounded(self, path: VelocityPath, command: Array) -> Array:
         """Joint velocities of a command without ramps and walls [rad/s]."""
         return command
 
@@ -326,10 +342,13 @@ class TwistServo(JogServo):
         *,
         twist: TwistLimits,
         moving: Pose,
+        elbow: Callable[[Array], ElbowTask],
         axes: Callable[[Pose], Pose],
     ) -> None:
         super().__init__(connection, terms, limits)
         self._twist_limits = twist
+        self._elbow_from = elbow
+        self._elbow: ElbowTask | None = None
         self._moving = moving  # pose of the motion frame in the flange frame
         self._axes = axes  # pose of the frame of the twist in the base, by that of the flange
         self._twist = np.zeros(6)
@@ -338,6 +357,9 @@ class TwistServo(JogServo):
         """Begin at rest; see `Servo.__enter__`."""
         super().__enter__()
         return self
+
+    def _begin(self, q: Array) -> None:
+        self._elbow = self._elbow_from(q)
 
     def set(self, twist: npt.ArrayLike) -> Array:
         """Command a Cartesian velocity, until the next call, or for `timeout`; after the end it has no effect.
@@ -355,20 +377,23 @@ class TwistServo(JogServo):
         """
         return self._set(twist)
 
-    def _velocity(self, q: Array, wanted: Array, dt: float) -> tuple[Array, list[Slowdown]]:
+    def _velocity(self, path: VelocityPath, wanted: Array | None, dt: float) -> tuple[Array, list[Slowdown]]:
         limits = self._twist_limits
-        goal = limited_twist(wanted, limits.speed, limits.turn)
+        goal = np.zeros(6) if wanted is None else limited_twist(wanted, limits.speed, limits.turn)
         if dt > 0.0:
             self._twist = ramped_twist(self._twist, goal, limits.acceleration * dt, limits.spin * dt)
-        twist, point = self._in_base(q, self._twist)
-        slowed, wall = self._along_walls(twist, point, q)
-        dq, singular = resolved_twist(self._connection.robot, q, slowed, point)
+        twist, point = self._in_base(path.q, self._twist)
+        slowed, wall = self._along_walls(twist, point, path.q)
+        assert self._elbow is not None
+        dq, singular = resolved_twist(
+            self._connection.robot, path, slowed, point, elbow=self._elbow, idle=wanted is None
+        )
         return dq, [one for one in (singular, wall) if one.reason]
 
-    def _unbounded(self, q: Array, command: Array) -> Array:
+    def _unbounded(self, path: VelocityPath, command: Array) -> Array:
         limits = self._twist_limits
-        twist, point = self._in_base(q, limited_twist(command, limits.speed, limits.turn))
-        return resolved_twist(self._connection.robot, q, twist, point)[0]
+        twist, point = self._in_base(path.q, limited_twist(command, limits.speed, limits.turn))
+        return joint_velocity(self._connection.robot, path.q, twist, point)
 
     def _in_base(self, q: Array, twist: Array) -> tuple[Array, Array]:
         """A twist in the axes of the base, and its point: the origin of the motion frame in the base."""

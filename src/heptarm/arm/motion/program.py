@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isinf
 
@@ -16,7 +15,7 @@ from heptarm.arm.translate.conditions import condition_message, reaction_message
 from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.translate.motions import in_base, items
 from heptarm.arm.translate.triggers import trigger_messages
-from heptarm.errors import CommandRejected, HeptarmError, ShapeError
+from heptarm.errors import CommandRejected, ShapeError, inside
 from heptarm.values.arrays import Array
 from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
@@ -127,7 +126,7 @@ def resolved(
         place = _Place(None if newest is None or newest.groups.joints is None else _rest(connection, newest))
     made: list[Motion] = []
     for index, motion in enumerate(motions):
-        with _named(f"motions[{index}]." if len(motions) > 1 else ""):
+        with inside(f"motions[{index}]" if len(motions) > 1 else ""):
             one = in_base(motion, tooling.taught)
             if isinstance(one, Ptp) and one.keeps:
                 one = _with_kept(one, place.q, index)
@@ -164,7 +163,7 @@ def _check_arcs(motion: Circ | Spline, start: Pose | None) -> None:
         return
     for index, one in enumerate(motion.segments):
         if isinstance(one, Circ) and start is not None:
-            with _named(f"segments[{index}]."):
+            with inside(f"segments[{index}]"):
                 circle_through(start, one.via, one.end)
         start = _end(one)
 
@@ -273,22 +272,12 @@ def _triggers(
     index: int, motion: Motion, connection: Connection, tooling: Tooling
 ) -> tuple[wire.Trigger, ...]:
     """Messages of a motion's triggers, their frames checked; errors name the motion."""
-    with _named(f"motions[{index}]."):
+    with inside(f"motions[{index}]"):
         messages = trigger_messages(motion, connection.signals)
         for place, trigger in enumerate(triggers_of(motion)):
-            with _named(f"triggers[{place}]."):
+            with inside(f"triggers[{place}]"):
                 tooling.check_until([node for node, _ in condition_nodes(trigger.condition)])
     return messages
-
-
-@contextmanager
-def _named(prefix: str) -> Iterator[None]:
-    """Put a prefix before the parameter that an error names."""
-    try:
-        yield
-    except HeptarmError as error:
-        error.parameter = f"{prefix}{error.parameter}"
-        raise
 
 
 def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) -> float:

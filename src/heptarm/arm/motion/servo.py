@@ -6,9 +6,10 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
+from functools import partial
 from math import nan
 from operator import le
-from typing import Any, Literal, TypedDict, TypeVar
+from typing import Any, Final, Literal, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +32,15 @@ from heptarm.io.tcp import WarmUpConnection
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
-from heptarm.model.velocity import FREE, Slowdown
+from heptarm.model.velocity import (
+    ELBOWS,
+    FREE,
+    Elbow,
+    ElbowTask,
+    Slowdown,
+    blockage,
+    resolved_pose,
+)
 from heptarm.values.arrays import Array, array, instance, shown, within, word
 from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
@@ -40,6 +49,7 @@ from heptarm.values.mode.mode import MODES, Mode
 from heptarm.values.notebook import as_html
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
+from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
 from heptarm.wire import messages as wire
@@ -49,6 +59,7 @@ _Method = TypeVar("_Method", bound=Callable[..., Any])
 #: Kinds of servo motions: of targets, and of velocities.
 KINDS = ("joint", "pose", "lin", "velocity", "twist")
 VELOCITIES = ("velocity", "twist")
+REDUNDANT = ("twist", "pose")
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
 #: The protocol's defaults and ranges; `schema/protocol.toml` is their one place.
 _DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoTiming.RANGES
@@ -88,6 +99,8 @@ class ServoKeywords(TypedDict, total=False):
     moving: str
     frame: str | Pose | None
     timeout: float | None
+    elbow: Elbow | None
+    posture: npt.ArrayLike | None
     keep_clear_of: ClearanceModel | None
     until: Condition | None
 
@@ -123,6 +136,10 @@ class ServoRequest:
             is the velocity of its origin.
         frame: of "twist": its axes: "tool", "flange", "base", a name, or a pose in the base; None: "tool".
         timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
+        elbow: of "twist" and "pose": what the redundant joint does: "keep": the arm angle stays that of the start, the
+            default; "center": the joints stay away from their limits. Where a limit or a singularity would slow the
+            arm down, the elbow yields first.
+        posture: instead of `elbow`: the joints stay as near as they can to these positions, shape (7,) [rad].
         keep_clear_of: model of bodies to keep clear of, such as a `heptarm.CollisionModel`, which has the shapes of the
             attached tool and workpiece as well: velocities brake before them, targets that are nearer than its margin
             are refused; None: none. It is no safety function: it knows only its own model of the scene.
@@ -153,6 +170,8 @@ class ServoRequest:
     moving: str = TOOL
     frame: str | Pose | None = None
     timeout: float | None = None
+    elbow: Elbow | None = None
+    posture: npt.ArrayLike | None = None
     keep_clear_of: ClearanceModel | None = None
     until: Condition | None = None
 
@@ -173,6 +192,8 @@ class ServoRequest:
             )
         if self.until is not None:
             check_condition(self.until)
+        if self.elbow is not None:
+            word(self.elbow, "elbow", ELBOWS)
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
         TARGETS.time(self.watchdog, period=self.period)
@@ -238,6 +259,19 @@ class ServoRequest:
     def silence(self) -> float:
         """Silence after which a stream of velocities comes to rest [s]."""
         return _SILENCE if self.timeout is None else self.timeout
+
+    def elbow_task(self, robot: RobotModel) -> Callable[[Array], ElbowTask]:
+        """What the elbow does, for the joint positions at the start of the stream.
+
+        Raises:
+            ShapeError: the posture has not seven numbers.
+            LimitError: one of them is outside the limits of its joint.
+        """
+        posture = None
+        if self.posture is not None:
+            posture = array(self.posture, 7, "posture")
+            robot.check(posture, "posture")
+        return partial(ElbowTask, robot, elbow=self.elbow or "keep", posture=posture)
 
     @property
     def _kept(self) -> float:
@@ -315,6 +349,19 @@ class ServoRequest:
             raise CommandRejected(
                 'frame applies to arm.servo("twist") only', parameter="frame", hint="leave it out"
             )
+        for name in ("elbow", "posture"):
+            if getattr(self, name) is not None and self.kind not in REDUNDANT:
+                raise CommandRejected(
+                    f'{name} applies to arm.servo("twist") and arm.servo("pose") only',
+                    parameter=name,
+                    hint="leave it out",
+                )
+        if self.elbow is not None and self.posture is not None:
+            raise CommandRejected(
+                f"posture takes the place of elbow, got both: elbow={self.elbow!r}",
+                parameter="posture",
+                hint="leave one of them out",
+            )
         if self.speed_timeout is not None and (self.kind, self.engine) != ("joint", "smart"):
             raise CommandRejected(
                 'speed_timeout applies only to arm.servo("joint") with the engine "smart", '
@@ -340,6 +387,9 @@ _COSTS = 4096
 #: Time before a tick at which its thread wakes to warm up the caches [s].
 _EARLY = 200e-6
 _DOUBLES = np.dtype(np.float64)
+#: Of a straight servo motion: time between two looks for what slows it down, the time that one takes at most [ns], and that
+#: in which it would be at its target, where nothing slows it down any more [s].
+_LOOK, _LOOK_TIME, _ARRIVED = 50_000_000, 3_000_000, 0.01
 #: A point that is moved by less is not moved [m].
 _ROUNDING = 1e-9
 
@@ -441,6 +491,8 @@ class Servo(Block):
     """
 
     what = "servo motion"
+    period: Final[float]
+    watchdog: Final[float]
 
     def __init__(self, connection: Connection, terms: StreamTerms) -> None:
         self.period = terms.period
@@ -568,6 +620,7 @@ class Servo(Block):
         self._due += round(self.period * 1e9)
         now = clock.nanos()
         if now < self._due:
+            self._look_ahead(now)
             clock.sleep((self._due - now) * 1e-9 - _EARLY)
             self._warm_up()
             clock.sleep_until(self._due)
@@ -588,6 +641,9 @@ class Servo(Block):
         if self._last_target is not None and self._warm_up_socket is not None:
             with suppress(HeptarmError):  # the link has ended: sending the next target raises
                 self._warm_up_socket.send(self._link.pack_target(*self._last_target, now=self._clock.nanos()))
+
+    def _look_ahead(self, now: int) -> None:
+        """Use the time until the next tick, on the clock of this machine [ns]."""
 
     def _send(self, began: int, kind: type[wire.OneWay], target: list[float]) -> None:
         if not self._active:
@@ -726,28 +782,42 @@ class JointServo(Servo):
 
 
 class PoseServo(Servo):
-    """A stream of poses of the motion frame in the base: followed by the joints or, as "lin", on straight lines."""
+    """A stream of poses of the motion frame in the base, followed by the joints."""
 
-    def __init__(self, connection: Connection, terms: StreamTerms, *, moving: Pose) -> None:
+    def __init__(
+        self,
+        connection: Connection,
+        terms: StreamTerms,
+        *,
+        moving: Pose,
+        elbow: Callable[[Array], ElbowTask],
+    ) -> None:
         super().__init__(connection, terms)
         self._to_flange = moving.inverse()  # moving: pose of the motion frame in the flange frame
-        self._newest: Pose | None = None
-        self._near: Array | None = None
-        self._good: Pose | None = None  # the last target that kept clear of bodies
+        self._elbow_from = elbow
+        self._elbow: ElbowTask | None = None
+        self._q = np.zeros(7)  # joint positions of the last good target
+        self._pose = Pose.at()  # and its pose
+        self._held = 0
+        self._slowdown = FREE
+        self._slowdowns: dict[str, Slowdown] = {}
 
     def __enter__(self) -> PoseServo:
         """Begin; see `Servo.__enter__`."""
         super().__enter__()
+        self._q = self.start.q
+        self._pose = Pose.from_matrix(forward(self._connection.robot, self._q)) @ self._to_flange.inverse()
+        self._elbow = self._elbow_from(self._q)
         return self
 
     def set(self, pose: Pose) -> Pose:
         """Send a target; the newest one wins. After the end of the motion it has no effect.
 
-        The cabinet chooses the joint positions nearest to the last target, on straight lines those that keep the arm
-        angle; it refuses a pose that is out of reach, and `stats` reports that.
+        The joint positions are those nearest to the last target, with the elbow where `elbow` or `posture` wants it. A
+        pose that they cannot reach is not sent: the arm is held at the last good target, and `stats` has the reason.
 
         Returns:
-            The pose sent: shifted into `arm.workspace`, if there is one.
+            The pose sent: shifted into `arm.workspace`, if there is one, or the last good one.
 
         Raises:
             ShapeError: not a Pose.
@@ -756,33 +826,81 @@ class PoseServo(Servo):
         """
         began = self._clock.nanos()
         check_pose(pose)
-        if self._boundary is not None:
-            pose = self._inside(pose, self._boundary)
-        if self._clear is not None and self._active:
-            try:
-                self._check_clear(pose, self._clear)
-            except CollisionForeseen:
-                good = self._newest = self._here if self._good is None else self._good
-                self._send(began, wire.ServoPose, good.xyz.tolist() + good.quat.tolist())
-                raise
-        self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
-        return pose
+        if not self._active:
+            _ = self.start  # raises unless it has begun
+            return pose
+        try:
+            self._take(pose)
+        finally:
+            self._follow(began)
+        return self._pose
 
-    def _check_clear(self, pose: Pose, clear: ClearTargets) -> None:
-        """Check the joint positions nearest to the last good ones, which the cabinet will choose as well.
+    def _follow(self, began: int) -> None:
+        """Send the last good target."""
+        self._send(began, wire.ServoJoints, self._q.tolist())
+
+    def _take(self, pose: Pose) -> None:
+        """Make a target the last good one, if it is good.
 
         Raises:
+            OutsideWorkspace: the workspace refuses it.
             CollisionForeseen: bodies are too near.
         """
+        boundary, clamped = self._boundary, self._clamped
+        if boundary is not None:
+            pose = self._inside(pose, boundary)
         try:
-            q = solve(self._connection.robot, pose @ self._to_flange, near=clear.q.tolist())
-        except Unreachable:
-            return  # the cabinet refuses it
-        clear.check(q, parameter="pose")
-        self._good = pose
+            q = self._joints(pose)
+        except Unreachable as error:
+            self._held += 1
+            reason = self._reason(pose) or f"out of reach: {error.text}"
+            self._slowdown = self._slowdowns[reason] = Slowdown(reason, 0.0)
+            return
+        if (
+            boundary is not None
+            and boundary.workspace.joints is not None
+            and ((q < boundary.q_min - TOLERANCE) | (q > boundary.q_max + TOLERANCE)).any()
+        ):
+            if boundary.refuses:
+                raise boundary.refusal(q, "the target", parameter="pose")
+            self._clamped = clamped + 1
+            return
+        if self._clear is not None:
+            self._clear.check(q, parameter="pose")
+        self._q, self._pose, self._slowdown = q, pose, FREE
+
+    def _joints(self, pose: Pose) -> Array:
+        """Joint positions of a target, near to the last good one.
+
+        Raises:
+            Unreachable: there are none.
+        """
+        assert self._elbow is not None
+        robot = self._connection.robot
+        reach = self._message.velocity * float(robot.dq_max.min()) * self.period
+        return resolved_pose(robot, pose @ self._to_flange, self._q, elbow=self._elbow, reach=reach)
+
+    def _reason(self, pose: Pose) -> str:
+        """What keeps the arm from going on to a pose from the last good target; empty: nothing near."""
+        assert self._elbow is not None
+        here, there = self._pose @ self._to_flange, pose @ self._to_flange
+        twist = here.displacement(there) / self.period
+        return blockage(self._connection.robot, self._q, twist, elbow=self._elbow).reason
+
+    @property
+    def stats(self) -> ServoStats:
+        """Statistics so far; also after the block."""
+        stats = super().stats
+        slowdown = self._slowdown if stats.slowdown is FREE else stats.slowdown
+        return replace(
+            stats,
+            slowdown=slowdown,
+            slowdowns=(*stats.slowdowns, *self._slowdowns.values()),
+            held=stats.held + self._held,
+        )
 
     def _inside(self, pose: Pose, boundary: Boundary) -> Pose:
-        """The target inside the workspace.
+        """The target inside the box of the workspace.
 
         Raises:
             OutsideWorkspace: it is outside, and such targets are refused.
@@ -792,27 +910,86 @@ class PoseServo(Servo):
         inside = boundary.clamped_point(tool)
         if boundary.refuses and boundary.outside(tool) > TOLERANCE:
             raise boundary.refusal_of_point(tool, "the target", parameter="pose")
-        if clamped := float(np.abs(inside - tool).max()) > _ROUNDING:
-            self._clamped += 1
-            pose = Pose.of(pose.xyz + inside - tool, pose.quat)
-        if boundary.workspace.joints is not None:
-            # the cabinet chooses the joint positions nearest to those before
-            near = self.start.q if self._near is None else self._near
-            try:
-                q = solve(boundary.robot, pose @ self._to_flange, near=near.tolist())
-            except Unreachable:
-                return pose  # the cabinet refuses it
-            if ((q < boundary.q_min - TOLERANCE) | (q > boundary.q_max + TOLERANCE)).any():
-                if boundary.refuses:
-                    raise boundary.refusal(q, "the target", parameter="pose")
-                self._clamped += not clamped
-                return self._newest if self._newest is not None else self._here
-            self._near = q
-        self._newest = pose
-        return pose
+        if float(np.abs(inside - tool).max()) <= _ROUNDING:
+            return pose
+        self._clamped += 1
+        return Pose.of(pose.xyz + inside - tool, pose.quat)
+
+
+class LineServo(PoseServo):
+    """A stream of poses of the motion frame in the base, followed on straight lines."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        terms: StreamTerms,
+        *,
+        moving: Pose,
+        elbow: Callable[[Array], ElbowTask],
+    ) -> None:
+        super().__init__(connection, terms, moving=moving, elbow=elbow)
+        self._looked = 0
+
+    def __enter__(self) -> LineServo:
+        """Begin; see `Servo.__enter__`."""
+        super().__enter__()
+        return self
+
+    def set(self, pose: Pose) -> Pose:
+        """Send a target; the newest one wins. After the end of the motion it has no effect.
+
+        The elbow keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the arm
+        comes to rest on it, and `stats` has the reason; the cabinet refuses a pose that is out of reach altogether.
+
+        Returns:
+            The pose sent: shifted into `arm.workspace`, if there is one.
+
+        Raises:
+            ShapeError: not a Pose.
+            OutsideWorkspace: `arm.workspace` refuses the target.
+            CollisionForeseen: bodies of `keep_clear_of` are too near; the last good target was sent again.
+        """
+        return super().set(pose)
+
+    def _follow(self, began: int) -> None:
+        pose = self._pose
+        self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
+
+    def _joints(self, pose: Pose) -> Array:
+        """Joint positions of a target, if somebody asks for them; the cabinet refuses a pose that has none."""
+        joints = self._boundary is not None and self._boundary.workspace.joints is not None
+        if self._clear is None and not joints:
+            return self._q
+        try:
+            return solve(self._connection.robot, pose @ self._to_flange, near=self._q.tolist())
+        except Unreachable:
+            return self._q
 
     @property
-    def _here(self) -> Pose:
-        """Pose of the motion frame when the motion began."""
-        flange = Pose.from_matrix(forward(self._connection.robot, self.start.q))
-        return flange @ self._to_flange.inverse()
+    def stats(self) -> ServoStats:
+        """Statistics so far; also after the block."""
+        self._look(self._clock.nanos())
+        return super().stats
+
+    def _look_ahead(self, now: int) -> None:
+        if now - self._looked > _LOOK and self._due - now > _LOOK_TIME:
+            self._look(now)
+
+    def _look(self, now: int) -> None:
+        """Find out what slows the arm down on its line."""
+        self._looked = now
+        limits, newest = self._message.linear, self._connection.newest()
+        joints = None if newest is None else newest.groups.joints
+        if not self._sent or not self._active or joints is None or limits is None or self._elbow is None:
+            return
+        robot = self._connection.robot
+        left = Pose.from_matrix(forward(robot, joints.q_cmd)).displacement(self._pose @ self._to_flange)
+        way, turn = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
+        seconds = max(way / limits.velocity, turn / limits.orientation_velocity)
+        self._slowdown = FREE
+        if seconds > _ARRIVED:
+            why = blockage(robot, joints.q_cmd, left / seconds, elbow=self._elbow)
+            self._slowdown = why
+            known = self._slowdowns.get(why.reason, FREE)
+            if why.factor < known.factor:
+                self._slowdowns[why.reason] = why

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.arm.translate.fields import NAMES, frame_message, hints, message_of
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import CommandRejected, inside
 from heptarm.model.inverse_kinematics import redundancy
 from heptarm.values.arrays import Array, shown, within
 from heptarm.values.frames import BASE
@@ -70,14 +70,8 @@ def _item(
     mode: wire.Mode | None,
     until: wire.Condition,
 ) -> wire.Item:
-    try:
+    with inside("" if index is None else f"motions[{index}]"):
         message = _message(type(motion).__name__, motion.limited_to(speed), robot)
-    except HeptarmError as error:
-        if index is not None:  # name the motion
-            error.text = f"motions[{index}]: {error.text}"
-            error.parameter = f"motions[{index}].{error.parameter}"
-            error.args = (error.text,)
-        raise
     frame = frame_message(getattr(motion, "moving", ""))
     return wire.Item(motion=message, frame=frame, mode=mode, until=until)
 
@@ -189,14 +183,18 @@ def _(motion: LinRel, robot: RobotModel) -> dict[str, Any]:
 
 @_fields.register
 def _(motion: Spline, robot: RobotModel) -> dict[str, Any]:
-    segments = (_message(f"{type(one).__name__}Segment", one, robot) for one in motion.segments)
+    segments = []
+    for index, one in enumerate(motion.segments):
+        with inside(f"segments[{index}]"):
+            segments.append(_message(f"{type(one).__name__}Segment", one, robot))
     return {"segments": tuple(segments)}
 
 
 @_fields.register
 def _(motion: JointSpline, robot: RobotModel) -> dict[str, Any]:
     for index, point in enumerate(motion.points):
-        robot.check(point.q, f"points[{index}].q")
+        with inside(f"points[{index}]"):
+            robot.check(point.q)
     points = (
         message_of(wire.JointPoint, point, **dynamics_fields(wire.JointPoint, point.dynamics))
         for point in motion.points

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
+from math import isnan
 from operator import attrgetter
 from struct import Struct
 from typing import Any
@@ -18,9 +19,9 @@ from heptarm.errors import ConnectFailed, RemoteProtocolError
 from heptarm.values import state as values
 from heptarm.values.arrays import Array
 from heptarm.values.io import Signal, SignalValues
-from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.result import Cause, Result
-from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.robot import ROBOTS, Flange, RobotModel
 from heptarm.wire import messages as wire
 from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.state_groups import StateGroups
@@ -154,8 +155,8 @@ def read_result(message: wire.MotionFinished, state: values.State | None) -> Res
     )
 
 
-def read_robot(message: wire.RobotInfo) -> RobotModel:
-    """The connected robot, with the limits that the cabinet reports.
+def read_robot(message: wire.RobotInfo, flange: Flange) -> RobotModel:
+    """The connected robot with its flange, which no cabinet reports, and with the limits that the cabinet reports.
 
     Raises:
         ConnectFailed: a robot that this version does not know.
@@ -170,7 +171,7 @@ def read_robot(message: wire.RobotInfo) -> RobotModel:
             hint="pip install --upgrade heptarm",
         )
     return replace(
-        known,
+        known.with_flange(flange),
         title=message.title or known.title,
         q_min=_array(message.q_min),
         q_max=_array(message.q_max),
@@ -190,8 +191,13 @@ def _cartesian(message: wire.PoseState) -> values.Cartesian:
         message.stamp,
         Pose.of(message.xyz, message.quat),
         Pose.of(message.xyz_cmd, message.quat_cmd),
-        value_of(Redundancy, message.redundancy),
+        _redundancy(message.redundancy),
     )
+
+
+def _redundancy(message: wire.Redundancy) -> Redundancy:
+    """The redundancy of a state; a cabinet reports NaN where it knows no E1."""
+    return Redundancy(NOT_GIVEN if isnan(message.e1) else message.e1, message.status, message.turn)
 
 
 class _Vectors:

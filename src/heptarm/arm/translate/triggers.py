@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 
 from heptarm.arm.translate.conditions import condition_message
-from heptarm.errors import CommandRejected, HeptarmError, LimitError
+from heptarm.errors import CommandRejected, LimitError, inside
 from heptarm.values.arrays import scalar, shown, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.signals import PathReached, SignalOutside
@@ -30,13 +30,10 @@ def trigger_messages(motion: Motion, signals: Sequence[Signal]) -> tuple[wire.Tr
     """
     made = []
     for place, one in enumerate(triggers_of(motion)):
-        try:
+        with inside(f"triggers[{place}]"):
             condition, parts = condition_message(one.condition, signals)
             _check(motion, parts)
             made.append(wire.Trigger(condition=condition, action=_action(one.action, signals)))
-        except HeptarmError as error:
-            error.parameter = f"triggers[{place}].{error.parameter}"
-            raise
     return tuple(made)
 
 

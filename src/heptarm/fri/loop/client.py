@@ -7,7 +7,7 @@ import os
 import time
 from dataclasses import replace
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from heptarm.values.arrays import array, finite, instance, integer, within
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
+from heptarm.values.sealed import Sealed
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -40,7 +42,7 @@ LONGEST = 1e9
 COMPILING = 120.0
 
 
-class Client(Reader):
+class Client(Sealed, Reader):
     """Client that answers a controller from a separate process; close it, or use it in a `with` block.
 
     It works over any number of sessions: the application of the cabinet may end and start again.
@@ -65,6 +67,12 @@ class Client(Reader):
         CommandRejected: an argument is outside its range, or the law cannot be compiled or loaded.
         Unavailable: the compiled part of heptarm is missing.
     """
+
+    params: Final[Params]
+    memory: Final[LiveMemory]
+    port: Final[int]
+    model: Final[RobotModel]
+    settings: Final[LoopSettings]
 
     def __init__(
         self,
@@ -94,7 +102,9 @@ class Client(Reader):
         super().__init__(at.Layout(block, **self.settings.sizes))
         self._header[at.HISTORY] = self.settings.history
         self._header[at.SIZE], self._header[at.MEMORY_SIZE] = values.size, remembered.size
-        self.params = Params(values, schema, changed=self._send_params)
+        self.params = Params(
+            values, schema, changed=self._send_params, declared=self.settings.declared
+        )
         self._send_params()
         self.memory = LiveMemory(
             remembered, kept, newest=self._newest_memory, write=self._layout.memory_set.write

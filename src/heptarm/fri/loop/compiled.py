@@ -11,20 +11,24 @@ import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, Final, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
+from heptarm.fri.loop import parameters
+from heptarm.fri.loop.user_api import Params
 from heptarm.fri.loop.wrench import external_wrench
 from heptarm.values.arrays import callback, instance, within
 from heptarm.values.robot import RobotModel, robot
+from heptarm.values.sealed import Sealed
 
 #: Number of arguments of a law with memory: state, output, parameters, memory.
 WITH_MEMORY = 4
 _Numbers = Mapping[str, interface.Given]
+_Initial = Mapping[str, interface.Initial]
 
 
 def include_dir() -> Path:
@@ -32,7 +36,7 @@ def include_dir() -> Path:
     return Path(__file__).resolve().with_name("include")
 
 
-class CompiledLaw:
+class CompiledLaw(Sealed):
     """A law that the native loop calls.
 
     Args:
@@ -46,11 +50,13 @@ class CompiledLaw:
 
     success = 0
     kind: str = ""
+    params: Final[dict[str, Any]]
+    memory: Final[dict[str, Any]]
 
-    def __init__(self, params: _Numbers | None = None, memory: _Numbers | None = None) -> None:
+    def __init__(self, params: _Initial | None = None, memory: _Numbers | None = None) -> None:
         _check(params, memory)
-        self.params: dict[str, Any] = dict(params or {})
-        self.memory: dict[str, Any] = dict(memory or {})
+        self.params = dict(params or {})
+        self.memory = dict(memory or {})
 
     def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
         """Parameters and their initial values for a robot."""
@@ -72,7 +78,7 @@ class CompiledLaw:
         raise NotImplementedError
 
 
-def _check(params: _Numbers | None, memory: _Numbers | None) -> None:
+def _check(params: _Initial | None, memory: _Numbers | None) -> None:
     """Check that both are numbers and arrays by name, or None."""
     for values, what in ((params, "params"), (memory, "memory")):
         if values is not None:
@@ -102,7 +108,7 @@ class NumbaLaw(CompiledLaw):
     def __init__(
         self,
         function: Callable[..., object],
-        params: _Numbers | None = None,
+        params: _Initial | None = None,
         memory: _Numbers | None = None,
     ) -> None:
         super().__init__(params, memory)
@@ -134,14 +140,14 @@ def law(function: Callable[..., object]) -> NumbaLaw: ...
 
 @overload
 def law(
-    *, params: _Numbers | None = None, memory: _Numbers | None = None
+    *, params: _Initial | None = None, memory: _Numbers | None = None
 ) -> Callable[[Callable[..., object]], NumbaLaw]: ...
 
 
 def law(
     function: Callable[..., object] | None = None,
     *,
-    params: _Numbers | None = None,
+    params: _Initial | None = None,
     memory: _Numbers | None = None,
 ) -> NumbaLaw | Callable[[Callable[..., object]], NumbaLaw]:
     """Compile a law with Numba when its session opens; the loop then calls it without Python.
@@ -177,8 +183,11 @@ class LibraryLaw(CompiledLaw):
         memory: see `CompiledLaw`.
     """
 
+    path: Path
+    name: Final[str]
+
     def __init__(
-        self, path: Path, name: str, params: _Numbers | None = None, memory: _Numbers | None = None
+        self, path: Path, name: str, params: _Initial | None = None, memory: _Numbers | None = None
     ) -> None:
         super().__init__(params, memory)
         self.path, self.name = path, name
@@ -229,7 +238,7 @@ class LibraryLaw(CompiledLaw):
 
 
 def law_from(
-    path: str | Path, name: str, *, params: _Numbers | None = None, memory: _Numbers | None = None
+    path: str | Path, name: str, *, params: _Initial | None = None, memory: _Numbers | None = None
 ) -> LibraryLaw:
     """Take a law from a shared library in C or C++, which was built with heptarm_law.h; see `include_dir`.
 
@@ -255,7 +264,7 @@ def law_from(
     return LibraryLaw(file, name, params, memory)
 
 
-class LawTrial:
+class LawTrial(Sealed):
     """A compiled law in this process, called with states of your own: for tests, simulations and plots.
 
     A law that crashes ends this process; in a session it does not.
@@ -268,7 +277,7 @@ class LawTrial:
         dt: command period [s].
 
     Attributes:
-        params: parameters; assign to them between calls.
+        params: parameters; assign to them between calls, and the law sees them follow at their rates.
         memory: memory; read it or assign to it between calls.
         t: time of the next call [s].
 
@@ -276,11 +285,15 @@ class LawTrial:
         CommandRejected: the law cannot be compiled or loaded.
     """
 
+    params: Final[interface.Memory]
+    memory: Final[interface.Memory]
+    t: float
+
     def __init__(
         self,
         compiled: CompiledLaw,
         *,
-        params: _Numbers | None = None,
+        params: _Initial | None = None,
         memory: _Numbers | None = None,
         model: str | RobotModel = "iiwa14",
         dt: float = 1e-3,
@@ -289,12 +302,14 @@ class LawTrial:
         _check(params, memory)
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
         self._dt = within(dt, "dt", 1e-6, 1.0, unit="s")
-        values, schema = interface.flat({**compiled.parameters(arm), **(params or {})}, "params")
+        declared = parameters.merged(compiled.parameters(arm), params)
+        values, schema = interface.flat(declared, "params")
         kept, remembered = interface.flat({**compiled.memory, **(memory or {})}, "memory")
         address, self._kept = compiled.load(schema, remembered)
         self._function = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 4)(address)
         self._params, self._memory = np.append(values, 0.0), np.append(kept, 0.0)
-        self.params = interface.Memory(self._params, schema)
+        self._follower = parameters.Follower(self._params[:-1], parameters.rates(declared))
+        self.params = Params(self._follower.target, schema, changed=lambda: None, declared=declared)
         self.memory = interface.Memory(self._memory, remembered)
         self._state = np.full(_words(interface.STATE), np.nan)
         self._arm = arm
@@ -337,6 +352,10 @@ class LawTrial:
         self._state.view(np.int64)[_words(interface.STATE[:_FLOATS]) :] = 0
         out.q, out.tau, out.wrench = shown.q_ipo, 0.0, 0.0
         out.pose, out.e1 = np.nan, np.nan
+        if self.t > 0.0:
+            self._follower.step(self._dt)
+        else:
+            self._follower.begin(self._follower.target)
         self.t += self._dt
         code = self._function(
             *(one.ctypes.data for one in (self._state, self._command, self._params, self._memory))

@@ -16,6 +16,7 @@ import numpy as np
 from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.law_interface import Memory
@@ -30,6 +31,7 @@ from heptarm.fri.loop.native import (
     Seam,
     library,
 )
+from heptarm.fri.loop.parameters import Follower
 from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import chain_of
@@ -84,6 +86,8 @@ class Cycle:
         seam.lowest[:], seam.highest[:], seam.fastest[:] = arm.q_min, arm.q_max, arm.dq_max
         seam.missing, seam.patience, seam.over = MISSING.index(policy.missing), policy.patience, policy.over
         seam.has_chain, seam.chain[:] = 1, chain_of(arm)
+        self._torques = TorqueGuard(settings.limits or Limits.of(arm), settings.bodies)
+        seam.torque_guard = self._torques.words.ctypes.data
         if settings.collision is not None:
             seam.has_watch = 1
             for name in ("threshold", "baseline", "margin"):
@@ -100,13 +104,20 @@ class Cycle:
         if isinstance(law, CompiledLaw):
             seam.law, self._kept = law.load(schema, kept)
             seam.law_success = law.success
-            # parameters, memory, counts of writes, buffer of the larger of both rings
-            sizes = values.size, memory.size, memory.size, max(values.size, 2 * memory.size) + 1
-            self._words = [np.zeros(max(size, 1)) for size in sizes]
-            self._words[1][: memory.size] = memory
-            for name, words in zip(
-                ("params", "memory", "memory_written", "law_buffer"), self._words, strict=True
-            ):
+            self._words = {
+                name: np.zeros(size + 1)
+                for name, size in (
+                    ("params", values.size),
+                    ("params_target", values.size),
+                    ("params_rates", values.size),
+                    ("memory", memory.size),
+                    ("memory_written", memory.size),
+                    ("law_buffer", max(values.size, 2 * memory.size)),
+                )
+            }
+            self._words["params_rates"][:-1] = settings.law_rates
+            self._words["memory"][:-1] = memory
+            for name, words in self._words.items():
                 setattr(seam, name, words.ctypes.data)
             base = layout.block.ints.ctypes.data
             for name in ("params", "memory", "memory_set"):
@@ -115,6 +126,7 @@ class Cycle:
             self.library.fri_protect()
             return
         self._params = Params(np.zeros(values.size), schema)
+        self._follower = Follower(self._params.words, settings.law_rates)
         self._memory = Memory(memory, kept) if law is not None and arity(law) >= WITH_MEMORY else None
         self._param_tick, self._memory_tick, self._offer_tick = -1, 0, -1
         self._memory_written = np.zeros(memory.size)
@@ -167,15 +179,12 @@ class Cycle:
         """Call the law in Python on the state of this cycle; brake from now on if it fails."""
         law, layout = self._law, self.layout
         assert law is not None and not isinstance(law, CompiledLaw)
-        ring = layout.params
-        if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
-            self._param_tick = ring.count
-            self._params.replace(words[1:])
         if layout.offered.tick != self._offer_tick and (offer := layout.offered.read()) is not None:
             self._offer_tick = layout.offered.tick
             self._signals = self._outputs.signals = Signals.of(offer[0])
         states = layout.states
         state = State(states.floats[states.count % len(states.ints)], self._signals, self._dq)
+        self._take_params(state.dt)
         began = time.monotonic_ns()
         try:
             if self.limit is not None:
@@ -194,6 +203,16 @@ class Cycle:
                 self.limit.end()
             self._fail(str(error) if isinstance(error, EndlessLaw) else describe(error))
         layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
+
+    def _take_params(self, dt: float) -> None:
+        """Let the parameters follow what the user's process has set."""
+        ring, follower = self.layout.params, self._follower
+        if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
+            if self._param_tick < 0:
+                follower.begin(words[1:])
+            follower.target[:] = words[1:]
+            self._param_tick = ring.count
+        follower.step(dt)
 
     def _write_outputs(self) -> None:
         """Hand on the outputs that the law has written in this cycle."""

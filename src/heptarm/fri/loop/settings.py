@@ -14,11 +14,13 @@ from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
-from heptarm.fri.loop.law_interface import Floats, Given, flat
+from heptarm.fri.loop.law_interface import Floats, Given, Initial, flat
+from heptarm.fri.loop.parameters import Param, merged, rates
 from heptarm.fri.protocol.version import Version
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.arrays import callback, flag, instance, integer, within
 from heptarm.values.condition.collision import CollisionGuard
-from heptarm.values.robot import RobotModel, robot
+from heptarm.values.robot import Body, RobotModel, robot
 
 #: `law(state, out, params)`, or `law(state, out, params, memory)`.
 Law = Callable[..., object]
@@ -32,11 +34,12 @@ class LoopKeywords(TypedDict, total=False):
 
     version: str | None
     model: str | RobotModel
+    load: Body | None
     limits: Limits | None
     pose_limits: PoseLimits | None
     policy: Policy | None
     law: Law | CompiledLaw | None
-    params: Mapping[str, Given] | None
+    params: Mapping[str, Initial] | None
     memory: Mapping[str, Given] | None
     collision: CollisionGuard | None
     history: int
@@ -52,13 +55,14 @@ class LoopSettings:
     Attributes:
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, or its name, for the limits.
+        load: on the flange, for the guard of torques, which computes with the robot's inertia; None: none.
         limits: limits of joint commands; None for limits slightly inside the robot's.
         pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
         policy: behaviour without fresh commands; None for the default.
         law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in every cycle
             of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the loop calls
             it without Python. None: commands come from `command`.
-        params: parameters of the law, numbers and arrays by name.
+        params: parameters of the law, numbers and arrays by name, or declarations with `heptarm.param`.
         memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
         collision: bands of the external torques; at a torque outside its band the arm brakes at once, and the client
             commands nothing more: `collision` names the joint. None: no such bands.
@@ -76,11 +80,12 @@ class LoopSettings:
 
     version: str | None = None
     model: str | RobotModel = "iiwa14"
+    load: Body | None = None
     limits: Limits | None = None
     pose_limits: PoseLimits | None = None
     policy: Policy | None = None
     law: Law | CompiledLaw | None = None
-    params: Mapping[str, Given] | None = None
+    params: Mapping[str, Initial] | None = None
     memory: Mapping[str, Given] | None = None
     collision: CollisionGuard | None = None
     history: int = 2048
@@ -99,6 +104,7 @@ class LoopSettings:
         if not isinstance(self.model, str):
             instance(self.model, RobotModel, "model")
         for value, kind, name in (
+            (self.load, Body, "load"),
             (self.limits, Limits, "limits"),
             (self.pose_limits, PoseLimits, "pose_limits"),
             (self.policy, Policy, "policy"),
@@ -124,6 +130,7 @@ class LoopSettings:
             integer(self.cpu, "cpu", 0, 65535)
         within(self.busy_poll, "busy_poll", 0.0, BUSY_POLL, unit="s")
         object.__setattr__(self, "model", self.arm)
+        _ = self.declared  # raises for a value outside its range
 
     @property
     def arm(self) -> RobotModel:
@@ -136,12 +143,25 @@ class LoopSettings:
         return None if self.version is None else Version.of(self.version)
 
     @property
+    def declared(self) -> dict[str, Param]:
+        """Declarations of the law's parameters; those of a compiled law may depend on the robot."""
+        known = self.law.parameters(self.arm) if isinstance(self.law, CompiledLaw) else {}
+        return merged(known, self.params)
+
+    @property
     def law_params(self) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
-        """Parameters of the law, flattened, and their schema; those of a compiled law may depend on the robot."""
-        known: Mapping[str, Given] = (
-            self.law.parameters(self.arm) if isinstance(self.law, CompiledLaw) else {}
-        )
-        return flat({**known, **(self.params or {})}, "params")
+        """Parameters of the law, flattened, and their schema."""
+        return flat(self.declared, "params")
+
+    @property
+    def law_rates(self) -> Floats:
+        """Largest change of each parameter in a second."""
+        return rates(self.declared)
+
+    @property
+    def bodies(self) -> Floats:
+        """Links, load and motors of the robot, for the guard of torques: `rigid_bodies`."""
+        return rigid_bodies(self.arm, self.load, rotor=ROTOR)
 
     @property
     def law_memory(self) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.law_interface import Fields, Given, Schema, flat
+from heptarm.fri.loop.law_interface import Fields, Given, Initial, Schema, flat
+from heptarm.fri.loop.parameters import Param
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import (
     CommandMode,
@@ -244,15 +245,25 @@ class Params(Fields):
         values: numbers and arrays, flattened.
         schema: shape and position of each, by name.
         changed: called after an assignment; None makes them read-only.
+        declared: what each may be set to, by name; None: any number, also NaN.
     """
 
-    __slots__ = ("_changed",)
+    __slots__ = ("_changed", "_declared")
 
     _changed: Callable[[], None] | None
+    _declared: Mapping[str, Param]
 
-    def __init__(self, values: Floats, schema: Schema, *, changed: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        values: Floats,
+        schema: Schema,
+        *,
+        changed: Callable[[], None] | None = None,
+        declared: Mapping[str, Param] | None = None,
+    ) -> None:
         super().__init__(values, schema, "parameter")
         object.__setattr__(self, "_changed", changed)
+        object.__setattr__(self, "_declared", declared or {})
 
     def __getattr__(self, name: str) -> Any:
         part = self._view(name)
@@ -270,20 +281,36 @@ class Params(Fields):
 
         Raises:
             ShapeError: a value has a different shape than initially.
+            LimitError: a value is outside the range that the parameter's declaration has, or not finite.
+            CommandRejected: a parameter is fixed while the law runs.
             AttributeError: no such parameter, or they are read-only.
         """
         if self._changed is None:
             raise AttributeError("parameters are read-only in a law")
-        for start, given in self._checked(values):
+        for start, given in [one for name, value in values.items() for one in self._within(name, value)]:
             self._values[start : start + given.size] = given
         self._changed()
 
-    def replace(self, values: Floats) -> None:
-        """Replace all values."""
-        self._values[:] = values
+    def _within(self, name: str, value: Given) -> list[tuple[int, Floats]]:
+        """First word and numbers of a value, checked against its declaration."""
+        declaration = self._declared.get(name)
+        if declaration is None:
+            return self._checked({name: value})
+        if not declaration.live:
+            raise CommandRejected(
+                f"{name} is fixed while the law runs",
+                parameter=name,
+                hint="make the law with another value, and open another session",
+            )
+        return [(self._schema[name][1], declaration.checked(value, name).reshape(-1))]
+
+    @property
+    def words(self) -> Floats:
+        """All values, as the law sees them."""
+        return self._values
 
     @staticmethod
-    def flat(values: Mapping[str, Given]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
+    def flat(values: Mapping[str, Initial]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
         """Flatten a mapping into numbers and their schema.
 
         Raises:

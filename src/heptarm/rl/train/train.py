@@ -14,6 +14,8 @@ import numpy as np
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
 from heptarm.rl.policy import Policy
 from heptarm.rl.sim.batch import BatchReach, Engine
+from heptarm.values.arrays import flag
+from heptarm.values.files import refuse_existing
 
 torch = require("torch", extra="rl")
 
@@ -245,7 +247,7 @@ class Training:
         """Write the policy, and a checkpoint beside it."""
         if self.team.is_first:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self.policy().save(path)
+            self.policy().save(path, overwrite=True)
         state = {
             "recipe": self.recipe.as_dict(),
             "workers": self.team.size,
@@ -293,6 +295,7 @@ def train(
     threads: int = 2,
     checkpoint: int = CHECKPOINT,
     engine: Any = Engine,
+    overwrite: bool = False,
 ) -> Trained:
     """Train a policy.
 
@@ -309,15 +312,18 @@ def train(
         threads: of the simulation and of learning; the result does not depend on them.
         checkpoint: updates between two checkpoints.
         engine: class of the simulation's engine.
+        overwrite: replace an `out` that exists and is not resumed.
 
     Raises:
-        CommandRejected: arguments that contradict each other.
+        CommandRejected: arguments that contradict each other, or `out` exists and is not resumed.
         HeptarmError: no checkpoint to resume from, or no such file.
         MissingExtra: torch or `mujoco.batch` is not installed.
     """
     path = Path(out) if out is not None else Path(resume) if resume is not None else None
     if path is not None and path.suffix != ".npz":
         raise CommandRejected(f"out must end in .npz, got {path.name!r}", parameter="out", value=str(path))
+    if path is not None and (resume is None or Path(resume) != path):
+        refuse_existing(path, overwrite=flag(overwrite, "overwrite"), name="out")
     if checkpoint < 1:
         raise LimitError(f"checkpoint must be at least 1, got {checkpoint}", code=2, parameter="checkpoint")
     torch.set_num_threads(1)  # for tensors this small, more would wait for each other most of the time

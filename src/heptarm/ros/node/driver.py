@@ -9,6 +9,7 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal, Protocol
 
 import numpy as np
@@ -122,6 +123,7 @@ class Driver:
             groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
             watchdog=values["watchdog"],
             datagrams=values["datagrams"],
+            flange=values["flange"] or None,
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = NodeFriSession(self._arm)
@@ -134,6 +136,7 @@ class Driver:
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
+            elbow=values["servo.elbow"],
         )
         self._destinations = DestinationKeeper(
             self._stream,
@@ -151,7 +154,10 @@ class Driver:
             return SplineExecution(self._arm, config.joints, self, speed=speed, settings=config.settings)
         if config.values["execution"] == "fri":
             return FriExecution(self._arm, config.joints, self, options=config.fri, settings=config.settings)
-        return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=config.settings)
+        settings = config.settings
+        ceiling = min(settings.rules.speed, self._arm.speed)  # a faster goal is refused, not followed late
+        settings = replace(settings, rules=replace(settings.rules, speed=ceiling))
+        return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=settings)
 
     # -------------------------------------------------------------------------------- life cycle
 

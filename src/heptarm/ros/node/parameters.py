@@ -80,6 +80,12 @@ PARAMETERS = (
         'target of the connection, as in heptarm.connect; "": the environment variable HEPTARM_TARGET',
     ),
     Parameter(
+        "flange",
+        "",
+        'media flange of the robot: "plain", "touch", or its height above a plain one [m]; "": that of the target, or '
+        "plain",
+    ),
+    Parameter(
         "key_file",
         "",
         'file with the pre-shared key of the cabinet; "": HEPTARM_KEY, or the key stored for the target',
@@ -162,6 +168,12 @@ PARAMETERS = (
         10.0,
     ),
     Parameter("servo.turn_speed", 0.5, "angular speed limit of servo/twist [rad/s]", 0.001, 20.0),
+    Parameter(
+        "servo.elbow",
+        "keep",
+        "what the elbow does in servo/twist and servo/pose: keep its angle, or keep the joints away from their limits",
+        choices=("keep", "center"),
+    ),
     Parameter("servo.linger", 0.5, "how long the servo motion stays open after a goal [s]", 0.0, 60.0),
     Parameter(
         "servo.lookahead", 0.004, "delay from a target to its motion, which is compensated [s]", 0.0, 0.5

@@ -15,7 +15,7 @@ from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
 from heptarm.model.kinematics import forward
-from heptarm.model.velocity import MARGIN, VelocityPath, joint_velocity, limited_twist
+from heptarm.model.velocity import MARGIN, Elbow, ElbowTask, VelocityPath, limited_twist, resolved_twist
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.values.arrays import Array, array
 from heptarm.values.condition.condition import Condition
@@ -25,8 +25,9 @@ from heptarm.values.result import Cause
 
 _log = logging.getLogger("heptarm.ros")
 
-#: A velocity command becomes a target this far ahead [s]; the cabinet keeps the velocity of a target for longer.
-_AHEAD = 0.05
+#: A velocity command becomes a target this far ahead [s]; the cabinet keeps the velocity of a target for longer, and then
+#: takes a while to brake.
+_AHEAD, _KEPT = 0.05, 0.2
 #: The first velocity command counts as if the one before had come so long ago [s].
 _FIRST = 0.02
 
@@ -57,6 +58,7 @@ class TargetStream:
         options: speed and acceleration limits.
         line_speed: along each axis of the base on straight lines, and of twists [m/s].
         turn_speed: of twists [rad/s].
+        elbow: of twists and poses, see `Arm.servo`.
     """
 
     def __init__(
@@ -67,15 +69,17 @@ class TargetStream:
         options: ServoOptions,
         line_speed: float = 0.25,
         turn_speed: float = 0.5,
+        elbow: Elbow = "keep",
     ) -> None:
         self._arm = arm
         self._timeout = timeout
         self._options = options
-        self._line_speed, self._turn_speed = line_speed, turn_speed
+        self._line_speed, self._turn_speed, self._elbow = line_speed, turn_speed, elbow
         self._clock = RealClock()
         self._lock = threading.RLock()
         self._servo: JointServo | PoseServo | None = None
         self._path: VelocityPath | None = None  # of the velocities of the open servo motion
+        self._task: ElbowTask | None = None  # of its twists
         self._last = 0
         self._guard: Condition | None = None
         self._blocked = ""  # what ended the last servo motion; setting a guard clears it
@@ -121,6 +125,7 @@ class TargetStream:
         """Move with joint velocities, shape (7,) [rad/s], slowed down in step to the limits of the robot."""
         command = array(dq, 7, "velocity")
         self._move(lambda _: command)
+        self._task = None
 
     def twist(self, twist: Array, frame: Literal["base", "flange", "tool"] = "base") -> None:
         """Move with a Cartesian velocity, scaled down to the limits; it slows down near singularities and joint limits.
@@ -133,8 +138,8 @@ class TargetStream:
         robot = self._arm.robot
         wanted = limited_twist(array(twist, 6, "twist"), self._line_speed, self._turn_speed)
 
-        def command(q: Array) -> Array:
-            flange = forward(robot, q)
+        def command(path: VelocityPath) -> Array:
+            flange = forward(robot, path.q)
             turn, point = np.eye(3), None
             if frame == "flange":
                 turn = flange[:3, :3]
@@ -144,12 +149,14 @@ class TargetStream:
                 tool = flange @ offset
                 turn, point = tool[:3, :3], tool[:3, 3]
             axes = np.concatenate([turn @ wanted[:3], turn @ wanted[3:]])
-            return joint_velocity(robot, q, axes, point)
+            if self._task is None:
+                self._task = ElbowTask(robot, path.q, elbow=self._elbow)
+            return resolved_twist(robot, path, axes, point, elbow=self._task)[0]
 
         self._move(command)
 
-    def _move(self, command_at: Callable[[Array], Array]) -> None:
-        """Move with the joint velocities [rad/s] that a function returns for the commanded positions [rad]."""
+    def _move(self, command_at: Callable[[VelocityPath], Array]) -> None:
+        """Move with the joint velocities [rad/s] that a function returns for the path so far."""
         with self._lock:
             robot, options = self._arm.robot, self._options
             before = self._servo
@@ -162,11 +169,13 @@ class TargetStream:
                     acceleration=options.acceleration * robot.ddq_max,
                     q_min=robot.q_min + MARGIN,
                     q_max=robot.q_max - MARGIN,
+                    reaction=_AHEAD + _KEPT,
                 )
+                self._task = None
                 self._last = now - round(_FIRST * 1e9)
             passed = min((now - self._last) * 1e-9, self._timeout)
             self._last = now
-            self._path.advance(command_at(self._path.q), passed)
+            self._path.advance(command_at(self._path), passed)
             servo.set(*self._path.target(_AHEAD))
             self._again = None
 
@@ -257,6 +266,8 @@ class TargetStream:
             "watchdog": self._timeout,
             "mode": options.mode,
         }
+        if kind == "pose":
+            settings["elbow"] = self._elbow
         if kind != "lin":
             one = options if limits is None else limits
             return settings | {"engine": "smart", "speed": one.speed, "acceleration": one.acceleration}

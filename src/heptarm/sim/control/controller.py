@@ -79,7 +79,7 @@ class ActiveLaw:
         if isinstance(mode, JointImpedance):
             if self.retune(mode):
                 return False
-            self._law, self._frames = JointImpedanceLaw(mode.stiffness, mode.damping), None
+            self._law, self._frames = JointImpedanceLaw(self._robot, mode.stiffness, mode.damping), None
         elif isinstance(mode, CartesianImpedance | SineImpedance):
             frame = mode.base.frame if isinstance(mode, SineImpedance) else mode.frame
             frames = (order.tcp, frame, order.axes)

@@ -143,6 +143,8 @@ SETTLE_TICKS = 500
 _T1 = OperationMode.T1
 #: Highest speed of the tool frame in T1 [m/s], slightly below the standard's 250 mm/s.
 REDUCED_SPEED = 0.249
+#: A change of the override that an axis cannot follow is halved so often.
+_HALVINGS = 10
 #: Jerk of a fast stop relative to that of a motion.
 FAST_JERK = 20.0
 
@@ -445,7 +447,7 @@ class Interpolator:
             self._halt(run)
             if run.follower is not None:
                 return self._follow_targets(run, run.follower)
-        step = TICK if run.braking else TICK * self._speed_override.factor
+        step = TICK if run.braking else self._step(run)
         if run.table is not None and not run.braking and self._follow_ahead(run, run.table, step):
             s = run.place
             return (nan if run.failure else planned.progress(s, run.part)), planned.duration - run.time
@@ -466,6 +468,35 @@ class Interpolator:
         else:
             self._follow_path(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
+
+    def _step(self, run: RunningMotion) -> float:
+        """By how much the motion's time grows in this tick [s]: no axis leaves its acceleration limit for the override.
+
+        The override changes along the path, whose curvature adds to the acceleration: as much of the change is made as
+        the axes can follow.
+        """
+        override, path, profile = self._speed_override, run.path, run.profile
+        step, last = TICK * override.factor, TICK * override.last_factor
+        if step == last or path is None or profile is None:
+            return step
+        command = self._command
+        straight = 2.0 * command.after - command.before
+        room = self._robot.ddq_max * TICK**2
+
+        def is_within(step: float) -> bool:
+            s = min(max(profile.at(run.time + step)[0], 0.0), 1.0)
+            return bool((np.abs(path.at(s, command.after) - straight) <= room).all())
+
+        try:
+            if is_within(step) or not is_within(last):
+                return step
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (step + last)
+                step, last = (step, middle) if is_within(middle) else (middle, last)
+        except Unreachable:  # reported where the set-point is made
+            return step
+        override.keep(last / TICK)
+        return last
 
     def _follow_ahead(self, run: RunningMotion, table: MotionTable, step: float) -> bool:
         """Take the next set-point from those that are computed ahead; False: there is none.

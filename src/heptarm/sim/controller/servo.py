@@ -6,17 +6,21 @@ SmartServoLIN does; all of them plan online with `OnlineTrajectory`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from math import atan2, cos, sin, sqrt
 
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
+from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import forward
 from heptarm.planning.command import DEFAULT_TIMING, TICK, Order
-from heptarm.planning.path import TcpInverseKinematics
+from heptarm.planning.geometry import Quat, product
 from heptarm.planning.seam import ServoTiming, StraightLimits
 from heptarm.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
+from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
@@ -57,6 +61,11 @@ class OnlineTrajectory:
         return self._plan is not None
 
     @property
+    def duration(self) -> float:
+        """Of the trajectory [s]; without one 0."""
+        return 0.0 if self._plan is None else self._plan.duration
+
+    @property
     def over(self) -> float:
         """Time since the end of the trajectory, negative before it [s]; without one infinite."""
         return float("inf") if self._plan is None else self.time - self._plan.duration
@@ -71,6 +80,12 @@ class OnlineTrajectory:
         assert self._plan is not None
         q, dq, ddq = self._plan.at_time(time)
         return np.array(q), np.array(dq), np.array(ddq)
+
+    def position(self, time: float) -> list[float]:
+        """Coordinates at a time [s]."""
+        assert self._plan is not None
+        place: list[float] = self._plan.at_time(time)[0]
+        return place
 
     def aim(self, state: OtgState, target: Array, *, speed: Array, minimum: float) -> bool:
         """Plan from a state to a target.
@@ -121,6 +136,11 @@ class OnlineTrajectory:
 _STEP = 1e-5
 #: Angles below it [rad] do not determine their axis.
 _TINY = 1e-9
+#: A target that no trajectory leads to yet is tried again after this time [s]; and these are the times of a trajectory
+#: after which the axes try to be at rest [s].
+_AGAIN, _STOPS = 0.01, (0.02, 0.05, 0.1, 0.2)
+#: An acceleration whose square is at most this times speed and jerk ends before the speed does.
+_SOONER = 1.9
 #: A velocity or acceleration perpendicular to the line that is smaller than this [m/s, rad/s, ...] is rounding.
 _ASIDE = 1e-6
 
@@ -162,8 +182,26 @@ class StraightServoLimits:
         return np.maximum(self.acceleration, default[1]), np.maximum(self.jerk, default[2])
 
 
+@dataclass(frozen=True, slots=True)
+class _Trajectory:
+    """A trajectory of the tool frame that is followed, and how fast.
+
+    Attributes:
+        otg: position and rotation from the centre over its own time, along the axes of the limits.
+        centre: orientation from which rotations are measured.
+        profile: rate of its time.
+    """
+
+    otg: OnlineTrajectory
+    centre: Quat
+    profile: RateProfile
+
+
 class StraightFollower:
-    """Follows poses of the tool frame on straight lines.
+    """Follows poses of the tool frame on straight lines, as fast as the axes can.
+
+    A trajectory is taken up only if all axes can brake on it before a limit; until then the last one goes on, which ends
+    at rest.
 
     Args:
         robot: the robot.
@@ -178,34 +216,28 @@ class StraightFollower:
         tcp = Pose.of(order.tcp[:3], order.tcp[3:])
         origin = Pose.from_matrix(forward(robot, here)) @ tcp
         limits = self._limits = StraightServoLimits.of(order)
-        self._inverse = TcpInverseKinematics(robot, here, tcp)
+        self._axes = AxisLimits(robot)
+        self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
+        self._inverse = PathInverse(robot, tcp)
         self._q = here.copy()
-        self._otg = OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
-        self._centre = origin.quat  # orientation from which rotations are measured
+        self._centre: Quat = tuple(origin.quat.tolist())  # orientation at rest
+        self._followed: _Trajectory | None = None
+        self._goal: Array | None = None  # that no trajectory leads to yet
+        self._waited = 0.0
         self._stopping = False
         self.resting = 0.0
 
     @property
     def remaining(self) -> float:
-        """Time until the target is reached [s]; NaN without a target."""
-        return self._otg.remaining
+        """Time until the target is reached, at full speed [s]; NaN without a target."""
+        return float("nan") if self._followed is None else self._followed.otg.remaining
 
     def aim(self, goal: Array, dq: Array | None = None) -> None:
         """Set the target pose of the tool frame in the base: x y z [m], quaternion x y z w; shape (7,)."""
-        if self._stopping:
-            return
-        place, turn, speed, change = self._state()
-        centre = self._turned(turn)
-        inward = self._limits.axes.T
-        target = np.concatenate([inward @ goal[:3], inward @ _between(centre, goal[3:])])
-        distance = target - _unrotated(place)
-        free = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
-        (velocity, acceleration, jerk), speed, change = _along(distance, free, speed, change)
-        self._otg.limit(acceleration, jerk, velocity=velocity)
-        start = (_unrotated(place), speed, change)
-        if self._otg.aim(start, target, speed=np.zeros(6), minimum=self._limits.timing.min_trajectory_time):
-            self._centre, self.resting = centre, 0.0
+        if not self._stopping:
+            self._goal = None if self._leads_to(goal) else goal
+            self._waited = 0.0
 
     def advance(self, dt: float) -> Array:
         """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad].
@@ -213,15 +245,19 @@ class StraightFollower:
         Raises:
             Unreachable: the line leaves the workspace.
         """
-        if not self._otg.has_begun:
+        self._waited += dt
+        if self._goal is not None and self._waited >= _AGAIN:
+            self.aim(self._goal)
+        one = self._followed
+        if one is None:
             self.resting += dt
             return self._q
-        self._otg.time += dt
-        self.resting = max(0.0, self._otg.over)
-        place, turn, _, _ = self._state()
-        x, y, z = (self._limits.axes @ place).tolist()
-        i, j, k, w = self._turned(turn).tolist()
-        self._q = self._inverse.joints((x, y, z), (i, j, k, w), self._inverse.e1, self._q)
+        otg = one.otg
+        otg.time = one.profile.advanced(otg.time, dt)
+        self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
+        self._q = self._joints(otg, one.centre, otg.time, self._q)
+        if not (one.profile.is_whole or self._stopping) and otg.time > one.profile.next_look:
+            self._look(one)
         return self._q
 
     def brake(self, *, scale: float, rate: float) -> None:
@@ -233,61 +269,145 @@ class StraightFollower:
         """
         if self._stopping:
             return
-        self._stopping = True
-        if not self._otg.has_begun:
+        self._stopping, self._goal = True, None
+        one = self._followed
+        if one is None:
             return
         place, turn, speed, change = self._state()
         speed, change = speed * scale, change * scale * scale + speed * rate
-        (acceleration, jerk), speed, change = _along(speed, self._limits.hardest, speed, change)
-        self._otg.limit(acceleration, jerk)
+        (acceleration, jerk), along, by = _along(speed, self._limits.hardest, speed, change)
+        otg = self._new_trajectory()
+        otg.limit(acceleration, jerk)
         centre = self._turned(turn)
-        if self._otg.halt((_unrotated(place), speed, change)):
-            self._centre = centre
+        if otg.halt((_unrotated(place), along, by)) and self._follow(otg, centre):
+            return
+        # the axes cannot brake that hard: as soon as they can, on the trajectory they follow
+        now = one.profile.at(one.otg.time)[0] * scale
+        for horizon in _STOPS:
+            profile = self._profile(one.otg, one.centre, rate=now, horizon=horizon)
+            if profile is not None:
+                self._followed = replace(one, profile=profile)
+                return
 
     @property
     def is_still(self) -> bool:
         """Whether a braked motion has come to rest."""
-        return self._stopping and self._otg.over >= 0.0
+        one = self._followed
+        return self._stopping and (
+            one is None or one.otg.over >= 0.0 or one.otg.time >= one.profile.times[-1]
+        )
 
-    def _turned(self, turn: Array) -> Array:
+    # ------------------------------------------------------------------------- trajectories ahead
+
+    def _leads_to(self, goal: Array) -> bool:
+        """Follow a trajectory to a target; False: from here the axes could not brake on it."""
+        place, turn, speed, change = self._state()
+        centre = self._turned(turn)
+        inward = self._limits.axes.T
+        target = np.concatenate([inward @ goal[:3], inward @ _between(centre, goal[3:])])
+        distance = target - _unrotated(place)
+        free = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
+        (velocity, acceleration, jerk), speed, change = _along(distance, free, speed, change)
+        otg = self._new_trajectory()
+        otg.limit(acceleration, jerk, velocity=velocity)
+        start = (_unrotated(place), speed, change)
+        minimum = self._limits.timing.min_trajectory_time
+        return otg.aim(start, target, speed=np.zeros(6), minimum=minimum) and self._follow(otg, centre)
+
+    def _follow(self, otg: OnlineTrajectory, centre: Quat) -> bool:
+        """Follow a trajectory from its start; False: the axes could not brake on it."""
+        profile = self._profile(otg, centre, rate=1.0)
+        if profile is None:
+            return False
+        self._followed, self.resting = _Trajectory(otg, centre, profile), 0.0
+        return True
+
+    def _look(self, one: _Trajectory) -> None:
+        """Look farther ahead; where that shows nothing better, the arm comes to rest where it was to."""
+        profile = self._profile(one.otg, one.centre, rate=one.profile.at(one.otg.time)[0])
+        if profile is not None:
+            self._followed = replace(one, profile=profile)
+
+    def _profile(
+        self, otg: OnlineTrajectory, centre: Quat, *, rate: float, horizon: float = HORIZON
+    ) -> RateProfile | None:
+        return self._axes.profile(
+            partial(self._joints, otg, centre),
+            self._q,
+            start=otg.time,
+            end=otg.duration,
+            rate=rate,
+            horizon=horizon,
+        )
+
+    def _new_trajectory(self) -> OnlineTrajectory:
+        return OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
+
+    def _joints(self, otg: OnlineTrajectory, centre: Quat, time: float, near: Array) -> Array:
+        """Joint positions at a time of a trajectory, next to others.
+
+        Raises:
+            Unreachable: there are none.
+        """
+        x, y, z, *turn = otg.position(time)
+        if self._turned_axes is not None:
+            x, y, z = (self._turned_axes @ (x, y, z)).tolist()
+            turn = (self._turned_axes @ turn).tolist()
+        i, j, k, w = _rotated(centre, turn)
+        return self._inverse.joints((x, y, z), (i, j, k, w), near)
+
+    def _turned(self, turn: Array) -> Quat:
         """Orientation at a rotation from the centre, quaternion."""
-        vector = self._limits.axes @ turn
-        angle = sqrt(float(vector @ vector))
-        if angle < _TINY:
-            return self._centre
-        return multiply((*(vector * (sin(angle / 2) / angle)).tolist(), cos(angle / 2)), self._centre)
+        centre = self._centre if self._followed is None else self._followed.centre
+        return _rotated(centre, (self._limits.axes @ turn).tolist())
 
     def _state(self) -> tuple[Array, Array, Array, Array]:
         """Position and rotation from the centre, shape (3,) each; velocity and acceleration, shape (6,)."""
-        if not self._otg.has_begun:
+        one = self._followed
+        if one is None:
             return self._place, np.zeros(3), np.zeros(6), np.zeros(6)
-        time = self._otg.time
-        x, v, a = self._otg.at(time)
+        otg, time = one.otg, one.otg.time
+        x, v, a = otg.at(time)
         if np.abs(np.cross(x[3:], v[3:])).max() < _TINY and np.abs(np.cross(x[3:], a[3:])).max() < _TINY:
             change = np.array(a[3:])  # about one axis; exact also where the acceleration has a kink
         else:
             low, high = max(0.0, time - _STEP), time + _STEP
-            change = (self._spin(high) - self._spin(low)) / (high - low)
-        return (
-            x[:3],
-            x[3:],
-            np.concatenate([v[:3], self._spin(time)]),
-            np.concatenate([a[:3], change]),
-        )
+            change = (_spin(otg, high) - _spin(otg, low)) / (high - low)
+        rate, growth = one.profile.at(time)
+        speed = np.concatenate([v[:3], _spin(otg, time)])
+        change = rate * rate * np.concatenate([a[:3], change]) + growth * speed
+        speed = rate * speed
+        # the axes may brake harder than the limits of the tool frame: what would turn the motion round is left out
+        braking = speed * change < -_TINY
+        if braking.any():
+            most = np.sqrt(_SOONER * np.abs(speed) * self._limits.jerk)
+            change = change * min(1.0, float((most[braking] / np.abs(change[braking])).min()))
+        return x[:3], x[3:], speed, change
 
-    def _spin(self, time: float) -> Array:
-        """Angular velocity at a time of the plan, shape (3,) [rad/s]."""
-        x, v, _ = self._otg.at(time)
-        turn, speed = x[3:], v[3:]
-        angle = sqrt(float(turn @ turn))
-        if angle < 1e-6:
-            almost: Array = speed + 0.5 * np.cross(turn, speed)
-            return almost
-        # left Jacobian of the rotation group, e.g. Sola et al., "A micro Lie theory", 2018, (145)
-        once = np.cross(turn, speed)
-        twice = np.cross(turn, once)
-        spin: Array = speed + (1.0 - cos(angle)) / angle**2 * once + (angle - sin(angle)) / angle**3 * twice
-        return spin
+
+def _rotated(centre: Quat, vector: Sequence[float]) -> Quat:
+    """A quaternion turned by a rotation vector in the base; plain floats, since every sample asks for it."""
+    x, y, z = vector
+    angle = sqrt(x * x + y * y + z * z)
+    if angle < _TINY:
+        return centre
+    part = sin(angle / 2) / angle
+    return product((x * part, y * part, z * part, cos(angle / 2)), centre)
+
+
+def _spin(otg: OnlineTrajectory, time: float) -> Array:
+    """Angular velocity at a time of a trajectory, shape (3,) [rad/s]."""
+    x, v, _ = otg.at(time)
+    turn, speed = x[3:], v[3:]
+    angle = sqrt(float(turn @ turn))
+    if angle < 1e-6:
+        almost: Array = speed + 0.5 * np.cross(turn, speed)
+        return almost
+    # left Jacobian of the rotation group, e.g. Sola et al., "A micro Lie theory", 2018, (145)
+    once = np.cross(turn, speed)
+    twice = np.cross(turn, once)
+    spin: Array = speed + (1.0 - cos(angle)) / angle**2 * once + (angle - sin(angle)) / angle**3 * twice
+    return spin
 
 
 def _unrotated(place: Array) -> Array:
@@ -295,9 +415,9 @@ def _unrotated(place: Array) -> Array:
     return np.concatenate([place, np.zeros(3)])
 
 
-def _between(start: Array, end: Array) -> Array:
+def _between(start: Quat, end: Array) -> Array:
     """Rotation vector from one orientation to another by the smaller angle, in the base, shape (3,) [rad]."""
-    x, y, z, w = multiply(end, start * (-1.0, -1.0, -1.0, 1.0)).tolist()
+    x, y, z, w = multiply(end, np.array(start) * (-1.0, -1.0, -1.0, 1.0)).tolist()
     length = sqrt(x * x + y * y + z * z)
     if length < _TINY:
         return np.zeros(3)

@@ -96,6 +96,15 @@ class SpeedOverride:
         self.scale *= cap
         self.rate *= cap
 
+    @property
+    def last_factor(self) -> float:
+        """The factor of the tick before."""
+        return self._before
+
+    def keep(self, factor: float) -> None:
+        """Replace the factor of the running tick: an axis cannot follow the change."""
+        self.factor = self.scale = self._free = factor
+
     def rest(self) -> None:
         """Motion time does not advance from now on; the motion begins again from rest."""
         self.factor = self.scale = self.rate = self._free = self._goal = self._before = 0.0

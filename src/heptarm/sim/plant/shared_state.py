@@ -135,7 +135,7 @@ class Trace:
 
     def __init__(self, shared: SharedState, path: Path) -> None:
         self._shared = shared
-        self._file = path.open("wb", buffering=1 << 18)
+        self._file = path.open("wb", buffering=0)  # readers see each tick at once
 
     def append(self) -> None:
         """Write the newest state; called after each tick."""

@@ -10,12 +10,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from heptarm.sim.plant.appearance import ArmMeshes, undress
+from heptarm.sim.plant.appearance import DRAWN_GROUP, HIDDEN_GROUP, ArmMeshes, undress
 from heptarm.sim.plant.carried import NO_TREES, CarriedShapes, make_room
 from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
-from heptarm.values.robot import robot
+from heptarm.values.robot import FLANGE_RADIUS, RobotModel, robot
 
 MODELS = Path(__file__).parents[1] / "models"
 #: Name of the camera of a model.
@@ -61,26 +61,54 @@ class Box:
 
 
 def specification(model: str, meshes: ArmMeshes | None = None) -> mujoco.MjSpec:
-    """MuJoCo's description of a robot: "iiwa7", "iiwa14", "med7" or "med14".
+    """MuJoCo's description of a robot: "iiwa7", "iiwa14", "med7" or "med14", with a media flange "iiwa14+touch".
 
-    The Med robots have the shapes of the iiwa ones, and the masses of their own links.
+    The Med robots have the shapes of the iiwa ones, and the masses of their own links. A media flange belongs to the
+    last link.
 
     Args:
         model: name of the robot.
         meshes: in which it is drawn; None: nobody looks, it has the shapes that meet others alone.
     """
-    spec = mujoco.MjSpec.from_file(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+    arm = robot(model)
+    spec = mujoco.MjSpec.from_file(str(MODELS / f"{arm.base_name.replace('med', 'iiwa')}.xml"))
     if meshes is None:
         undress(spec)
     else:
         meshes.dress(spec)
-    if model.startswith("med"):
-        links = robot(model).links
-        for index in range(7):
-            body, inertia = spec.body(f"link_{index + 1}"), links.inertia[index]
-            body.mass, body.ipos = links.mass[index], links.com[index]
-            body.fullinertia = (*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+    is_mounted = arm.flange.height > 0
+    # the file has the masses of an iiwa with a plain flange
+    for index in range(7) if arm.base_name.startswith("med") else (6,) if is_mounted else ():
+        body, inertia = spec.body(f"link_{index + 1}"), arm.links.inertia[index]
+        body.mass, body.ipos = arm.links.mass[index], arm.links.com[index]
+        body.fullinertia = (*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+    if is_mounted:
+        _mount_flange(spec, arm, is_drawn=meshes is not None)
     return spec
+
+
+def _mount_flange(spec: mujoco.MjSpec, arm: RobotModel, *, is_drawn: bool) -> None:
+    """Give the last link its media flange: the site, a shape that meets others, and a mesh for the eye."""
+    site = spec.site("flange")
+    bottom, top = float(site.pos[2]), float(arm.links.flange[2])
+    site.pos = arm.links.flange
+    site.parent.add_geom(
+        spec.find_default("arm"),
+        name="media flange",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        fromto=[0.0, 0.0, bottom, 0.0, 0.0, top],
+        size=[FLANGE_RADIUS, 0.0, 0.0],
+        material="dark",
+        group=HIDDEN_GROUP if is_drawn else 0,
+    )
+    if is_drawn:
+        turns = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        circle = FLANGE_RADIUS * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        rims = [np.column_stack([circle, np.full(len(circle), z)]) for z in (bottom, top)]
+        spec.add_mesh(name="media flange", uservert=np.concatenate(rims).ravel())
+        site.parent.add_geom(
+            spec.find_default("shown"), meshname="media flange", material="dark", group=DRAWN_GROUP
+        )
 
 
 def compiled(
@@ -133,7 +161,7 @@ def compiled(
         spec.option.disableflags |= NO_TREES
     if camera is not None:
         _add_camera(spec, camera)
-    return spec.compile()
+    return spec.compile() if scene is None else scene.compile(spec)
 
 
 def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:

@@ -14,7 +14,9 @@ from tempfile import TemporaryDirectory
 
 from heptarm import _resources
 from heptarm.errors import CommandRejected, MissingExtra
+from heptarm.sim.runtime import station
 from heptarm.sim.runtime.addresses import AddressMap
+from heptarm.values.files import read_bytes
 
 #: Every address stays.
 UNMAPPED = AddressMap({})
@@ -58,6 +60,7 @@ class Application:
         main: its class.
         classes: folder with all classes.
         project: the project's `RoboticsAPI.data.xml`; None: there is none.
+        station: the project's `StationSetup.cat`; None: there is none.
         background: classes of its background tasks.
         jars: its own libraries.
         left_out: why a class or a file of the project is missing beside the application.
@@ -66,6 +69,7 @@ class Application:
     main: str
     classes: Path
     project: Path | None
+    station: Path | None = None
     background: tuple[str, ...] = ()
     jars: tuple[Path, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -109,7 +113,7 @@ def _descendants(sources: list[Path], roots: tuple[str, ...]) -> list[str]:
 
 def read_source(file: Path) -> str:
     """Text of a Java source: UTF-8 with or without a byte order mark, otherwise windows-1252 as Workbench writes it."""
-    data = file.read_bytes()
+    data = read_bytes(file)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -205,6 +209,8 @@ def compile_application(
     chosen = _chosen(find(folder), main, folder)
     jars, tasks = _libraries(folder), background(folder)
     data = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
+    stations = [file for file in _sources(folder, "cat") if file.name == station.FILE]
+    found = stations[0] if stations else station.find_station(data or folder)
     left_out: list[str] = []
     with TemporaryDirectory(prefix="heptarm-sources-") as place:
         copies = _Copies(Path(place), folder, sources, addresses)
@@ -223,7 +229,7 @@ def compile_application(
                 except CommandRejected as error:
                     tasks = [task for task in tasks if task != name]
                     left_out.append(f"{name} is left out: {error.text}")
-    return Application(chosen, out, data, tuple(tasks), jars, tuple(left_out))
+    return Application(chosen, out, data, found, tuple(tasks), jars, tuple(left_out))
 
 
 def _full_name(source: Path, text: str) -> str:

@@ -23,6 +23,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, cast, get_args, get_type_hints
 
+from heptarm._resources import cabinet_sources
 from heptarm.errors import HeptarmError, without_java
 from heptarm.fri.protocol.version import Version
 from heptarm.io.keys import find_key
@@ -36,6 +37,7 @@ from heptarm.sim.plant.shared_state import PositionsFile, Trace
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
+from heptarm.sim.runtime.application import PROJECT
 from heptarm.sim.runtime.operator import LONGEST_WAIT, SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import (
     ANSWER_GAP,
@@ -45,7 +47,8 @@ from heptarm.sim.runtime.realtime_loop import (
     share_memory_pools,
 )
 from heptarm.sim.runtime.rest import Rest
-from heptarm.values.robot import robot
+from heptarm.sim.runtime.station import simulated_robot
+from heptarm.values.robot import RobotModel
 from heptarm.values.simulator_options import RealTime, SimulatorOptions, flag
 
 log = logging.getLogger("heptarm.sim")
@@ -98,12 +101,14 @@ def arguments(argv: list[str] | None = None) -> SimulatorOptions:
 
 
 def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
-    """Process data of the project, overridden by the command line; a value keeps its type in the project.
+    """Process data as `heptarm install-cabinet` writes them, overridden by the project and by the command line.
+
+    A value keeps its type in the project.
 
     Raises:
         ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
-    data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
+    data = project.read_process_data(cabinet_sources() / "project" / PROJECT)
     if options.project is not None:
         addresses = AddressMap.of(options.map)
         for name, value in project.read_process_data(options.project).items():
@@ -122,19 +127,32 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
 
 
 class VirtualCabinet:
-    """Plant, JVM and application of one process."""
+    """Plant, JVM and application of one process.
 
-    def __init__(self, options: SimulatorOptions, data: dict[str, project.Value]) -> None:
+    Args:
+        options: of the process.
+        data: process data of the application.
+        robot: that is simulated.
+        notes: what of the robot contradicts the project; reported with the readiness.
+    """
+
+    def __init__(
+        self,
+        options: SimulatorOptions,
+        data: dict[str, project.Value],
+        robot: RobotModel,
+        notes: tuple[str, ...] = (),
+    ) -> None:
         # the main thread starts the JVM before there are other threads
         from heptarm.sim.runtime import java_plant, jvm
 
-        self.options = options
+        self.options, self.notes = options, notes
         self.plant = Plant(
-            options.model,
+            robot.name,
             boxes=[Box.of(text) for text in options.box],
             scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
-            errors=sensor_errors(robot(options.model), options.sensors),
+            errors=sensor_errors(robot, options.sensors),
             limits=parse_safety(options.safety),
         )
         self.sessions = Sessions(
@@ -227,6 +245,11 @@ class VirtualCabinet:
     def is_observed(self) -> bool:
         """Whether clients may observe another application."""
         return self.is_foreign and self._server is not None
+
+    def ready(self) -> dict[str, Any]:
+        """What the line reports that says that it is ready."""
+        robot = self.plant.robot
+        return {"ready": True, "pid": os.getpid(), "model": robot.name, "notes": self.notes}
 
     def port(self) -> int:
         """The port that heptarm's application has opened, for clients or for observers.
@@ -368,15 +391,13 @@ def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[s
         failed.append(str(error))
         cabinet.loop.stop()
         return
-    options = cabinet.options
-    ready = {"ready": True, "host": options.host, "port": port, "pid": os.getpid(), "model": options.model}
-    print(json.dumps(ready), flush=True)
+    print(json.dumps(cabinet.ready() | {"host": cabinet.options.host, "port": port}), flush=True)
     _housekeeping(cabinet.loop, stopping)
 
 
 def _wait_for_application(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
     """Run until the foreign application ends."""
-    ready: dict[str, Any] = {"ready": True, "pid": os.getpid(), "model": cabinet.options.model}
+    ready = cabinet.ready()
     if cabinet.is_observed:
         try:
             ready["port"] = cabinet.port()
@@ -399,13 +420,14 @@ def main(argv: list[str] | None = None) -> int:
     options = arguments(argv)
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, stream=sys.stderr)
     try:
+        arm, notes = simulated_robot(options)
         data = process_data(options)
         for fault in options.fault:
             timed(fault)
         for text in options.box:
             Box.of(text)
         if options.scene:
-            compiled(options.model, (), Scene.of(options.scene))
+            compiled(arm.name, (), Scene.of(options.scene))
         if options.payload:
             parse_payload(options.payload)
         if options.drive_monitoring not in ("on", "off"):
@@ -421,7 +443,7 @@ def main(argv: list[str] | None = None) -> int:
     share_memory_pools()
     try:
         with batch_scheduled():
-            cabinet = VirtualCabinet(options, data)
+            cabinet = VirtualCabinet(options, data, arm, notes)
     except Exception as error:  # of the JVM, of a jar, of the machine: the parent prints it
         log.debug("the virtual cabinet does not start", exc_info=True)
         print(json.dumps({"ready": False, "error": _described(error), "host": True}), flush=True)

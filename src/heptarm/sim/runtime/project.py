@@ -4,29 +4,67 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TypeAlias
 from xml.etree import ElementTree
 
+from heptarm.errors import CommandRejected
+from heptarm.values.arrays import shown
+from heptarm.values.files import read_xml, unreadable
+
 Value = str | int | float | bool
 
+_WHAT, _HINT = "a project file", "give the file that Sunrise Workbench has written"
 _TRUTH = {"true": True, "false": False}
+#: Range of Java's Integer.
+_INTEGERS = range(-(2**31), 2**31)
 
 
 def _convert(kind: str, text: str) -> Value:
+    """A value of process data.
+
+    Raises:
+        ValueError: the text is not a value of its type.
+    """
     if kind == "java.lang.Integer":
-        return int(text)
+        try:
+            number = int(text)
+        except ValueError:
+            raise ValueError(f"an Integer must be a whole number, got {shown(text)}") from None
+        if number not in _INTEGERS:
+            raise ValueError(f"an Integer must be in [-2147483648, 2147483647], got {shown(text)}")
+        return number
     if kind == "java.lang.Double":
-        return float(text)
-    if kind == "java.lang.Boolean":
-        if text not in _TRUTH:
-            raise ValueError(f"a Boolean must be true or false, got {text!r}")
-        return _TRUTH[text]
+        return _finite(text, "a Double")
+    if kind == "java.lang.Boolean":  # Java ignores the case, and projects in the field have "False"
+        if text.lower() not in _TRUTH:
+            raise ValueError(f"a Boolean must be true or false, got {shown(text)}")
+        return _TRUTH[text.lower()]
     if kind == "java.lang.String":
         return text
     raise ValueError(
-        f"type of process data must be Integer, Double, Boolean or String of java.lang, got {kind}"
+        f"type of process data must be Integer, Double, Boolean or String of java.lang, got {shown(kind)}"
     )
+
+
+def _finite(text: str, what: str) -> float:
+    """A finite number.
+
+    Raises:
+        ValueError: it is none.
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise ValueError(f"{what} must be a finite number, got {shown(text)}")
+    return number
+
+
+def _unreadable(file: Path, why: str) -> CommandRejected:
+    return unreadable(file, why, what=_WHAT, name="project", hint=_HINT)
 
 
 def like(old: Value | None, text: str) -> Value:
@@ -43,13 +81,9 @@ def read_process_data(file: Path) -> dict[str, Value]:
     """Read the process data of a project file by their ids; without a value the default counts.
 
     Raises:
-        ValueError: the file is not XML, or a value does not fit its type.
-        OSError: the file cannot be read.
+        CommandRejected: the file cannot be read or is not XML, or a value does not fit its type.
     """
-    try:
-        root = ElementTree.fromstring(file.read_bytes())
-    except ElementTree.ParseError as error:
-        raise ValueError(f"{file} is not a project file: {error}") from error
+    root = read_xml(file, _WHAT, name="project", hint=_HINT)
     found: dict[str, Value] = {}
     for one in root.iter("processData"):
         name, kind = one.get("id"), one.get("dataType", "java.lang.String")
@@ -59,7 +93,7 @@ def read_process_data(file: Path) -> dict[str, Value]:
         try:
             found[name] = _convert(kind, text)
         except ValueError as error:
-            raise ValueError(f"{file}: process data {name}: {error}") from error
+            raise _unreadable(file, f"process data {shown(name)}: {error}") from None
     return found
 
 
@@ -118,20 +152,19 @@ def read_project(file: Path) -> Project:
     """Read the templates and frames of a project file.
 
     Raises:
-        ValueError: the file is not XML, or a number in it is illegal.
-        OSError: the file cannot be read.
+        CommandRejected: the file cannot be read or is not XML, or a number in it is illegal.
     """
+    root = read_xml(file, _WHAT, name="project", hint=_HINT)
     try:
-        root = ElementTree.fromstring(file.read_bytes())
         return Project(
             tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
             tuple(frame for world in root.iter("world") for frame in _frames(world, "")),
             tuple(one for world in root.iter("world") for one in _redundancies(world, "")),
         )
-    except ElementTree.ParseError as error:
-        raise ValueError(f"{file} is not a project file: {error}") from error
     except ValueError as error:
-        raise ValueError(f"{file}: {error}") from error
+        raise _unreadable(file, str(error)) from None
+    except RecursionError:
+        raise _unreadable(file, "its frames are nested too deeply") from None
 
 
 def _template(one: ElementTree.Element) -> Template:
@@ -177,7 +210,4 @@ def _redundancies(parent: ElementTree.Element, path: str) -> Iterator[tuple[str,
 
 def _number(element: ElementTree.Element, *names: str) -> float:
     text = next((element.get(name) for name in names if element.get(name) is not None), None)
-    try:
-        return float(text or 0.0)
-    except ValueError:
-        raise ValueError(f"{element.tag} {names[0]} must be a number, got {text!r}") from None
+    return _finite(text, f"{element.tag} {names[0]}") if text else 0.0

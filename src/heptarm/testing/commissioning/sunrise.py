@@ -10,9 +10,11 @@ import re
 from pathlib import Path
 
 from heptarm.arm.arm import Arm
+from heptarm.errors import CommandRejected
 from heptarm.testing.commissioning.person import Person
 from heptarm.testing.commissioning.step import Comparison, at_most, same, step
 from heptarm.testing.measure import Unfit
+from heptarm.values.files import read_text
 
 #: Names in the station setup, as public projects show them.
 _DEVICE = r"LBR_(iiwa|Med)_(7_R800|14_R820)_\d+"
@@ -33,9 +35,9 @@ def _facts(person: Person) -> dict[str, str]:
     if not name:
         raise Unfit("SunriseProbe has not run on this cabinet; see examples/sunrise/probe")
     try:
-        text = Path(name).expanduser().read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise Unfit(f"the file of SunriseProbe cannot be read: {error}") from None
+        text = read_text(Path(name).expanduser())
+    except CommandRejected as error:
+        raise Unfit(f"the file of SunriseProbe: {error.text}") from None
     found = dict(re.findall(r"^([\w.]+) = (.*?)\s*$", text, re.MULTILINE))
     if "probe" not in found:
         raise Unfit(f"{name} is no file of SunriseProbe: the line `probe = ...` is missing")

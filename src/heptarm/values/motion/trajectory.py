@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -11,12 +10,28 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, finite, finite_entries, frozen, instance, numbers, within
+from heptarm.values.arrays import (
+    Array,
+    Value,
+    finite,
+    finite_entries,
+    flag,
+    frozen,
+    instance,
+    numbers,
+    within,
+)
+from heptarm.values.files import path_of, read_arrays, refuse_existing, unreadable, unwritable
 from heptarm.values.motion.spline import JointSpline, spline_joints
+from heptarm.values.motion.table import read_table
 from heptarm.values.text import degrees, fixed, lines
 
 #: Marks a file as a trajectory, so that another .npz is not mistaken for one.
 FORMAT = "heptarm trajectory 1"
+_WHAT, _HINT = (
+    "a trajectory",
+    "`heptarm teach` and Trajectory.save write one; a table of joint positions ends in .csv",
+)
 #: Most points of a spline that the cabinet accepts.
 MOST_POINTS = 1000
 
@@ -169,38 +184,54 @@ class Trajectory(Value):
             )
         return spline_joints([*chosen[1:]], speed=speed)
 
-    def save(self, path: str | Path) -> Path:
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write a file, .npz; returns its path.
 
+        Args:
+            path: the file; another suffix is replaced by .npz.
+            overwrite: replace a file that exists.
+
         Raises:
-            OSError: the file cannot be written.
+            CommandRejected: the file exists, or cannot be written.
         """
-        file = Path(instance(path, (str, Path), "path")).with_suffix(".npz")
-        np.savez_compressed(file, format=FORMAT, times=self.times, q=self.q, robot=self.robot)
+        file = refuse_existing(path_of(path).with_suffix(".npz"), overwrite=flag(overwrite, "overwrite"))
+        try:
+            np.savez_compressed(file, format=FORMAT, times=self.times, q=self.q, robot=self.robot)
+        except OSError as error:
+            raise unwritable(file, error) from error
         return file
 
     @staticmethod
-    def load(path: str | Path) -> Trajectory:
-        """Read a file that `save` has written.
+    def load(path: str | Path, *, rate: float = 100.0) -> Trajectory:
+        """Read a file that `save` has written, or a table (.csv, .txt) of another program.
+
+        A table has seven columns of joint positions [rad], A1 to A7, and may have a column of times [s] before them. In
+        the first line their names may stand; of more columns those named q.A1 to q.A7 and t are taken.
+
+        Args:
+            path: the file.
+            rate: rows per second of a table that has no times [Hz].
 
         Raises:
-            OSError: the file does not exist or cannot be read.
-            CommandRejected: the file is no trajectory of heptarm.
+            CommandRejected: the file cannot be read or is neither; of a table the text has line and column.
         """
-        path = Path(instance(path, (str, Path), "path"))
+        file = path_of(path)
+        if file.suffix.lower() in (".csv", ".txt"):
+            rows = within(rate, "rate", 0.0, 10000.0, above=True, unit="Hz")
+            content = dict(zip(("times", "q"), read_table(file, rate=rows), strict=True))
+            robot = ""
+        else:
+            content = read_arrays(file, _WHAT, hint=_HINT)
+            for name in ("format", "times", "q", "robot"):
+                if name not in content:
+                    raise unreadable(file, f"the array {name!r} is missing", what=_WHAT, hint=_HINT)
+            if str(content["format"]) != FORMAT:
+                raise unreadable(file, f"its format is {content['format']}", what=_WHAT, hint=_HINT)
+            robot = str(content["robot"])
         try:
-            # numpy leaves a broken archive open that it has opened itself
-            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                if str(file["format"]) != FORMAT:
-                    raise ValueError(f"its format is {file['format']}")
-                return Trajectory.of(file["times"], file["q"], robot=str(file["robot"]))
-        except (KeyError, ValueError, zipfile.BadZipFile, EOFError) as error:
-            raise CommandRejected(
-                f"{path} is no trajectory: {error}",
-                parameter="path",
-                value=str(path),
-                hint="`heptarm teach` writes one",
-            ) from None
+            return Trajectory.of(content["times"], content["q"], robot=robot)
+        except CommandRejected as error:
+            raise unreadable(file, error.text, what=_WHAT, hint=_HINT) from None
 
 
 def _needed(along: Array, points: Array, tolerance: float) -> list[int]:

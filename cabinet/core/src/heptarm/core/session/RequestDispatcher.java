@@ -120,7 +120,7 @@ final class RequestDispatcher {
             if (request.rate > maxRate) {
                 throw new CommandRejected(Code.OUT_OF_RANGE, "rate", Double.toString(request.rate), "[0, " + maxRate + "] Hz",
                         "rate must be in [0, " + maxRate + "] Hz on this cabinet, got " + request.rate
-                                + " Hz; raise the process data heptarm.max_rate, or ask for less");
+                                + " Hz; ask for less, raise the process data heptarm.max_rate, or use FRI");
             }
             sampler.subscribe(client, request.groups, request.rate);
         } else if (message instanceof TakeControl) {

@@ -9,9 +9,9 @@ public final class HandGuiding {
     public double[] qMin = Seam.missing(7);
     /** NaN: the axis' own limit [rad] */
     public double[] qMax = Seam.missing(7);
-    /** NaN: unlimited [rad/s] */
+    /** NaN: half of each axis' maximum [rad/s] */
     public double jointVelocity = Double.NaN;
-    /** Of the motion frame; NaN: unlimited [m/s] */
+    /** Of the motion frame; NaN: 0.25 m/s [m/s] */
     public double cartesianVelocity = Double.NaN;
     public AtLimit atLimit = AtLimit.AXIS;
     public OutsideLimit outside = OutsideLimit.FREE;

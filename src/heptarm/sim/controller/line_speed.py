@@ -1,0 +1,232 @@
+"""How fast a trajectory of the tool frame may be followed, so that every axis stays within its limits.
+
+A trajectory over its own time is sampled ahead. The largest rate of that time, 1 at most, is found by reachability
+analysis (Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", 2018): it
+brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before the path ends.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt, tau
+from operator import le
+
+import numpy as np
+
+from heptarm.errors import Unreachable
+from heptarm.model.velocity import NEAREST
+from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel
+
+#: How far ahead a trajectory is looked at, in its own time, and the time between two samples where it is straight [s]; and
+#: the part of what was seen after which it is looked at again.
+HORIZON, _APART, _LOOK = 0.35, 0.07, 0.3
+#: Most samples: where more are needed, an axis is so slow that it needs to look less far ahead.
+_MOST = 80
+#: The same at the start, where the arm moves already.
+_FIRST = 1e-3
+#: Samples are so dense that the joints between two are near to the line between them: squares of twice the distance [rad²],
+#: and of its ratio to the step, which does not count below a smallest distance ...
+_BENT, _SLANT, _STILL = 1e-3**2, 0.05**2, 3e-6**2
+#: ... unless they would be nearer than this [s]: there the joints jump.
+_LEAST = 1e-6
+#: Fractions of an axis' speed and acceleration that are planned with; the rest is for what is between two samples.
+_SPEED, _GRIP = 0.985, 0.9
+#: The square of the rate at the start may exceed what the samples allow by this factor, and be so large at rest.
+_ROUNDING, _AT_REST = 1.02, 1e-6
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class RateProfile:
+    """Rate at which the time of a trajectory passes, over that time: its square is linear between samples.
+
+    Attributes:
+        times: samples of the trajectory's time, ascending [s].
+        squares: of the rate there.
+        is_whole: ends where the trajectory does, or where an axis could not go on.
+    """
+
+    times: list[float]
+    squares: list[float]
+    is_whole: bool
+
+    @property
+    def next_look(self) -> float:
+        """Time of the trajectory from which on it is to be looked at again, before the arm brakes at the end of this [s]."""
+        return self.times[0] + _LOOK * (self.times[-1] - self.times[0])
+
+    def at(self, time: float) -> tuple[float, float]:
+        """Rate and its change [1/s] at a time of the trajectory [s]."""
+        times, squares = self.times, self.squares
+        if time >= times[-1]:
+            return sqrt(squares[-1]), 0.0
+        k = max(1, bisect_right(times, time))
+        slope = (squares[k] - squares[k - 1]) / (times[k] - times[k - 1])
+        return sqrt(max(0.0, squares[k - 1] + slope * (time - times[k - 1]))), 0.5 * slope
+
+    def advanced(self, time: float, dt: float) -> float:
+        """Time of the trajectory after another `dt` seconds."""
+        rate, change = self.at(time)
+        end = rate + change * dt
+        if end < 0.0:  # it comes to rest before
+            return min(self.times[-1], time - 0.5 * rate * rate / change)
+        later = time + 0.5 * (rate + end) * dt
+        return later if self.squares[-1] > 0.0 else min(later, self.times[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    times: list[float]
+    q: list[Array]
+    is_open: bool  # the trajectory goes on
+    is_blocked: bool  # an axis could not go on
+
+
+class AxisLimits:
+    """Finds rate profiles of one robot.
+
+    Args:
+        robot: its limits hold.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._velocity, self._acceleration = _SPEED * robot.dq_max, _GRIP * robot.ddq_max
+        self._low, self._high = robot.q_min + NEAREST, robot.q_max - NEAREST
+
+    def profile(
+        self,
+        joints: Callable[[float, Array], Array],
+        here: Array,
+        *,
+        start: float,
+        end: float,
+        rate: float,
+        horizon: float = HORIZON,
+    ) -> RateProfile | None:
+        """The fastest profile from a time of a trajectory on.
+
+        Args:
+            joints: joint positions at a time [s], next to others, shape (7,) [rad]; Unreachable: there are none.
+            here: joint positions at the start, shape (7,) [rad].
+            start: time of the trajectory [s].
+            end: of the trajectory, which rests there [s].
+            rate: at the start.
+            horizon: the arm is at rest at the latest so far ahead [s].
+
+        Returns:
+            None: from that rate no axis could brake in time.
+        """
+        samples = self._samples(joints, here, start, min(end, start + horizon), end)
+        if len(samples.times) < 3:
+            return None
+        times, q = np.array(samples.times), np.array(samples.q)
+        gaps = np.diff(times)
+        slopes = np.diff(q, axis=0) / gaps[:, None]
+        first = np.empty_like(q)
+        second = np.empty_like(q)
+        before, after = gaps[:-1, None], gaps[1:, None]
+        first[1:-1] = (slopes[:-1] * after + slopes[1:] * before) / (before + after)
+        second[1:-1] = 2.0 * (slopes[1:] - slopes[:-1]) / (before + after)
+        second[0], second[-1] = second[1], second[-2]
+        first[0] = slopes[0] - 0.5 * gaps[0] * second[0]
+        first[-1] = slopes[-1] + 0.5 * gaps[-1] * second[-1]
+        rests = samples.is_open or samples.is_blocked
+        squares = self._fastest(first, second, gaps, rate * rate, 0.0 if rests else 1.0)
+        return None if squares is None else RateProfile(samples.times, squares, not samples.is_open)
+
+    def _fastest(
+        self, first: Array, second: Array, gaps: Array, begin: float, end: float
+    ) -> list[float] | None:
+        """Squares of the rate at the samples; None: there is no profile from the first one.
+
+        With z the square and u half its slope, an axis needs first u + second z of its acceleration.
+        """
+        sign = np.where(first < 0.0, -1.0, 1.0)
+        along, bend = np.abs(first) + _TINY, second * sign
+        free, taken = self._acceleration / along, bend / along
+        # some u has to be left between those that two axes need: -free_i - taken_i z <= u <= free_j - taken_j z
+        crossing = taken[:, None, :] - taken[:, :, None]
+        with np.errstate(divide="ignore"):
+            bound = np.where(
+                crossing > _TINY, (free[:, None, :] + free[:, :, None]) / np.maximum(crossing, _TINY), np.inf
+            ).min(axis=(1, 2))
+        bound = np.minimum(bound, ((self._velocity / along).min(axis=1)) ** 2)
+        most = np.minimum(bound, 1.0).tolist()
+        rows, turns = free.tolist(), taken.tolist()
+        steps = (2.0 * gaps).tolist()
+        # backwards: from which squares the end can be reached
+        most[-1] = min(most[-1], end)
+        for k in range(len(steps) - 1, -1, -1):
+            step, last = steps[k], most[k + 1]
+            inverse, then = 1.0 / step, last / step
+            most[k] = min(most[k], last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)))
+            for a, b in zip(rows[k], turns[k], strict=True):
+                if inverse > b:
+                    most[k] = min(most[k], (then + a) / (inverse - b))
+                elif b > inverse:
+                    most[k] = min(most[k], a / (b - inverse))
+        if begin > most[0] * _ROUNDING:
+            return None
+        # forwards: as fast as can be
+        squares = [begin]
+        for k, step in enumerate(steps):
+            z = squares[-1]
+            gain = min(a - b * z for a, b in zip(rows[k], turns[k], strict=True))
+            loss = max(-a - b * z for a, b in zip(rows[k], turns[k], strict=True))
+            for a, b in zip(rows[k + 1], turns[k + 1], strict=True):
+                if (share := 1.0 + b * step) > 0.0:
+                    gain, loss = min(gain, (a - b * z) / share), max(loss, (-a - b * z) / share)
+            squares.append(max(0.0, z + step * loss, min(most[k + 1], z + step * gain)))
+        return squares if squares[-1] <= end + _AT_REST else None
+
+    # ---------------------------------------------------------------------------------- sampling
+
+    def _samples(
+        self, joints: Callable[[float, Array], Array], here: Array, start: float, last: float, end: float
+    ) -> _Samples:
+        """Follow the trajectory as far as the axes can."""
+        low, high = np.minimum(self._low, here).tolist(), np.maximum(self._high, here).tolist()
+
+        def at(time: float, near: Array) -> Array | None:
+            """Joint positions within the limits; None: there are none."""
+            try:
+                q = joints(time, near)
+            except Unreachable:
+                return None
+            step = q - near
+            if step @ step > 1.0:  # a joint that passes half a turn goes on
+                q = q - tau * np.round(step / tau)
+            values = q.tolist()
+            return q if all(map(le, low, values)) and all(map(le, values, high)) else None
+
+        times, found = [start], [here]
+        count = max(1, round((last - start) / _APART))
+        # ends of intervals that are not sampled yet, with joint positions that may be known, the nearest one last
+        pending: list[tuple[float, Array | None]] = [
+            (time, None) for time in np.linspace(last, start, count, endpoint=False).tolist()
+        ]
+        if last - start > 2.0 * _FIRST:
+            pending.append((start + _FIRST, None))
+        while pending and len(times) < _MOST:
+            a, qa = times[-1], found[-1]
+            b, qb = pending[-1]
+            middle = 0.5 * (a + b)
+            qm = at(middle, qa)
+            if qm is not None and qb is None:
+                qb = at(b, qm)
+                pending[-1] = b, qb
+            if qm is not None and qb is not None:
+                bent, step = 2.0 * qm - qa - qb, qb - qa
+                square = bent @ bent
+                if square <= _STILL or (square <= _BENT and square <= _SLANT * (step @ step)):
+                    times += [middle, b]
+                    found += [qm, qb]
+                    pending.pop()
+                    continue
+            if b - a <= _LEAST:
+                return _Samples(times, found, False, True)
+            pending.append((middle, qm))
+        return _Samples(times, found, times[-1] < end, False)

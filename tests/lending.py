@@ -1,0 +1,219 @@
+"""Virtual cabinets that programs under test use one after the other, instead of starting one each.
+
+A test module lends them to the programs that it runs: in those, `connect("sim://iiwa14")` takes a cabinet that is
+free and of the same model and speed, and gives it back when the connection or the program ends. Then it is made as it
+was: nothing pressed, nothing attached, the arm at its first position. One that cannot be made so is ended, and the next
+program starts its own, as does one that asks for another option, or for a second arm.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+import heptarm as ha
+from heptarm.arm.link.local_simulator import READY_TIMEOUT, PrivateCabinet
+from heptarm.arm.link.target import Target
+
+ROOT = Path(__file__).resolve().parents[1]
+#: How a program takes part; put before it.
+PRELUDE = """
+import sys
+sys.path.append({root!r})
+from tests.lending import borrow
+borrow({address!r})
+sys.path.remove({root!r})
+"""
+
+
+def borrow(address: str) -> None:
+    """From now on private virtual cabinets of this program are those of a `Lender`, where it has one free."""
+    start = PrivateCabinet.start
+
+    def take(target: Target, *, key: str | None = None, timeout: float = READY_TIMEOUT) -> PrivateCabinet:
+        options = dict(target.options)
+        if key is None and not options.keys() - {"speed"}:
+            line = socket.socket(socket.AF_UNIX)
+            line.connect(address)
+            lent = Borrowed.take(line, target.model, float(options.get("speed", 1.0)))
+            if lent is not None:
+                return lent
+        return start(target, key=key, timeout=timeout)
+
+    PrivateCabinet.start = take  # type: ignore[method-assign,assignment]
+
+
+class Borrowed(PrivateCabinet):
+    """A cabinet of another process: what its operator does goes through there."""
+
+    def __init__(self, line: socket.socket, lines: Any, port: int, pid: int) -> None:
+        self.scene, self.positions, self.port, self.pid = "", None, port, pid
+        self._line, self._lines, self._asking = line, lines, threading.Lock()
+
+    @classmethod
+    def take(cls, line: socket.socket, model: str, speed: float) -> Borrowed | None:
+        """One that is free; None: there is none."""
+        lines = line.makefile("rw", encoding="utf-8")
+        given = _ask(lines, {"model": model, "speed": speed})
+        if given:
+            return cls(line, lines, given["port"], given["pid"])
+        lines.close()
+        line.close()
+        return None
+
+    @property
+    def is_running(self) -> bool:
+        return True
+
+    def operate(self, words: str) -> tuple[str, str]:
+        with self._asking:
+            error, shown = _ask(self._lines, {"operate": words})
+        return error, shown
+
+    def abandon(self) -> None:
+        """A fork of the program neither operates it nor gives it back."""
+
+    def close(self) -> None:
+        with self._asking:
+            if not self._lines.closed:
+                self._lines.close()
+                self._line.close()
+
+
+def _ask(lines: Any, question: Any) -> Any:
+    lines.write(json.dumps(question) + "\n")
+    lines.flush()
+    return json.loads(lines.readline())
+
+
+class Lender:
+    """Lends some cabinets, which it starts, until it is closed.
+
+    Args:
+        address: path of its socket.
+        speeds: one cabinet of each speed.
+    """
+
+    def __init__(self, address: Path, *speeds: float) -> None:
+        self.address = str(address)
+        self._changed = threading.Condition()
+        self._cabinets = {("iiwa14", speed): _Lent(speed) for speed in speeds}
+        self._server = socket.socket(socket.AF_UNIX)
+        self._server.bind(self.address)
+        self._server.listen()
+        self._threads = [threading.Thread(target=self._serve, name="lender", daemon=True)]
+        self._threads[0].start()
+
+    @property
+    def prelude(self) -> str:
+        """Put before a program that is to borrow."""
+        return PRELUDE.format(root=str(ROOT), address=self.address)
+
+    def __enter__(self) -> Lender:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._server.shutdown(socket.SHUT_RDWR)
+        self._server.close()
+        for thread in self._threads:
+            thread.join(30.0)
+        for lent in self._cabinets.values():
+            lent.cabinet.close()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                line, _ = self._server.accept()
+            except OSError:
+                return
+            thread = threading.Thread(target=self._lend, args=(line,), name="lending", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+
+    def _lend(self, line: socket.socket) -> None:
+        with line, line.makefile("rw", encoding="utf-8") as lines:
+
+            def answer(value: object) -> None:
+                lines.write(json.dumps(value) + "\n")
+                lines.flush()
+
+            asked = json.loads(lines.readline())
+            with self._taken(asked["model"], asked["speed"]) as lent:
+                if lent is None:
+                    answer(None)
+                    return
+                answer({"port": lent.cabinet.port, "pid": lent.cabinet.pid})
+                try:
+                    for question in lines:
+                        answer(lent.cabinet.operate(json.loads(question)["operate"]))
+                except OSError:
+                    pass  # the program was killed
+
+    @contextmanager
+    def _taken(self, model: str, speed: float) -> Iterator[_Lent | None]:
+        lent = self._cabinets.get((model, speed))
+        with self._changed:
+            if lent is not None:
+                self._changed.wait_for(lambda: not lent.is_tidied, 60.0)
+            if lent is None or lent.is_taken or lent.is_spoilt:
+                lent = None
+            else:
+                lent.is_taken = True
+        try:
+            yield lent
+        finally:
+            if lent is not None:
+                with self._changed:
+                    lent.is_tidied = True
+                lent.tidy()
+                with self._changed:
+                    lent.is_taken = lent.is_tidied = False
+                    self._changed.notify_all()
+
+
+class _Lent:
+    """A cabinet that is lent again and again."""
+
+    def __init__(self, speed: float) -> None:
+        self.cabinet = PrivateCabinet.start(Target(model="iiwa14", options=(("speed", f"{speed:g}"),)))
+        self.is_taken = self.is_tidied = self.is_spoilt = False
+        self.spoilt_by = ""
+        with self._connected() as arm:
+            self._first, self._known = arm.state.q, _known(arm)
+
+    def _connected(self) -> ha.Arm:
+        return ha.connect(f"sim://{self.cabinet.host}:{self.cabinet.port}", watchdog=10.0, timeout=30.0)
+
+    def tidy(self) -> None:
+        """Make it as it was, or end it."""
+        try:
+            for words in ("clear", "release", "aut", "override 1"):
+                self.cabinet.operate(words)
+            with self._connected() as arm:
+                arm.stop()
+                arm.recover(timeout=30.0)
+                arm.set_override(1.0)
+                arm.move(ha.ptp(self._first), speed=1.0)
+                known = _known(arm)
+            if known != self._known:
+                raise RuntimeError(f"it was left with {known}, not {self._known}")
+            assert np.abs(arm.state.q - self._first).max() < 1e-3
+        except Exception as error:
+            self.is_spoilt, self.spoilt_by = True, str(error)
+            self.cabinet.close()
+
+
+def _known(arm: ha.Arm) -> tuple[object, ...]:
+    """What a program can leave in a cabinet."""
+    welcome = arm.connection.welcome
+    return (welcome.tools, welcome.frames, {name: arm.io[name] for name in arm.io}, arm.state.tool)

@@ -1,0 +1,407 @@
+"""Analytic inverse kinematics of an LBR with KUKA's redundancy: arm angle E1, Status and Turn.
+
+Geometry after Shimizu, Kakuya, Yoon, Kitagaki, Kosuge, "Analytical Inverse Kinematic Computation for 7-DOF
+Redundant Manipulators With Joint Limits and Its Application to Redundancy Resolution", IEEE T-RO 24(5),
+2008, with KUKA's zero of the arm angle: E1 is the angle about the shoulder-wrist line away from the arm that
+reaches the wrist with A3 = 0 in the same Status. Status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0;
+bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, isnan, nan, pi, sin, sqrt
+from typing import TypeAlias
+
+import numpy as np
+from heptarm.model.null_space import events
+
+from heptarm.errors import ShapeError, Unreachable
+from heptarm.model.kinematics import Columns, Vec, flange
+from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
+from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.robot import RobotModel
+
+#: Rows of a rotation matrix.
+Rows: TypeAlias = tuple[Vec, Vec, Vec]
+
+#: Below it sin(b) does not determine the other two angles, and the wrist is neither before nor behind A1.
+SINGULAR = 1e-10
+_NARROW = 1e-9
+#: Largest step of the arm angle [rad] when the best of an interval is looked for.
+_STEP = pi / 36
+#: Where a solution is looked for when nothing is known: elbow down in front, wrist bent.
+_USUAL = (0.0, 0.3, 0.0, -pi / 2, 0.0, pi / 3, 0.0)
+_USUAL_STATUS = 2
+
+
+def rows(pose: Pose | Array) -> tuple[Rows, Vec]:
+    """Rotation rows and position of a pose or a homogeneous matrix, as floats."""
+    if not isinstance(pose, Pose):
+        given = finite_entries(numbers(pose, "pose", "a Pose or a matrix of shape (4, 4)"), "pose")
+        if given.shape not in ((4, 4), (3, 4)):
+            raise ShapeError(f"pose must have shape (4, 4), got {given.shape}", parameter="pose", value=pose)
+        m = given.tolist()
+    else:
+        m = pose.matrix.tolist()
+    return (tuple(m[0][:3]), tuple(m[1][:3]), tuple(m[2][:3])), (m[0][3], m[1][3], m[2][3])
+
+
+def _times(a: Rows, b: Rows) -> Rows:
+    (b00, b01, b02), (b10, b11, b12), (b20, b21, b22) = b
+    r = [
+        (
+            x * b00 + y * b10 + z * b20,
+            x * b01 + y * b11 + z * b21,
+            x * b02 + y * b12 + z * b22,
+        )
+        for x, y, z in a
+    ]
+    return r[0], r[1], r[2]
+
+
+def _transposed(a: Rows) -> Rows:
+    t = list(zip(*a, strict=True))
+    return t[0], t[1], t[2]
+
+
+def _about(u: Vec, angle: float) -> Rows:
+    """Rotation about the unit vector u (Rodrigues)."""
+    x, y, z = u
+    c, s = cos(angle), sin(angle)
+    k = 1.0 - c
+    return (
+        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
+        (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
+        (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
+    )
+
+
+def _zy(a: float, b: float) -> Rows:
+    """Rz(a) Ry(b)."""
+    ca, sa, cb, sb = cos(a), sin(a), cos(b), sin(b)
+    return (ca * cb, -sa, ca * sb), (sa * cb, ca, sa * sb), (-sb, 0.0, cb)
+
+
+def _wrap(angle: float) -> float:
+    return angle - 2 * pi if angle > pi else angle + 2 * pi if angle <= -pi else angle
+
+
+def _zyz(r: Rows, negative: bool, near: float) -> Vec:
+    """Angles a, b, c of r = Rz(a) Ry(b) Rz(c) with b of the wanted sign; where b is 0, a keeps `near`.
+
+    c comes from a + c = atan2(r10 - r01, r00 + r11), or where b is near pi from a - c, so that r is
+    reproduced to the last digits however little b determines a.
+    """
+    s = hypot(r[0][2], r[1][2])
+    upright = r[2][2] >= 0
+    if s < SINGULAR:
+        a, b = near, 0.0 if upright else -pi if negative else pi
+    elif negative:
+        a, b = atan2(-r[1][2], -r[0][2]), -atan2(s, r[2][2])
+    else:
+        a, b = atan2(r[1][2], r[0][2]), atan2(s, r[2][2])
+    if upright:
+        return a, b, _wrap(atan2(r[1][0] - r[0][1], r[0][0] + r[1][1]) - a)
+    return a, b, _wrap(a - atan2(-r[1][0] - r[0][1], r[1][1] - r[0][0]))
+
+
+def _reference(robot: RobotModel, w: Vec, q4: float, behind: bool) -> tuple[float, float]:
+    """A1 and A2 of the arm with A3 = 0 whose wrist is at w (from the shoulder)."""
+    radius = hypot(w[0], w[1])
+    q1 = atan2(w[1], w[0])
+    if behind:
+        q1, radius = q1 + pi, -radius
+    return q1, atan2(radius, w[2]) - atan2(-robot.d_ew * sin(q4), robot.d_se + robot.d_ew * cos(q4))
+
+
+def _elbow(robot: RobotModel, w: Vec) -> float:
+    """|A4| from the shoulder-wrist distance; half-angle form, accurate near the straight arm.
+
+    Raises:
+        Unreachable: the wrist is too far from or too near to the shoulder.
+    """
+    square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    far, near = robot.d_se + robot.d_ew, abs(robot.d_se - robot.d_ew)
+    above, below = far * far - square, square - near * near
+    if above < -1e-9 or below < -1e-9 or square < 1e-9:
+        raise Unreachable(
+            f"the wrist would be {sqrt(square):.3f} m from the shoulder; the {robot.title} reaches "
+            f"{max(near, 0.0):.3f} to {far:.3f} m",
+            code=51,
+            value=round(sqrt(square), 4),
+            allowed=f"[{near:.3f}, {far:.3f}] m",
+            hint="bring the target nearer, or change its orientation",
+        )
+    return 2.0 * atan2(sqrt(max(above, 0.0)), sqrt(max(below, 0.0)))
+
+
+def _wrist(robot: RobotModel, r: Rows, p: Vec) -> Vec:
+    """Wrist as seen from the shoulder."""
+    d = robot.d_wf
+    return (p[0] - d * r[0][2], p[1] - d * r[1][2], p[2] - d * r[2][2] - robot.d_bs)
+
+
+def raw(
+    robot: RobotModel,
+    r: Rows,
+    p: Vec,
+    e1: float,
+    status: int,
+    near: Sequence[float] | None = None,
+    *,
+    continuous: bool = False,
+) -> tuple[float, ...]:
+    """Joint positions of a flange pose for an arm angle and a Status; limits are not checked.
+
+    Args:
+        robot: the robot.
+        r: rows of the flange's rotation.
+        p: position of the flange in the base frame [m].
+        e1: arm angle [rad].
+        status: bit 0 selects the reference arm of E1; bits 0 and 2 select A2's and A6's branch, unless
+            `continuous`.
+        near: joint positions that decide where a singularity leaves a choice.
+        continuous: of the two branches of the shoulder and of the wrist take the one next to `near`, so that
+            a path may pass through A2 = 0 or A6 = 0.
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    w = _wrist(robot, r, p)
+    q4 = _elbow(robot, w)
+    if status & 2:
+        q4 = -q4
+    a1, a2 = _reference(robot, w, q4, bool(status & 1))
+    length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    r03 = _times(_about((w[0] / length, w[1] / length, w[2] / length), e1), _zy(a1, a2))
+    hint = near if near is not None else (a1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if continuous and near is not None:
+        shoulder = _next(_zyz(r03, False, hint[0]), _zyz(r03, True, hint[0]), hint[0], hint[1])
+    else:
+        shoulder = _zyz(r03, False, hint[0])
+        # bit 0: sign of the wrist's x in the frame of A1
+        ahead = w[0] * cos(shoulder[0]) + w[1] * sin(shoulder[0])
+        if abs(ahead) < SINGULAR:
+            same = cos(shoulder[0] - a1) > 0
+        else:
+            same = (ahead < 0) == bool(status & 1)
+        if not same:
+            shoulder = _zyz(r03, True, hint[0])
+    r47 = _times(_transposed(_times(r03, _zy(0.0, -q4))), r)
+    if continuous and near is not None:
+        wrist = _next(_zyz(r47, False, hint[4]), _zyz(r47, True, hint[4]), hint[4], hint[5])
+    else:
+        wrist = _zyz(r47, bool(status & 4), hint[4])
+    return (*shoulder, q4, *wrist)
+
+
+def _next(one: Vec, other: Vec, a: float, b: float) -> Vec:
+    """The branch whose first two angles are nearer to (a, b)."""
+
+    def distance(v: Vec) -> float:
+        return abs(_wrap(v[0] - a)) + abs(v[1] - b)
+
+    return one if distance(one) <= distance(other) else other
+
+
+def inside(robot: RobotModel, q: Sequence[float], tolerance: float = 1e-9) -> bool:
+    """Whether all joints are within their limits."""
+    return all(
+        low - tolerance <= value <= high + tolerance
+        for low, value, high in zip(robot.q_min.tolist(), q, robot.q_max.tolist(), strict=True)
+    )
+
+
+def status_of(robot: RobotModel, q: Sequence[float]) -> int:
+    """Status bits of a joint position."""
+    columns, p = flange(robot, q)
+    w = _wrist(robot, _rows(columns), p)
+    behind = w[0] * cos(q[0]) + w[1] * sin(q[0]) < -SINGULAR
+    return behind | (q[3] < 0) << 1 | (q[5] <= 0) << 2
+
+
+def _rows(columns: Columns) -> Rows:
+    x, y, z = columns
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+
+def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
+    """E1 [rad] of a joint position, against the reference arm of Status bit 0 = `behind`."""
+    columns, p = flange(robot, q)
+    w = _wrist(robot, _rows(columns), p)
+    length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    a1, a2 = _reference(robot, w, q[3], behind)
+    c, s = cos(q[2]), sin(q[2])
+    turned = _times(
+        _times(_zy(q[0], q[1]), ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), _transposed(_zy(a1, a2))
+    )
+    axial = (turned[2][1] - turned[1][2]) * w[0] + (turned[0][2] - turned[2][0]) * w[1]
+    axial += (turned[1][0] - turned[0][1]) * w[2]
+    return atan2(axial / length, turned[0][0] + turned[1][1] + turned[2][2] - 1.0)
+
+
+def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
+    """E1, Status and Turn of a joint position, shape (7,) [rad]."""
+    instance(robot, RobotModel, "robot")
+    values = array(q, 7, "q").tolist()
+    status = status_of(robot, values)
+    turn = sum((value < 0) << index for index, value in enumerate(values))
+    return Redundancy(arm_angle(robot, values, bool(status & 1)), status, turn)
+
+
+def intervals(robot: RobotModel, pose: Pose | Array, status: int) -> list[tuple[float, float]]:
+    """Arm angles at which a flange pose can be held in a Status within the joint limits.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base frame.
+        status: bits 0-2.
+
+    Returns:
+        Closed intervals of E1 [rad], ascending, the lower end in (-pi, pi]; one that passes through pi goes
+        on above it.
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    r, p = rows(pose)
+    return _intervals(instance(robot, RobotModel, "robot"), r, p, integer(status, "status", 0, 7))
+
+
+def _intervals(robot: RobotModel, r: Rows, p: Vec, status: int) -> list[tuple[float, float]]:
+    w = _wrist(robot, r, p)
+    q4 = _elbow(robot, w)
+    if status & 2:
+        q4 = -q4
+    if abs(q4) > robot.q_max[3] + 1e-9:
+        return []
+    u = np.array(w) / sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    reference = np.array(_zy(*_reference(robot, w, q4, bool(status & 1))))
+
+    def feasible(e1: float) -> bool:
+        return inside(robot, raw(robot, r, p, e1, status))
+
+    marks = events(robot, u, reference, np.array(r), q4)
+    if not marks:
+        return [(-pi, pi)] if feasible(0.0) else []
+    pairs = list(zip(marks, [*marks[1:], marks[0] + 2 * pi], strict=True))
+    found: list[tuple[float, float]] = []
+    for low, high in pairs:
+        if not feasible((low + high) / 2):
+            continue
+        if found and low - found[-1][1] <= _NARROW:
+            found[-1] = (found[-1][0], high)
+        else:
+            found.append((low, high))
+    # the last interval may end where the first begins, one turn on
+    if len(found) > 1 and found[0][0] + 2 * pi - found[-1][1] <= _NARROW:
+        first = found.pop(0)
+        found[-1] = (found[-1][0], first[1] + 2 * pi)
+    return found
+
+
+def solve(
+    robot: RobotModel,
+    pose: Pose | Array,
+    *,
+    e1: float | None = None,
+    status: int | None = None,
+    near: Sequence[float] | None = None,
+) -> Array:
+    """Solve the inverse kinematics: joint positions within the limits for a flange pose.
+
+    E1 and Status are kept if given; otherwise they are taken from `near` if that gives a solution within the limits. If
+    not, the result is the solution closest to `near` (by default a bent arm), in the same Status if possible, then in
+    any. If there is a solution within the limits, one is found.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base frame.
+        e1: arm angle [rad]; None or NaN: not given.
+        status: bits 0-2; None or -1: not given.
+        near: joint positions, shape (7,) [rad].
+
+    Returns:
+        Shape (7,) [rad].
+
+    Raises:
+        LimitError: a value is outside its range, such as Status 8.
+        Unreachable: no solution within the joint limits; the text names the cause.
+    """
+    instance(robot, RobotModel, "robot")
+    r, p = rows(pose)
+    hint = None if near is None else array(near, 7, "near").tolist()
+    given = Redundancy(nan if e1 is None else e1, -1 if status is None else status)
+    e1 = None if isnan(given.e1) else given.e1
+    wanted = status = None if given.status < 0 else given.status
+    if hint is not None:
+        own = redundancy(robot, hint)
+        wanted = own.status if status is None else status
+        candidate = raw(robot, r, p, own.e1 if e1 is None else e1, wanted, hint)
+        if inside(robot, candidate):
+            return np.array(candidate)
+    elif wanted is None:
+        wanted = _USUAL_STATUS
+    best = _nearest(robot, r, p, e1, [wanted], hint)
+    if best is None and status is None:
+        best = _nearest(robot, r, p, e1, [s for s in range(8) if s != wanted], hint)
+    if best is None:
+        fixed = " with that E1 or Status" if e1 is not None or status is not None else ""
+        raise Unreachable(
+            f"the pose is within reach, but every arm position that reaches it{fixed} violates a joint limit",
+            code=51,
+            hint="change the orientation" + (", or leave E1 and Status free" if fixed else ""),
+        )
+    return np.array(best)
+
+
+def _nearest(
+    robot: RobotModel, r: Rows, p: Vec, e1: float | None, states: Sequence[int], hint: Sequence[float] | None
+) -> tuple[float, ...] | None:
+    """The solution next to `hint`, each joint's distance counted in its range; None if there is none."""
+    goal = _USUAL if hint is None else hint
+    weights = (1.0 / (robot.q_max - robot.q_min) ** 2).tolist()
+
+    def distance(q: Sequence[float]) -> float:
+        return float(sum(w * (x - y) * (x - y) for w, x, y in zip(weights, q, goal, strict=True)))
+
+    found: list[tuple[float, ...]] = []
+    for status in states:
+        angles = [e1] if e1 is not None else _samples(_intervals(robot, r, p, status))
+        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status, hint)))
+    return min(found, key=distance, default=None)
+
+
+def _samples(spans: Sequence[tuple[float, float]]) -> list[float]:
+    """Arm angles from the insides of intervals: their ends lie on joint limits."""
+    result = []
+    for low, high in spans:
+        count = 1 + int((high - low) / _STEP)
+        result += [low + (high - low) * (i + 0.5) / count for i in range(count)]
+    return result
+
+
+def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None) -> list[Array]:
+    """Find solutions within the joint limits.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base frame.
+        e1: arm angle [rad]; None: the middle of each interval of arm angles.
+
+    Returns:
+        For an arm angle: one for each Status that has one, up to 8. Without: one for each interval of each
+        Status. Each has shape (7,) [rad].
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    instance(robot, RobotModel, "robot")
+    r, p = rows(pose)
+    e1 = None if e1 is None else finite(e1, "e1", unit="rad")
+    found: list[tuple[float, ...]] = []
+    for status in range(8):
+        angles = [(a + b) / 2 for a, b in _intervals(robot, r, p, status)] if e1 is None else [e1]
+        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status)))
+    return [np.array(q) for q in found]

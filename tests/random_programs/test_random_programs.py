@@ -1,0 +1,87 @@
+"""Random programs on one virtual cabinet, judged by the plant's own record.
+
+hypothesis makes the programs, prints the seed of a run that fails, and shrinks it to a short one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+
+import heptarm as ha
+from heptarm.arm.link import local_simulator
+from tests.long import longer
+from tests.random_programs.judge import Judge, Violation
+from tests.random_programs.programs import Step, programs, refusals
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(longer(600, 8 * 3600))]
+HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
+#: Simulated seconds per second: streams of this machine's clock have gaps, which is part of the test.
+SPEED = 10
+EXAMPLES = longer(150, 20_000)
+
+
+class Rig:
+    """A virtual cabinet with a record, and the arm of a client."""
+
+    def __init__(self, trace: Path) -> None:
+        start = local_simulator.PrivateCabinet.start
+
+        def recorded(target, **more):  # type: ignore[no-untyped-def]
+            return start(replace(target, options=(*target.options, ("trace", str(trace)))), **more)
+
+        local_simulator.PrivateCabinet.start = recorded  # type: ignore[method-assign]
+        try:
+            self.arm = ha.connect(f"sim://iiwa14?speed={SPEED}", watchdog=5.0, timeout=30.0, black_box=False)
+        finally:
+            local_simulator.PrivateCabinet.start = start  # type: ignore[method-assign]
+        self.judge = Judge(self.arm.robot, trace)
+
+    def restore(self) -> None:
+        """Bring the arm home, whatever a program has left."""
+        arm = self.arm
+        arm.operator.clear()
+        arm.operator.choose("aut")
+        recovery = arm.recover(timeout=30.0)
+        assert arm.connected and arm.in_control, recovery
+        arm.stop("fast")  # what recovery has resumed
+        arm.wait_for_rest(timeout=60.0)
+        arm.set_override(1.0)
+        arm.detach_tool()
+        arm.move(ha.ptp(HOME), speed=1.0)
+
+    def run(self, program: list[Step]) -> list[Violation]:
+        """Run a program from home; what the plant has shown meanwhile and on the way home."""
+        self.judge.skip()
+        for step in program:
+            with refusals():
+                step.run(self.arm)
+        self.restore()
+        assert np.abs(self.arm.state.q - HOME).max() < 1e-3
+        return self.judge.violations(
+            compliant=any(getattr(step, "mode", "position") != "position" for step in program)
+        )
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    made = Rig(tmp_path_factory.mktemp("record") / "plant.trace")
+    yield made
+    made.arm.close()
+
+
+@settings(
+    max_examples=EXAMPLES,
+    print_blob=True,
+    phases=(Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink),
+    suppress_health_check=list(HealthCheck),
+)
+@given(program=programs)
+def test_no_program_moves_the_arm_beyond_its_limits(rig: Rig, program: list[Step]) -> None:
+    found = rig.run(program)
+    assert not found, "\n".join(map(str, found))
