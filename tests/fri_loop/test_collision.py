@@ -97,7 +97,9 @@ def test_at_a_collision_both_loops_brake_and_name_the_joint(wire: Version, mode:
     sent = [one.q_sent for one in twins.pure.states[-100:]]
     assert np.ptp(sent, axis=0).max() == 0.0, "the arm stands, whatever is commanded"
     if mode is CommandMode.TORQUE:
-        assert not twins.pure.states[-1].tau_sent.any()
+        # this arm does not move when it is pushed: the guard of torques holds against what it takes for an unknown load
+        torques = [one.tau_sent for one in twins.pure.states[-100:]]
+        assert np.ptp(torques, axis=0).max() < 0.05, "whatever is commanded"
     twins.check()
 
 
