@@ -72,7 +72,7 @@ void fri_session_restart(struct session *s) {
     s->safety = ABSENT;
     s->period = s->received = s->waiting = s->sequence = 0;
     s->multiplier = 1;
-    s->reflected = -1;
+    s->reflected = s->sent - 1;
     s->began++;
 }
 
@@ -275,7 +275,7 @@ static int count(struct fri_loop *l, const struct message *m, word now) {
         return 0;
     }
     counts[COUNT_RESTARTS]++;
-    s->reflected = -1;
+    s->reflected = s->sent - 1; /* newest answer of this session that the controller has received */
     s->waiting = 0;
     s->began++;
     fri_report(l, KIND_RESTARTED, now, "the controller's counter restarts at %lld: a new session", (long long)m->sequence);
@@ -286,9 +286,10 @@ static int count(struct fri_loop *l, const struct message *m, word now) {
 /* Detect a change of command mode or safety state, and answers that the controller missed. */
 static void detect_changes(struct fri_loop *l, const struct message *m, word now) {
     struct session *s = &l->session;
-    if (0 <= s->reflected && s->reflected < m->reflected && m->reflected <= s->sent)
+    if (s->reflected < m->reflected && m->reflected <= s->sent) {
         l->header[H_COUNTS + COUNT_MISSED] += m->reflected - s->reflected - 1;
-    s->reflected = m->reflected;
+        s->reflected = m->reflected;
+    }
     if (m->safety != s->safety) {
         if (m->safety != ABSENT && (s->safety != ABSENT || m->safety != NORMAL_OPERATION))
             fri_report(l, KIND_SAFETY, now, "safety state %s", safety_names[m->safety]);

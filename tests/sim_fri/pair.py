@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from heptarm.fri.protocol import messages as m
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.faults import NONE, FaultyLink, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay

@@ -109,7 +109,7 @@ class Session:
         self.trouble = "no message received from a controller yet"
         self.received = 0  # time of the last message
         self.waiting = 0  # messages since the last answer
-        self.reflected = -1  # counter of the last answer that the controller has received
+        self.reflected = self.sent - 1  # newest answer of this session that the controller has received
         self._safety: m.Safety | None = None
         self._answers: Answers | None = None
 
@@ -363,7 +363,7 @@ class Session:
             self._report(Kind.REORDERED, f"message {sample.sequence} received after {last.sequence}", now)
             return False
         counts.restarts += 1
-        self.reflected, self.waiting = -1, 0
+        self.reflected, self.waiting = self.sent - 1, 0
         self._report(
             Kind.RESTARTED, f"the controller's counter restarts at {sample.sequence}: a new session", now
         )
@@ -378,9 +378,9 @@ class Session:
     def _detect_changes(self, sample: Sample, now: int) -> None:
         """Detect a change of command mode or safety state, and answers that the controller missed."""
         reflected = sample.message.header.reflected
-        if 0 <= self.reflected < reflected <= self.sent:
+        if self.reflected < reflected <= self.sent:
             self.counters.missed += reflected - self.reflected - 1
-        self.reflected = reflected
+            self.reflected = reflected
         safety = sample.robot.safety if sample.robot is not None else None
         if safety is not self._safety:
             if safety is not None and (self._safety is not None or safety is not m.Safety.NORMAL_OPERATION):

@@ -55,7 +55,6 @@ from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause, Result
 from heptarm.wire import messages as wire
-from heptarm.wire.codes import Code
 
 #: Longest wait for the end of a session, and for a message of an open one [s].
 _PATIENCE = 5.0
@@ -189,12 +188,13 @@ class Fri(Block):
             MotionAborted: the cabinet ended the motion, by a safety stop for instance.
             StreamError: the law raised an error, or the cabinet closed a monitoring session.
             CollisionDetected: the external torque of a joint left its band.
-            SafetyStop: the robot is in a safety stop.
+            SafetyStop: the block ends while a safety function stops the robot.
             ConnectionLost: the connection to the cabinet has ended.
         """
         if self._closed or self._client is None:
             return
         was_open = self._is_open
+        stop = self._safety_stop()
         hint = "" if was_open else advice(self.client, host=self._host)
         try:
             self._end()
@@ -209,14 +209,27 @@ class Fri(Block):
             raise self._collided(self._result)
         if self._law_error:
             raise StreamError(self._law_error, hint="the guard braked the arm within its limits")
+        if self.kind != "monitor" and (stop := stop or self._safety_stop()):
+            raise SafetyStop(
+                f"the FRI session ended in a safety stop: {stop}",
+                hint="remove its cause, then arm.recover(); arm.state.safety has the state",
+            )
         if self.kind == "monitor" and not was_open:
             raise self._connection.final_error() or self._early_end(None, hint)
-        if self.kind != "monitor" and (stop := self._stop) is not None:
-            raise SafetyStop(
-                f"the FRI session ended while the robot is in a safety stop ({stop.name})",
-                code=int(Code.SAFETY_STOP),
-                hint="clear its cause, then recover",
-            )
+
+    def _safety_stop(self) -> str:
+        """The safety stop in which the robot is, as text; empty: none is known."""
+        newest = self._connection.newest()
+        safety = None if newest is None else newest.groups.safety
+        if safety is not None and (
+            safety.emergency_stop or safety.operator_safety_open or safety.protective_stop
+        ):
+            return ", ".join(safety.stops)
+        with contextlib.suppress(HeptarmError):  # no message has arrived
+            found = self.client.state.safety
+            if found is not None and found is not Safety.NORMAL_OPERATION:
+                return found.name.lower().replace("_", " ")
+        return ""
 
     def _end(self) -> None:
         client, self._closed = self.client, True
@@ -253,12 +266,6 @@ class Fri(Block):
             history=self._connection.history(),
             hint="the guard braked the arm within its limits; check what the arm has hit",
         )
-
-    @property
-    def _stop(self) -> Safety | None:
-        """The safety stop in the last message; None: there is none."""
-        safety = self.client.state.safety if self.client.count else None
-        return None if safety is Safety.NORMAL_OPERATION else safety
 
     def _last_report(self) -> wire.FriChanged:
         """The cabinet's last report on this session."""

@@ -35,7 +35,7 @@ class Param(Value):
         low: smallest value, of the same shape; -inf: none.
         high: largest value, of the same shape; inf: none.
         above: `low` itself is not allowed.
-        unit: for errors.
+        unit: for errors, such as "Nm/rad".
         rate: largest change in a second, of the same shape; inf: a new value acts at once.
         nan: NaN is allowed.
         live: a running law's parameter can be changed.
@@ -66,7 +66,7 @@ class Param(Value):
         check: Check | None = None,
         name: str = "value",
     ) -> None:
-        made = _numbers(value, name)
+        made = _numbers(value, instance(name, str, "name"))
         bounds = {
             part: _like(given, made, f"{part} of {name}")
             for part, given in (("low", low), ("high", high), ("rate", rate))
