@@ -1,7 +1,7 @@
 """Declaration of a law's parameter: its range, its unit, and how fast it follows what a program sets.
 
 Every setter checks against it: making a law, opening its session, `rt.params`. The loop moves a parameter towards its
-new value at its rate before each call of the law (`hf_follow` of native/fri_loop.c), so a law in Python, Numba or C
+new value at its rate before each call of the law (`fri_follow` of native/fri_law.c), so a law in Python, Numba or C
 sees the same values.
 """
 
@@ -246,7 +246,7 @@ def rates(declared: Mapping[str, Param]) -> Array:
 
 @functools.cache
 def _follow() -> Callable[..., None]:
-    function = library(holds_gil=True).hf_follow
+    function = library(holds_gil=True).fri_follow
     pointer = ctypes.c_void_p
     function.argtypes = (pointer, pointer, pointer, ctypes.c_int64, ctypes.c_double)
     function.restype = None

@@ -675,6 +675,16 @@ class DirectFollower:
 Follower = SmartFollower | DirectFollower | StraightFollower
 
 
+def braking_axes(robot: RobotModel, here: Array, speed: Array, *, jerk: float = 1.0) -> SmartFollower:
+    """A follower whose axes brake, each by itself and as hard as it may; arguments as of `AxisStop`."""
+    limits = ServoLimits(
+        robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, _NO_TIMING
+    )
+    braking = SmartFollower(limits, here)
+    braking.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+    return braking
+
+
 class AxisStop:
     """Brakes every axis by itself: how a safety stop acts on a servo motion, which has no path to keep.
 
@@ -686,11 +696,7 @@ class AxisStop:
     """
 
     def __init__(self, robot: RobotModel, here: Array, speed: Array, *, jerk: float) -> None:
-        limits = ServoLimits(
-            robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, _NO_TIMING
-        )
-        self._stop = SmartFollower(limits, here)
-        self._stop.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+        self._stop = braking_axes(robot, here, speed, jerk=jerk)
 
     @property
     def is_over(self) -> bool:
