@@ -859,9 +859,10 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
         word off = received - l->received - l->period;
         count_duration(l, l->jitter, off < 0 ? -off : off);
     }
-    if (l->reflected >= 0 && (word)seen.reflected > l->reflected && (word)seen.reflected <= l->sent)
+    if ((word)seen.reflected > l->reflected && (word)seen.reflected <= l->sent) {
         counts[COUNT_MISSED] += (word)seen.reflected - l->reflected - 1;
-    l->reflected = (word)seen.reflected;
+        l->reflected = (word)seen.reflected;
+    }
     l->sequence = (word)seen.sequence;
     l->received = l->t_received = received;
     l->t_flags = l->t_answer = 0;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import nan
 
 import mujoco
 import numpy as np
@@ -12,8 +13,9 @@ import numpy.typing as npt
 from heptarm.fri.guard.joint_guard import JointGuard, Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.planning.command import Order
+from heptarm.planning.seam import Hold
 from heptarm.sim.control.laws import Superposition
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors
@@ -97,7 +99,7 @@ class Trial:
         dt = period * 1e-3
         joints.start(start.tolist(), [0.0] * 7, period=dt)
         guard.start()
-        plant.submit(Order(1, "hold", mode=JointImpedance(stiffness)))
+        plant.submit(MotionCommand(1, Hold(duration=nan), mode=JointImpedance(stiffness)))
         plant.step(50)
         set_point, tau, waiting = plant.snapshot.q_cmd, np.zeros(7), np.zeros(7)
         before = plant.snapshot.q

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.session.answers import Setpoint
 from heptarm.fri.session.session import Session
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.faults import NONE, FaultyLink, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay

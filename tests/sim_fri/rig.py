@@ -10,8 +10,7 @@ import numpy as np
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.codec import decode_monitoring, encode_command
 from heptarm.fri.protocol.version import Version
-from heptarm.planning.command import TICK_NS
-from heptarm.planning.seam import HeaderWords
+from heptarm.planning.seam import TICK_NS, HeaderWords
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading

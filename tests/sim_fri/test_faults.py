@@ -12,7 +12,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.codec import decode_monitoring
 from heptarm.fri.protocol.protobuf import MalformedMessage
 from heptarm.fri.protocol.version import Version, recognise
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.faults import NONE, FaultScenario, FaultyLink, LinkFaultCounts, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import OverlayEnded

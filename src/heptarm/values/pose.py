@@ -247,7 +247,11 @@ class Pose(Value):
         return 2.0 * math.atan2(float(np.linalg.norm(difference[:3])), abs(float(difference[3])))
 
     def displacement(self, other: Pose) -> Array:
-        """Way to another pose in the axes of the base: x y z [m] and the rotation vector of the smaller turn [rad], shape (6,)."""
+        """Way to another pose along and about the axes of the base, shape (6,).
+
+        Returns:
+            x y z [m], and the rotation vector of the smaller turn [rad].
+        """
         turn = Pose(np.zeros(3), multiply(other.quat, self.quat * np.array([-1.0, -1.0, -1.0, 1.0])))
         return np.concatenate([other.xyz - self.xyz, turn.rotvec])
 

@@ -139,7 +139,7 @@ class Session:
         self.trouble = "no message received from a controller yet"
         self.received = 0  # time of the last message
         self.waiting = 0  # messages since the last answer
-        self.reflected = -1  # counter of the last answer that the controller has received
+        self.reflected = self.sent - 1  # newest answer of this session that the controller has received
         self._safety: m.Safety | None = None
         self._reader: MonitoringReader | None = None
         self._answers: Answers | None = None
@@ -349,7 +349,7 @@ class Session:
             self._report(Kind.REORDERED, f"message {sample.sequence} received after {last.sequence}", now)
             return False
         counts.restarts += 1
-        self.reflected, self.waiting = -1, 0
+        self.reflected, self.waiting = self.sent - 1, 0
         self._report(
             Kind.RESTARTED, f"the controller's counter restarts at {sample.sequence}: a new session", now
         )
@@ -364,9 +364,9 @@ class Session:
     def _detect_changes(self, sample: Sample, datagram: bytes, now: int) -> None:
         """Detect a change of command mode or safety state, and answers that the controller missed."""
         reflected = reflected_in(datagram, framed=bool(self.version and self.version.traits.framed))
-        if 0 <= self.reflected < reflected <= self.sent:
+        if self.reflected < reflected <= self.sent:
             self.counters.missed += reflected - self.reflected - 1
-        self.reflected = reflected
+            self.reflected = reflected
         last = self.sample
         if last is None or sample.robot is not last.robot:
             safety = sample.robot.safety if sample.robot is not None else None
