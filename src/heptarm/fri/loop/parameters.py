@@ -12,7 +12,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -218,7 +218,7 @@ def declared(values: Mapping[str, object]) -> dict[str, Param]:
     return found
 
 
-def merged(known: Mapping[str, object], given: Mapping[str, object] | None) -> dict[str, Param]:
+def merged(known: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Param]:
     """Declarations of a law's parameters with other initial values, which have to fit them.
 
     Args:
