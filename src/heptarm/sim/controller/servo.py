@@ -258,7 +258,8 @@ class StraightFollower:
         self._elapsed += dt
         otg.time = one.profile.at(self._elapsed)[0]
         self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        before, self._q = self._q, self._joints(otg, one.centre, otg.time, self._q)
+        near = one.profile.near(otg.time)
+        before, self._q = self._q, self._joints(otg, one.centre, otg.time, near)
         if dt > 0.0:
             self._speed = (self._q - before) / dt
         if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
@@ -322,7 +323,8 @@ class StraightFollower:
             return False
         ahead = [self._q]
         for elapsed in profile.first_ticks:
-            ahead.append(self._joints(otg, centre, profile.at(elapsed)[0], ahead[-1]))
+            time = profile.at(elapsed)[0]
+            ahead.append(self._joints(otg, centre, time, profile.near(time)))
         if not self._axes.joins(scale * self._speed, *ahead):
             return False
         self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
