@@ -218,7 +218,7 @@ class StraightFollower:
         limits = self._limits = StraightServoLimits.of(order)
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
-        self._inverse = PathInverse(robot, tcp)
+        self._inverse, self._a3 = PathInverse(robot, tcp), float(here[2])
         self._q = here.copy()
         self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
@@ -364,7 +364,7 @@ class StraightFollower:
             x, y, z = (self._turned_axes @ (x, y, z)).tolist()
             turn = (self._turned_axes @ turn).tolist()
         i, j, k, w = _rotated(centre, turn)
-        return self._inverse.joints((x, y, z), (i, j, k, w), near)
+        return self._inverse.joints((x, y, z), (i, j, k, w), near, a3=self._a3)
 
     def _turned(self, turn: Array) -> Quat:
         """Orientation at a rotation from the centre, quaternion."""
