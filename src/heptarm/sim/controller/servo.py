@@ -221,7 +221,7 @@ class StraightFollower:
         limits = self._limits = StraightServoLimits.of(motion)
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
-        self._inverse = PathInverse(robot, frame)
+        self._inverse, self._a3 = PathInverse(robot, frame), float(here[2])
         self._q = here.copy()
         self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
@@ -261,7 +261,8 @@ class StraightFollower:
         self._elapsed += dt
         otg.time = one.profile.at(self._elapsed)[0]
         self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        before, self._q = self._q, self._joints(otg, one.centre, otg.time, self._q)
+        near = one.profile.near(otg.time)
+        before, self._q = self._q, self._joints(otg, one.centre, otg.time, near)
         if dt > 0.0:
             self._speed = (self._q - before) / dt
         if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
@@ -325,7 +326,8 @@ class StraightFollower:
             return False
         ahead = [self._q]
         for elapsed in profile.first_ticks:
-            ahead.append(self._joints(otg, centre, profile.at(elapsed)[0], ahead[-1]))
+            time = profile.at(elapsed)[0]
+            ahead.append(self._joints(otg, centre, time, profile.near(time)))
         if not self._axes.joins(scale * self._speed, *ahead):
             return False
         self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
@@ -365,7 +367,7 @@ class StraightFollower:
             x, y, z = (self._turned_axes @ (x, y, z)).tolist()
             turn = (self._turned_axes @ turn).tolist()
         i, j, k, w = _rotated(centre, turn)
-        return self._inverse.joints((x, y, z), (i, j, k, w), near)
+        return self._inverse.joints((x, y, z), (i, j, k, w), near, a3=self._a3)
 
     def _turned(self, turn: Array) -> Quat:
         """Orientation at a rotation from the centre, quaternion."""
