@@ -16,7 +16,8 @@
 static const double TOLERANCE = 5e-10;
 /* Squares of distances this far outside the reach are rounding errors [m2]. */
 static const double ON_REACH = 1e-9;
-/* Joints this far beyond a limit are on it; if nothing else reaches the pose, also at this distance: the noise of a measured pose. */
+/* Joints this far beyond a limit are on it; where the postures inside are far away, also at this distance: the noise of a measured
+   pose. */
 static const double ON_LIMIT = 1e-9, NEAR_LIMIT = 2e-5;
 /* Joints this far from 0, and the wrist this far from the plane of A1 [m], have both signs for Status: next to a posture, where a
    measured pose has noise, and alone. */
@@ -542,8 +543,8 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
         if (!request->is_fixed) offer_settled(&s, loose, 0);
     }
     if (!request->is_fixed && (!(s.least < INFINITY) || largest_move(s.q[choose(&s)], near) > LONG_WAY)) offer_sweep(&s);
-    if (s.least < INFINITY) return take(&s, s.q[choose(&s)], q);
-    return s.beyond_distance < INFINITY ? take(&s, s.beyond, q) : NO_POSTURE;
+    if (!(fmin(s.least, s.beyond_distance) < INFINITY)) return NO_POSTURE;
+    return take(&s, s.least <= PREFERENCE * s.beyond_distance + SAME ? s.q[choose(&s)] : s.beyond, q);
 }
 
 /* ---------------------------------------------------------------------------------------------------------- for Python */

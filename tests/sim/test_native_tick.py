@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from heptarm._library import SWITCH, Unavailable
-from heptarm.planning.native_inverse import inverse_library
 from heptarm.planning.seam import StateWords
 from heptarm.planning.table import ahead_library
 from heptarm.sim.controller.command import MotionCommand
@@ -50,12 +49,10 @@ def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         with monkeypatch.context() as patched:
             patched.setenv(SWITCH, "1")
             tick_library.cache_clear()
-            inverse_library.cache_clear()
             ahead_library.cache_clear()
             yield
     finally:
         tick_library.cache_clear()
-        inverse_library.cache_clear()
         ahead_library.cache_clear()
 
 

@@ -278,3 +278,26 @@ def test_resumed_before_it_rests_a_servo_motion_rests_and_then_goes_on(kind: str
     change = np.abs(np.diff(path, n=2, axis=0)) * 1e6
     assert (change <= plant.robot.ddq_max * 1.5).all(), "no jump"
     assert np.abs(plant.snapshot.q - target).max() < 1e-3
+
+
+@pytest.mark.parametrize(("target", "speed"), [(119.0, 1.2), (119.9, 2.0), (110.0, 2.0), (90.0, 2.0)])
+@pytest.mark.parametrize("acceleration", [0.2, 1.0])
+def test_a_target_that_is_passed_before_a_limit_leaves_room_to_brake(
+    target: float, speed: float, acceleration: float
+) -> None:
+    """As when the program that streams velocities dies beside a limit."""
+    plant, ear = Plant("iiwa14", q=tuple(np.radians([0, 30, 0, -90, 0, 80, 0]).tolist())), Ear()
+    plant.submit(
+        MotionCommand(
+            7,
+            motions.servo(joint_velocity=(1.0,) * 7, joint_acceleration=(acceleration,) * 7),
+            listener=ear,
+        )
+    )
+    plant.step(2)
+    plant.shared.post(7, np.radians([0, 30, 0, -90, 0, target, 0]), speed * np.eye(7)[5])
+    q = commands(plant, 2500)[:, 5]
+    rate = np.diff(q) * 1e3
+    assert np.radians(target) - 0.02 < q.max() <= plant.robot.q_max[5]
+    assert np.abs(np.diff(rate)).max() * 1e3 <= acceleration * plant.robot.ddq_max[5] * (1 + 1e-6)
+    assert abs(rate[-1]) < 1e-9 and ear.causes == ["started"]

@@ -26,7 +26,7 @@ from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.flange_check import flange_warning
 from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
-from heptarm.arm.link.connection import STATE_RATE, Connection
+from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import program
 from heptarm.arm.motion.foresight import Foresight
@@ -435,10 +435,11 @@ class ArmVerbs(Sealed):
             The state for which it held.
 
         Raises:
-            Timeout: it did not hold in time.
+            Timeout: it did not hold in time; the text names what stops the arm, if anything does.
+            SafetyStop: a safety stop began meanwhile, and a second later the condition still did not hold.
             ConnectionLost: the connection has ended.
         """
-        return self._wait_for(callback(condition, "condition"), timeout)
+        return self._wait_for(callback(condition, "condition"), timeout, StopWatch())
 
     def subscribe(self, *, rate: float = STATE_RATE, groups: Sequence[str] = GROUPS) -> None:
         """Choose the pushed states; a new choice replaces the old one.
@@ -453,10 +454,10 @@ class ArmVerbs(Sealed):
         """
         self._connection.subscribe(rate, groups)
 
-    def _wait_for(self, condition: Callable[[State], object], timeout: float) -> State:
+    def _wait_for(self, condition: Callable[[State], object], timeout: float, watch: StopWatch) -> State:
         seconds = check_timeout(timeout)
         with self._connection.stopping_on_interrupt():
-            return self._connection.wait_for(condition, seconds)
+            return self._connection.wait_for(condition, seconds, watch=watch)
 
     # ---------------------------------------------------------------------------------- motion
 
@@ -913,10 +914,11 @@ class ArmVerbs(Sealed):
         """Wait until nothing runs, nothing waits, and no axis turns.
 
         Raises:
-            Timeout: the arm does not come to rest in time.
+            Timeout: the arm does not come to rest in time; the text names what stops it, if anything does.
+            SafetyStop: a safety stop is active, so that what waits cannot begin.
             StaleState: the subscribed groups lack "joints" or "motion".
         """
-        return self._wait_for(RestDetector(self._connection), timeout)
+        return self._wait_for(RestDetector(self._connection), timeout, StopWatch(waits_for_rest=True))
 
     # -------------------------------------------------------------------------- tools and frames
 

@@ -969,7 +969,7 @@ _Redundancy_0 = Struct(">dii")
 class Redundancy:
     """Which arm posture reaches a pose."""
 
-    #: arm angle; NaN: keep the current one [rad]
+    #: E1, the angle of A3; NaN: keep the current one [rad]
     e1: float = nan
     #: -1: keep
     status: int = -1

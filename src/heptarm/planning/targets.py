@@ -13,10 +13,10 @@ from typing import TypeAlias
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model.inverse_kinematics import PathInverse, solve
+from heptarm.model.inverse_kinematics import PathInverse, inside, solve
 from heptarm.model.kinematics import forward
 from heptarm.planning import seam
-from heptarm.planning.composite_path import SegmentLimits, check_limits
+from heptarm.planning.composite_path import LARGEST_STEP, SegmentLimits, check_limits
 from heptarm.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
 from heptarm.planning.motion import (
     CARTESIAN_DEFAULT,
@@ -39,6 +39,10 @@ SplineSegment: TypeAlias = seam.Spl | seam.Lin | seam.Circ
 
 #: A path shorter than this [m or rad] does not move.
 STILL = 1e-7
+#: Cosine of half the angle between two orientations above which they are the same.
+_SAME_TURN = 0.99
+#: Samples of a path that tell whether the arm can follow it.
+_LOOKS = 101
 
 
 def pose_of(given: seam.Pose) -> Pose:
@@ -90,12 +94,14 @@ def _end(motion: PathMotion, origin: Pose) -> Pose:
 
 
 def e1_of(motion: PathMotion) -> float:
-    """Arm angle at its end [rad]; NaN: as at the start."""
+    """E1 at its end [rad]; NaN: as at the start."""
     return nan if isinstance(motion, seam.LinRel) else motion.redundancy.e1
 
 
-def geometry_of(robot: RobotModel, motion: PathMotion, start: Array, origin: Pose, tcp: Pose) -> Geometry:
-    """Path of the motion frame that begins at a pose.
+def geometry_of(
+    robot: RobotModel, motion: PathMotion, start: Array, origin: Pose, tcp: Pose, *, is_other: bool = False
+) -> Geometry:
+    """Path of the motion frame that begins at a pose; `is_other`: see `Slerp`.
 
     Raises:
         PlanError: there is no such arc, or no joint position at its end.
@@ -112,10 +118,11 @@ def geometry_of(robot: RobotModel, motion: PathMotion, start: Array, origin: Pos
     if isinstance(motion, seam.Circ):
         arc = Arc(origin.xyz, pose_of(motion.via).xyz, target.xyz)
         if turn is None:
-            return arc.oriented(origin.quat, target.quat, control)
+            return arc.oriented(origin.quat, target.quat, control, is_other=is_other)
         return arc.turning(turn, follows=False)
     if turn is None:
-        turn = Slerp(origin.quat, origin.quat if control.type == "constant" else target.quat)
+        end = origin.quat if control.type == "constant" else target.quat
+        turn = Slerp(origin.quat, end, is_other=is_other)
     return Straight(origin.xyz, target.xyz, turn)
 
 
@@ -125,21 +132,44 @@ def _joint_orientation(
     """The orientation as a PTP to the target would turn it."""
     place = target @ tcp.inverse()
     try:
-        end = PathInverse(robot, Pose()).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
+        inverse = PathInverse(robot, Pose.of((0.0, 0.0, 0.0)))
+        end = inverse.joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
     return JointOrientation(robot, start, end, tcp.quat)
 
 
 def cartesian_path(robot: RobotModel, motion: PathMotion, start: Array, tcp: Pose) -> CartesianPath:
-    """Path of a motion of the motion frame.
+    """Path of a motion of the motion frame; half a turn goes in the direction in which the arm can follow.
 
     Raises:
         PlanError: see `geometry_of`.
     """
     origin = Pose.from_matrix(forward(robot, start)) @ tcp
-    geometry, e1 = geometry_of(robot, motion, start, origin, tcp), e1_of(motion)
-    return CartesianPath(robot, start, geometry, tcp, None if isnan(e1) else e1)
+    e1 = None if isnan(e1_of(motion)) else e1_of(motion)
+    path, other = (
+        CartesianPath(
+            robot, start, geometry_of(robot, motion, start, origin, tcp, is_other=is_other), tcp, e1
+        )
+        for is_other in (False, True)
+    )
+    middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))
+    is_free = abs(float(middle @ middle_of_other)) < _SAME_TURN
+    return other if is_free and not _leads_on(robot, path, start) and _leads_on(robot, other, start) else path
+
+
+def _leads_on(robot: RobotModel, path: CartesianPath, start: Array) -> bool:
+    """Whether the arm can follow a path within its joint limits, by samples."""
+    near = start
+    for s in np.linspace(0.0, 1.0, _LOOKS)[1:].tolist():
+        try:
+            q = path.at(s, near)
+        except Unreachable:
+            return False
+        if float(np.abs(q - near).max()) > LARGEST_STEP or not inside(robot, q.tolist()):
+            return False
+        near = q
+    return True
 
 
 def programmed_speed(dynamics: seam.CartesianDynamics, path: CartesianPath) -> float:

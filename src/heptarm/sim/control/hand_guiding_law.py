@@ -13,12 +13,14 @@ import numpy as np
 
 from heptarm.planning.seam import HandGuide
 from heptarm.sim.control.cartesian_impedance import FlangeKinematics
-from heptarm.sim.control.laws import BRAKING, GUIDED, GUIDED_AXIS, STRICT, MeasuredState
+from heptarm.sim.control.laws import BRAKING, GUIDED, GUIDED_AXIS, MeasuredState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
 #: Decay rate of allowed velocities, so that the arm does not drift [1/s].
 CALM = 5.0
+#: Decay rate of excess velocities [1/s].
+STRICT = 600.0
 #: Highest speed limit of an axis, as a fraction of its maximum.
 ROOM = 0.9
 #: Fraction of an axis' acceleration assumed for stopping before a limit.

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from math import isnan
 from typing import Any, cast
 
 import jpype
@@ -234,7 +235,7 @@ class JavaPlant:
             found = solve(
                 self._plant.robot,
                 Pose.of(place[:3], place[3:]),
-                e1=float(e1),
+                e1=None if isnan(e1) else float(e1),
                 status=int(status),
                 near=_numbers(near),
             )

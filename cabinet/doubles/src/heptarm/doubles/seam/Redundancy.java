@@ -5,7 +5,7 @@ import heptarm.wire.Encoder;
 
 /** Which arm posture reaches a pose. */
 public final class Redundancy {
-    /** arm angle; NaN: keep the current one [rad] */
+    /** E1, the angle of A3; NaN: keep the current one [rad] */
     public double e1 = Double.NaN;
     /** -1: keep */
     public int status = -1;

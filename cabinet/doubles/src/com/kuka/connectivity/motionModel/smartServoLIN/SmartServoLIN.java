@@ -55,7 +55,7 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         return limit("maxOrientationAcceleration", radiansPerSecondSquared, acceleration, AXES, 1.0);
     }
 
-    /** Has no effect: the simulated arm keeps its arm angle, so it does not move in the null space. */
+    /** Has no effect: the simulated arm keeps A3, so it does not move in the null space. */
     public SmartServoLIN setMaxNullSpaceVelocity(double velocity) {
         positive("maxNullSpaceVelocity", velocity);
         return this;
