@@ -5,7 +5,7 @@ STAMPS := build/stamps
 # Hundreds of processes start here; without compiled bytecode each of them compiles the package for half a second.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup native cabinet demo test test-fast test-computing test-ros test-ros2 test-ros1 test-pythons test-long mutants conformance lint check bench soak figures lock docs \
+.PHONY: setup native sanitized cabinet demo test test-fast test-computing test-ros test-ros2 test-ros1 test-pythons test-long mutants conformance lint check bench soak figures lock docs \
 	wheel first-hour clean help
 
 ##@ To try it
@@ -105,11 +105,22 @@ test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searc
 	scripts/setup_rviz.sh
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance
+	@$(MAKE) --no-print-directory sanitized
 	@$(MAKE) --no-print-directory test-pythons
 	@$(MAKE) --no-print-directory mutants
 
 mutants: $(STAMPS)/venv native  ## a hundred slips in the core, of which the fast tests have to notice ninety; SEED=2 draws others
 	$(PY) -m tests.mutation --seed $(or $(SEED),1)
+
+# What runs in the process of the tests: FRI's loop in its own process uses the usual build.
+SANITIZED := tests/fri_loop/test_native.py tests/fri_loop/test_compiled.py tests/sim/test_native_tick.py \
+	tests/sim/test_table.py tests/model tests/transports/test_exchange.py
+
+sanitized: setup  ## the tests of the extension under ASan and UBSan
+	$(PY) scripts/native.py --sanitize
+	LD_PRELOAD="$$(cc -print-file-name=libasan.so) $$(cc -print-file-name=libubsan.so)" \
+		ASAN_OPTIONS=detect_leaks=0:handle_segv=0:verify_asan_link_order=0 UBSAN_OPTIONS=print_stacktrace=1 \
+		$(PY) -m pytest -q -p no:cacheprovider -p tests.sanitized $(SANITIZED)
 
 test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 3.13, and with the oldest packages; PYTHONS="3.10 lowest" selects
 	scripts/test_pythons.sh $(PYTHONS)

@@ -11,7 +11,7 @@
 
 enum { BODIES = 8 };
 
-/* Constants of a robot and of the load on its flange, in the order of `heptarm.laws.ready.constants`. */
+/* Constants of a robot and of the load on its flange, in the order of `heptarm.model.dynamics.rigid_bodies`. */
 struct robot {
     double origin[N][3], mass[N], com[N][3], inertia[N][6], flange[3];
     double load_mass, load_com[3], load_inertia[6];
@@ -134,43 +134,9 @@ static inline void gravity(const struct posture *p, const double *fall, double *
 
 /* Rotation vector from a rotation to that of a unit quaternion x y z w, base axes [rad]. */
 static inline void rotation_error(const double *turn, const double *quat, double *error) {
-    double x = quat[0], y = quat[1], z = quat[2], w = quat[3];
-    double goal[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z), 1 - 2 * (x * x + z * z),
-                      2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)};
-    double r[9]; /* goal turn' */
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) r[3 * i + j] = dot(goal + 3 * i, turn + 3 * j, 3);
-    double twice[3] = {r[7] - r[5], r[2] - r[6], r[3] - r[1]}, size = 0.5 * sqrt(dot(twice, twice, 3));
-    double angle = atan2(size, 0.5 * (r[0] + r[4] + r[8] - 1.0));
-    if (size < 1e-9 && angle > 1.0) { /* half a turn: the axis from the diagonal */
-        for (int k = 0; k < 3; k++) error[k] = angle * sqrt(fmax(0.0, 0.5 * (r[4 * k] + 1.0)));
-        return;
-    }
-    double scale = size < 1e-9 ? 0.5 : 0.5 * angle / size;
-    for (int k = 0; k < 3; k++) error[k] = scale * twice[k];
-}
-
-/* Unit quaternion x y z w of a rotation (Shepperd 1978). */
-static inline void quaternion(const double *r, double *quat) {
-    double trace = r[0] + r[4] + r[8];
-    int largest = 3;
-    double most = trace;
-    for (int k = 0; k < 3; k++)
-        if (r[4 * k] > most) most = r[4 * k], largest = k;
-    if (largest == 3) {
-        double w = 0.5 * sqrt(1.0 + trace), f = 0.25 / w;
-        quat[0] = (r[7] - r[5]) * f;
-        quat[1] = (r[2] - r[6]) * f;
-        quat[2] = (r[3] - r[1]) * f;
-        quat[3] = w;
-        return;
-    }
-    int i = largest, j = (i + 1) % 3, k = (i + 2) % 3;
-    double u = 0.5 * sqrt(1.0 + r[4 * i] - r[4 * j] - r[4 * k]), f = 0.25 / u;
-    quat[i] = u;
-    quat[j] = (r[3 * j + i] + r[3 * i + j]) * f;
-    quat[k] = (r[3 * k + i] + r[3 * i + k]) * f;
-    quat[3] = (r[3 * k + j] - r[3 * j + k]) * f;
+    double goal[9];
+    rotation(quat, goal);
+    turn_between(turn, goal, error);
 }
 
 #endif

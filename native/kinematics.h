@@ -1,6 +1,7 @@
-/* Kinematics of an LBR in C, as in heptarm.model: the tests compare them. Base axes, SI units.
+/* Kinematics of an LBR: the chain of its joints, its Jacobian, the wrench that explains torques. Base axes, SI units.
 
-   For the native loop and the ready laws. Jacobian and damped inverse as in Siciliano et al., "Robotics", 2009, chapter 3. */
+   heptarm.model, the paths of the simulator, its tick, the FRI loop and the ready laws share it. Jacobian and damped inverse as in
+   Siciliano et al., "Robotics", 2009, chapter 3. */
 #ifndef HEPTARM_KINEMATICS_H
 #define HEPTARM_KINEMATICS_H
 
@@ -27,6 +28,52 @@ static inline void rotate(const double *turn, const double *v, double *into) {
     into[2] = dot(turn + 6, v, 3);
     into[0] = x;
     into[1] = y;
+}
+
+/* Rotation vector from one rotation to another, rows, base axes [rad]. */
+static inline void turn_between(const double *from, const double *to, double *vector) {
+    double r[9]; /* to from' */
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) r[3 * i + j] = dot(to + 3 * i, from + 3 * j, 3);
+    double twice[3] = {r[7] - r[5], r[2] - r[6], r[3] - r[1]}, size = 0.5 * sqrt(dot(twice, twice, 3));
+    double angle = atan2(size, 0.5 * (r[0] + r[4] + r[8] - 1.0));
+    if (size < 1e-9 && angle > 1.0) { /* half a turn: the axis from the diagonal */
+        for (int k = 0; k < 3; k++) vector[k] = angle * sqrt(fmax(0.0, 0.5 * (r[4 * k] + 1.0)));
+        return;
+    }
+    double scale = size < 1e-9 ? 0.5 : 0.5 * angle / size;
+    for (int k = 0; k < 3; k++) vector[k] = scale * twice[k];
+}
+
+/* Rows of the rotation of a unit quaternion x y z w. */
+static inline void rotation(const double *quat, double *r) {
+    double x = quat[0], y = quat[1], z = quat[2], w = quat[3];
+    r[0] = 1 - 2 * (y * y + z * z), r[1] = 2 * (x * y - w * z), r[2] = 2 * (x * z + w * y);
+    r[3] = 2 * (x * y + w * z), r[4] = 1 - 2 * (x * x + z * z), r[5] = 2 * (y * z - w * x);
+    r[6] = 2 * (x * z - w * y), r[7] = 2 * (y * z + w * x), r[8] = 1 - 2 * (x * x + y * y);
+}
+
+/* Unit quaternion x y z w of a rotation (Shepperd 1978). */
+static inline void quaternion(const double *r, double *quat) {
+    double trace = r[0] + r[4] + r[8];
+    int largest = 3;
+    double most = trace;
+    for (int k = 0; k < 3; k++)
+        if (r[4 * k] > most) most = r[4 * k], largest = k;
+    if (largest == 3) {
+        double w = 0.5 * sqrt(1.0 + trace), f = 0.25 / w;
+        quat[0] = (r[7] - r[5]) * f;
+        quat[1] = (r[2] - r[6]) * f;
+        quat[2] = (r[3] - r[1]) * f;
+        quat[3] = w;
+        return;
+    }
+    int i = largest, j = (i + 1) % 3, k = (i + 2) % 3;
+    double u = 0.5 * sqrt(1.0 + r[4 * i] - r[4 * j] - r[4 * k]), f = 0.25 / u;
+    quat[i] = u;
+    quat[j] = (r[3 * j + i] + r[3 * i + j]) * f;
+    quat[k] = (r[3 * k + i] + r[3 * i + k]) * f;
+    quat[3] = (r[3 * k + j] - r[3 * j + k]) * f;
 }
 
 /* Move a frame, its rotation and its place, from link i - 1 to link i, whose joint is at `origin` in it; the joint's axis. */
@@ -94,6 +141,24 @@ struct chain {
     double origin[N][3], flange[3];
 };
 
+/* Axes and origins of the joints in a posture, and the frame of the flange: rotation by rows, place [m]. */
+struct frames {
+    double axis[N][3], origin[N][3], turn[9], place[3];
+};
+
+static inline void walk(const struct chain *chain, const double *q, struct frames *f) {
+    static const double start[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    double offset[3];
+    memcpy(f->turn, start, sizeof start);
+    memset(f->place, 0, sizeof f->place);
+    for (int i = 0; i < N; i++) {
+        advance(i, chain->origin[i], q[i], f->turn, f->place, f->axis[i]);
+        memcpy(f->origin[i], f->place, sizeof f->place);
+    }
+    rotate(f->turn, chain->flange, offset);
+    for (int k = 0; k < 3; k++) f->place[k] += offset[k];
+}
+
 /* What gives the wrench on the flange by the torques of the joints in a posture: the damped inverse of the transposed
    Jacobian, base axes. */
 struct wrench_map {
@@ -102,16 +167,11 @@ struct wrench_map {
 
 /* 0 if the damped square is not positive definite. */
 static inline int map_wrenches(const struct chain *chain, const double *q, struct wrench_map *map) {
-    double turn[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, place[3] = {0, 0, 0}, offset[3], axis[N][3], origin[N][3];
+    struct frames f;
     double j[6][N], factor[36], column[6];
     memcpy(map->q, q, sizeof map->q);
-    for (int i = 0; i < N; i++) {
-        advance(i, chain->origin[i], q[i], turn, place, axis[i]);
-        memcpy(origin[i], place, sizeof place);
-    }
-    rotate(turn, chain->flange, offset);
-    for (int k = 0; k < 3; k++) place[k] += offset[k];
-    jacobian(axis, origin, place, j);
+    walk(chain, q, &f);
+    jacobian(f.axis, f.origin, f.place, j);
     if (!damped_square(j, factor)) return 0;
     for (int i = 0; i < N; i++) {
         for (int r = 0; r < 6; r++) column[r] = j[r][i];

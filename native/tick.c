@@ -6,6 +6,7 @@
    bytes. */
 #include <math.h>
 
+#include "redundancy.h"
 #include "tick_layout.h"
 
 static void copy(double *to, const double *from, word count) {
@@ -82,88 +83,21 @@ word ht_strained(const struct tick *t, word stiff) {
     return 0;
 }
 
-struct frame {
-    double x[3], y[3], z[3];
-};
-
-static void mix(double *u, double *v, double c, double s) {
-    for (int i = 0; i < 3; i++) {
-        double a = u[i], b = v[i];
-        u[i] = c * a + s * b;
-        v[i] = c * b + -s * a;
-    }
-}
-
-static void turn_z(struct frame *f, double angle) { mix(f->x, f->y, cos(angle), sin(angle)); }
-
-static void turn_y(struct frame *f, double angle) { mix(f->x, f->z, cos(angle), -sin(angle)); }
-
-static void along(double *p, const double *direction, double length) {
-    for (int i = 0; i < 3; i++) p[i] = p[i] + length * direction[i];
-}
-
-/* Position and quaternion of the flange: `heptarm.model.kinematics.flange`. */
+/* Position and quaternion of the flange; of the two quaternions the one with w >= 0. */
 static void flange(const struct tick *t, const double *q, double *pose) {
-    struct frame f = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
-    double p[3] = {0.0, 0.0, t->d_bs}, n[4];
-    turn_z(&f, q[0]);
-    turn_y(&f, q[1]);
-    along(p, f.z, t->d_se);
-    turn_z(&f, q[2]);
-    turn_y(&f, -q[3]);
-    along(p, f.z, t->d_ew);
-    turn_z(&f, q[4]);
-    turn_y(&f, q[5]);
-    along(p, f.z, t->d_wf);
-    turn_z(&f, q[6]);
-    copy(pose, p, 3);
-    const double *x = f.x, *y = f.y, *z = f.z;
-    double xx = x[0], yy = y[1], zz = z[2], w = xx + yy + zz;
-    if (w >= xx && w >= yy && w >= zz) {
-        n[0] = y[2] - z[1], n[1] = z[0] - x[2], n[2] = x[1] - y[0], n[3] = 1.0 + w;
-    } else if (xx >= yy && xx >= zz) {
-        n[0] = 1.0 + xx - yy - zz, n[1] = x[1] + y[0], n[2] = x[2] + z[0], n[3] = y[2] - z[1];
-    } else if (yy >= zz) {
-        n[0] = x[1] + y[0], n[1] = 1.0 + yy - xx - zz, n[2] = y[2] + z[1], n[3] = z[0] - x[2];
-    } else {
-        n[0] = x[2] + z[0], n[1] = y[2] + z[1], n[2] = 1.0 + zz - xx - yy, n[3] = x[1] - y[0];
-    }
-    double scale = pow(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3], -0.5);
-    if (n[3] < 0.0) scale = -scale;
-    for (int i = 0; i < 4; i++) pose[3 + i] = n[i] * scale;
+    struct frames f;
+    walk(&((const struct arm *)t->arm)->chain, q, &f);
+    copy(pose, f.place, 3);
+    quaternion(f.turn, pose + 3);
+    for (int i = 0; i < 4 && pose[6] < 0.0; i++) pose[3 + i] = -pose[3 + i];
 }
 
-/* Arm angle and Status: `heptarm.sim.plant.plant.posture`. Returns 0 where the elbow does not determine the arm angle well. */
-static int posture(const struct tick *t, const double *q, double *e1, word *status) {
-    double q4 = q[3], s2 = sin(q[1]), c2 = cos(q[1]), s4 = sin(q4), c4 = cos(q4), d_se = t->d_se, d_ew = t->d_ew;
-    double x = -d_ew * s4 * cos(q[2]), y = -d_ew * s4 * sin(q[2]), z = d_se + d_ew * c4, turned = c2 * x + s2 * z;
-    z = c2 * z - s2 * x;
-    x = turned;
-    word behind = x < -t->on_axis;
-    *status = behind | (word)(q4 < 0.0) << 1 | (word)(q[5] <= 0.0) << 2;
-    double radius = sqrt(x * x + y * y);
-    if (fabs(s4) < t->straight || radius < t->on_axis) return 0;
-    double side = behind ? -radius : radius, a2 = atan2(side, z) - atan2(-d_ew * s4, d_se + d_ew * c4);
-    double sa = sin(a2), ca = cos(a2), ux = (x / side) * sa, uy = (y / side) * sa;
-    double length = sqrt(x * x + y * y + z * z);
-    double across = (x * uy * c2 + y * (ca * s2 - ux * c2) - z * uy * s2) / length;
-    double with_w = (x * ux + y * uy + z * ca) * (x * s2 + z * c2) / (length * length);
-    *e1 = atan2(across, ux * s2 + ca * c2 - with_w);
-    return 1;
-}
-
-/* Write a state into its slot of the shared memory; `ht_publish` has to follow. Returns ASK if the arm angle has to be
-   computed elsewhere: then nothing is written before the next call with that angle in `e1` and `has_e1` set. */
-word ht_write(struct tick *t, word tick, double progress, double remaining) {
+/* Write a state into its slot of the shared memory; `ht_publish` has to follow. */
+void ht_write(struct tick *t, word tick, double progress, double remaining) {
     const double *q = t->shown;
     word *words = t->memory + STATES + tick % SLOTS * SIZE;
-    double *reals = (double *)words, angle;
-    word status, turns = 0;
-    if (!posture(t, q, &angle, &status)) {
-        if (!t->has_e1) return ASK;
-        angle = t->e1;
-        t->has_e1 = 0;
-    }
+    double *reals = (double *)words;
+    word turns = 0;
     __atomic_store_n(words + SEQ, 2 * tick + 1, __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_SEQ_CST);
     words[TIME] = tick * TICK_NS;
@@ -180,16 +114,15 @@ word ht_write(struct tick *t, word tick, double progress, double remaining) {
     words[ORDER] = t->order;
     reals[PROGRESS] = progress;
     reals[REMAINING] = remaining;
-    reals[E1] = angle;
-    words[STATUS] = status;
+    reals[E1] = q[2];
+    words[STATUS] = hi_status(t->arm, q);
     for (int i = 0; i < AXES; i++) turns |= (word)(q[i] < 0.0) << i;
     words[TURN] = turns;
-    return DONE;
 }
 
 /* A tick in position control of an arm that nothing pushes, whose load data are true: `Plant.compute` after its set-point.
    Returns DONE, or what is left: ELSEWHERE: all of it; LOADED: from the wrench on; STRAINED: from the supervision of the
-   drives on; ASK: the state. */
+   drives on. */
 word ht_tick(struct tick *t, word tick, double progress, double remaining) {
     double slip[AXES];
     for (word i = 0; i < t->pulls; i++)
@@ -202,7 +135,8 @@ word ht_tick(struct tick *t, word tick, double progress, double remaining) {
     if (ht_sense(t)) return LOADED;
     for (int i = 0; i < 6; i++) t->wrench[i] = 0.0;
     if (t->ranges && ht_strained(t, 1)) return STRAINED;
-    return ht_write(t, tick, progress, remaining);
+    ht_write(t, tick, progress, remaining);
+    return DONE;
 }
 
 /* Position in a motion, 0 to 1, at a place on its path: `Plan.progress`. */

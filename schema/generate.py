@@ -16,12 +16,14 @@ import java
 import key_vectors
 import native
 import plant
+import process_data
 import python
 import sample_bodies
 import spec as schema
 
 ROOT = schema.HERE.parent
 JAVA = ROOT / "cabinet" / "core" / "src" / "heptarm" / "wire"
+APP = ROOT / "cabinet" / "app" / "src" / "heptarm" / "app"
 SEAM = ROOT / "cabinet" / "doubles" / "src" / "heptarm" / "doubles" / "seam"
 
 
@@ -44,6 +46,13 @@ def outputs() -> dict[Path, str]:
         ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",
+    }
+    settings, project = process_data.load(schema.HERE), ROOT / "cabinet" / "project"
+    guide = project / "INSTALL.md"
+    result |= {
+        project / "RoboticsAPI.data.xml": process_data.project(settings),
+        guide: process_data.table(settings, guide.read_text(encoding="utf-8")),
+        APP / "ProcessDefaults.java": process_data.java(settings),
     }
     seam = plant.load()
     result[ROOT / "src" / "heptarm" / "planning" / "seam.py"] = plant.python_module(seam)

@@ -11,7 +11,8 @@ import numpy as np
 from bench.measure.blocks import BLOCKS
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
-from heptarm.laws.ready import constants, shared_library
+from heptarm.laws.ready import shared_library
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.robot import ROBOTS
 
 #: Postures in a block.
@@ -25,7 +26,7 @@ def law_model() -> Iterator[Figure]:
     """M, C dq, g and J of one posture after another, with the call from Python."""
     robot = ROBOTS["iiwa14"]
     q = np.random.default_rng(7).uniform(robot.q_min, robot.q_max, (POSTURES, 7))
-    dq, known = np.linspace(-1.0, 1.0, 7), constants(robot)
+    dq, known = np.linspace(-1.0, 1.0, 7), rigid_bodies(robot, rotor=ROTOR)
     found = [np.zeros(shape) for shape in ((7, 7), 7, 7, (6, 7), 7)]
     compute = ctypes.CDLL(str(shared_library())).heptarm_model
     others = [ctypes.c_void_p(one.ctypes.data) for one in (dq, *found)]

@@ -161,6 +161,9 @@ from .fri.loop.compiled import (
 from .fri.loop.compiled import (
     law_from as law_from,
 )
+from .fri.loop.parameters import (
+    param as param,
+)
 from .record.fri_client import (
     record_client as record_client,
 )

@@ -16,13 +16,16 @@ class Unavailable(HeptarmError):
     """The compiled part is not available; the text gives the reason."""
 
 
-def extension_file() -> str:
+def extension_file(*, has_twin: bool = True) -> str:
     """Path of the extension.
+
+    Args:
+        has_twin: see `library`.
 
     Raises:
         Unavailable: it was not built, or is switched off.
     """
-    if os.environ.get(SWITCH):
+    if has_twin and os.environ.get(SWITCH):
         raise Unavailable(f"switched off by {SWITCH}")
     try:
         from heptarm import _native
@@ -35,16 +38,17 @@ def extension_file() -> str:
     return _native.__file__
 
 
-def library(*, holds_gil: bool = False) -> ctypes.CDLL:
+def library(*, holds_gil: bool = False, has_twin: bool = True) -> ctypes.CDLL:
     """The functions of the extension.
 
     Args:
         holds_gil: for short functions: they run without releasing Python's lock.
+        has_twin: another implementation in Python takes over where the extension is switched off.
 
     Raises:
         Unavailable: see `extension_file`.
     """
-    return _load(extension_file(), holds_gil)
+    return _load(extension_file(has_twin=has_twin), holds_gil)
 
 
 @functools.cache

@@ -14,7 +14,7 @@ import heptarm as ha
 from heptarm.values.condition.force import force
 from heptarm.values.condition.signals import path
 from heptarm.values.mode.compliance import compliance
-from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import HandGuiding, Position
 from heptarm.wire import messages as wire
 from tests.retry import answers_late, retry, starved
@@ -124,6 +124,33 @@ def test_led_precisely_along_one_axis(arm: ha.Arm) -> None:
     assert np.abs((end.xyz - start.xyz)[[0, 2]]).max() < 5e-3 and end.angle_to(start) < 0.02
     result = arm.guide_precisely("xy", frame="base", seconds=30.0, until=~(force > 1))
     assert result.cause is ha.Cause.CONDITION
+
+
+@pytest.mark.parametrize(
+    "mode",
+    [compliance("xyzabc"), CartesianImpedance(0.0, damping=0.1, nullspace_stiffness=0.0), None],
+    ids=["compliance", "raw", "hand_guide"],
+)
+def test_a_push_moves_a_guided_arm_within_bounds(arm: ha.Arm, mode: CartesianImpedance | None) -> None:
+    handle = arm.start(ha.hand_guide() if mode is None else ha.hold(60.0), mode=mode)
+    assert handle.wait_started(20.0)
+    if mode is None:
+        arm.operator.guide()
+    before = arm.wait_until(lambda state: state.motion.active).stamp
+    arm.operator.push([0, 0, 15], duration=2.0)
+    seen = [arm.wait_until(lambda state: np.abs(state.dq).max() > 0.05, timeout=30.0)]
+    for state in arm.states():
+        seen.append(state)
+        if (state.stamp - before) * 1e-9 > 2.5 or handle.done:
+            break
+    assert not handle.done
+    handle.cancel()
+    assert handle.wait(timeout=20.0).cause is ha.Cause.CANCELLED  # no drive error
+    fractions = np.array([np.abs(state.dq) / arm.robot.dq_max for state in seen])
+    moved = np.diff([state.pose.xyz for state in seen], axis=0)
+    passed = np.diff([state.stamp for state in seen]) * 1e-9
+    speed = np.linalg.norm(moved, axis=1)[passed > 0] / passed[passed > 0]
+    assert fractions.max() <= 0.55 and 0.1 < speed.max() <= 0.27
 
 
 # ------------------------------------------------------------------------------------------ contacts

@@ -16,6 +16,7 @@ import pytest
 import heptarm as ha
 from heptarm.arm.motion.jog import lag
 from heptarm.model import forward
+from heptarm.model.inverse_kinematics import arm_angle
 from heptarm.model.velocity import VelocityPath
 from tests.conftest import RunningCabinet
 
@@ -164,6 +165,42 @@ def test_a_rotation_turns_about_the_tool_and_axes_may_be_a_pose(arm: ha.Arm, sen
     assert max(tip.distance_to(start) for tip in tips) < 2e-3
     # to a target that comes late each axis goes on its own
     assert max(state.pose.distance_to(start) for state in seen) < 0.01
+
+
+def test_a_turn_of_the_tool_turns_a7_only_and_the_elbow_stays(arm: ha.Arm, sent: list[Target]) -> None:
+    with arm.servo("twist", frame="tool", speed=0.5, watchdog=2.0) as sv:
+        seen = jog(arm, sv, np.array([0, 0, 0, 0, 0, 0.4]), until=lambda state: state.q[6] > np.radians(40))
+        others = np.array([one.q_cmd for one in seen])[:, :6] - HOME[:6]
+        assert np.degrees(np.abs(others).max()) < 0.05
+        jog(arm, sv, np.array([0.05, 0.05, 0, 0.2, 0, 0]), until=1.0)
+        rest(arm, sv)
+    angle = np.degrees([arm_angle(arm.robot, HOME), arm_angle(arm.robot, sent[-1].q)])
+    assert abs(angle[1] - angle[0]) < 0.5
+
+
+def test_the_elbow_follows_a_posture_while_the_tool_stays(arm: ha.Arm) -> None:
+    posture = ha.deg(25, 32, -35, -90, 20, 60, -10)
+    with arm.servo("twist", posture=posture, speed=0.5, watchdog=2.0) as sv:
+        start = sv.start.pose
+        seen = jog(arm, sv, np.zeros(6), until=lambda state: abs(state.q[2] - posture[2]) < np.radians(8))
+        assert max(state.pose.distance_to(start) for state in seen) < 4e-3
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "word"),
+    [
+        ("lin", {"elbow": "keep"}, "elbow applies to"),
+        ("joint", {"posture": HOME}, "posture applies to"),
+        ("velocity", {"elbow": "center"}, "elbow applies to"),
+        ("twist", {"elbow": "up"}, "elbow must be"),
+        ("pose", {"elbow": "center", "posture": HOME}, "takes the place of elbow"),
+        ("twist", {"posture": [0.0] * 6}, "posture must"),
+        ("twist", {"posture": [0, 30, 0, -90, 0, 60, 0]}, "A2 must be in"),
+    ],
+)
+def test_what_no_elbow_can_do_is_refused(arm: ha.Arm, kind: Any, settings: dict, word: str) -> None:
+    with pytest.raises(ha.CommandRejected, match=word):
+        arm.servo(kind, **settings)
 
 
 def test_a_joint_stops_before_its_limit_which_is_never_passed(arm: ha.Arm) -> None:

@@ -59,19 +59,29 @@ def test_a_target_is_reached_and_passed_with_a_velocity(arm: ha.Arm) -> None:
     assert sv.stats.refused == 0
 
 
-def test_poses_are_followed_and_one_out_of_reach_is_refused_but_reported(arm: ha.Arm) -> None:
+def test_poses_are_followed_and_one_out_of_reach_is_not_sent_but_reported(arm: ha.Arm) -> None:
     with arm.servo("pose", rate=50, speed=0.5, acceleration=1.0, watchdog=2.0) as sv:
         start = sv.start.pose
         goal = ha.Pose.of(start.xyz + [0.0, 0.08, -0.05], start.quat)
         while sv.tick() and sv.t < 20.0 and arm.state.pose.distance_to(goal) > 1e-3:
             sv.set(goal)
         assert arm.state.pose.distance_to(goal) < 1e-3
-        while (
-            sv.tick() and sv.t < 20.0 and sv.stats.refused == 0
-        ):  # of two that arrive together the newer one counts
-            sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
+        sv.tick()
+        assert sv.set(ha.Pose.of([3.0, 0, 0], start.quat)) == goal, "the last good one is sent again"
+        assert sv.stats.slowdown.factor == 0.0 and sv.stats.slowdown.reason
         sv.set(goal)
-    assert sv.stats.refused > 0 and "not reachable" in sv.stats.text
+    assert sv.stats.held == 1 and sv.stats.refused == 0 and sv.stats.slowdown.factor == 1.0
+
+
+def test_a_pose_beyond_a_limit_names_the_axis(arm: ha.Arm) -> None:
+    arm.move(ha.ptp(ha.deg(0, 90, 0, -60, 0, 118, 0)))
+    with arm.servo("pose", rate=50, watchdog=2.0) as sv:
+        here = sv.start.pose
+        angle = 0.0
+        while sv.tick() and sv.stats.held == 0 and angle < np.pi:
+            angle += np.radians(2)
+            sv.set(here @ ha.Pose.xyz_abc(0, 0, 0, 0, angle, 0))
+        assert "limit of A" in sv.stats.slowdown.reason
 
 
 def test_a_target_behind_a_limit_is_brought_back_to_it(arm: ha.Arm) -> None:

@@ -45,6 +45,22 @@ def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
     assert np.linalg.norm(off - np.outer(off @ travel, travel), axis=1).max() < 2e-3
 
 
+def test_before_a_limit_it_rests_on_its_line_and_says_which_axis(arm: ha.Arm) -> None:
+    arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 105, 0)))
+    with arm.servo("lin", rate=50, speed_radps=1.0, acceleration_radps2=4.0, watchdog=2.0) as sv:
+        start = sv.start.pose
+        goal = start @ ha.Pose.xyz_abc(0, 0, 0, 0, np.radians(45), 0)
+        while sv.tick() and sv.t < 30.0 and sv.stats.slowdown.factor > 0.02:
+            sv.set(goal)
+        assert sv.stats.slowdown.reason == "limit of A6" and "limit of A6" in str(sv.stats)
+        limit = arm.robot.q_max[5]
+        assert limit - 5e-3 < arm.state.q_cmd[5] < limit
+        while sv.tick() and sv.t < 60.0 and not _there(arm.state.pose, start):
+            sv.set(start)
+        assert _there(arm.state.pose, start) and sv.active
+    assert sv.result is not None and sv.result.cause is ha.Cause.CANCELLED
+
+
 def test_a_straight_servo_is_compliant_and_renewed_after_its_time_out(arm: ha.Arm) -> None:
     compliant = CartesianImpedance((1500.0,) * 3 + (150.0,) * 3, damping=0.7)
     with arm.servo("lin", watchdog=2.0, goal_timeout=0.1, mode=compliant, speed_mps=0.2) as sv:

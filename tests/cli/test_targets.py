@@ -85,6 +85,7 @@ def test_commands_add_list_and_remove(tmp_path: Path) -> None:
         "key": str(file),
         "tool": "",
         "speed": 0.3,
+        "flange": "",
         "last_used": None,
     }
     assert "last used: never" in run("targets", "list").stdout

@@ -88,7 +88,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path, text: str) -> None:
     file.write_text(text)
     with pytest.raises(CommandRejected, match="wrong.jsonl"):
         devices.recorded(file)
-    with pytest.raises(CommandRejected, match="No such file"):
+    with pytest.raises(CommandRejected, match="no such file"):
         devices.recorded(tmp_path / "missing.jsonl")
-    with pytest.raises(CommandRejected, match="No such file"):
+    with pytest.raises(CommandRejected, match="no such file"):
         devices.recording(devices.synthetic(lambda t: None), tmp_path / "no" / "file.jsonl")

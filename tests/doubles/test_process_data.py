@@ -15,7 +15,7 @@ PROJECT = _resources.cabinet_sources() / "project" / "RoboticsAPI.data.xml"
 def test_our_own_project_file_is_understood() -> None:
     data = project.read_process_data(PROJECT)
     assert data["heptarm.port"] == 30001
-    assert data["heptarm.max_rate"] == 200.0
+    assert data["heptarm.max_rate"] == 500.0
     assert data["heptarm.key"] == ""
     assert isinstance(data["heptarm.verbosity"], int)
 
@@ -40,7 +40,7 @@ def test_what_does_not_fit_is_refused(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "expected_text"),
     [
-        ("<a><processData id='x' dataType='java.lang.Integer' value='1.5'/></a>", "process data x"),
+        ("<a><processData id='x' dataType='java.lang.Integer' value='1.5'/></a>", "process data 'x'"),
         ("<a><processData id='x' dataType='java.lang.Boolean' value='yes'/></a>", "must be true or false"),
         ("<a><processData id='x' dataType='java.util.Date' value='1'/></a>", "java.util.Date"),
         ("no xml", "not a project file"),

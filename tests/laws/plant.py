@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from heptarm.fri import LawTrial
 from heptarm.laws import ReadyLaw
-from heptarm.laws.ready import ROTOR, constants, shared_library
+from heptarm.laws.ready import shared_library
+from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.robot import robot
 
 Floats = npt.NDArray[np.float64]
@@ -50,7 +51,7 @@ class Plant:
         self._tau = np.zeros(7)
         self.force = 0.0
         self._library = ctypes.CDLL(str(shared_library()))
-        self._constants = constants(ARM)
+        self._constants = rigid_bodies(ARM, rotor=ROTOR)
         self.mass, self._none = np.zeros((7, 7)), np.zeros(7)
         self.jacobian, self._pose = np.zeros((6, 7)), np.zeros(7)
         self.look()

@@ -111,7 +111,12 @@ def judged(robot: RobotModel, rows: Array, *, compliant: bool) -> list[Violation
         "acceleration [rad/s²]", np.abs(acceleration[1:]) * driven[:, None], robot.ddq_max, seconds[3:]
     )
     moves = np.abs(np.diff(points, axis=0)).max(axis=1)
-    found += _first("set-point behind closed brakes [rad]", moves * ~(open_brakes[1:] | open_brakes[:-1]), STILL, seconds[1:])
+    found += _first(
+        "set-point behind closed brakes [rad]",
+        moves * ~(open_brakes[1:] | open_brakes[:-1]),
+        STILL,
+        seconds[1:],
+    )
     return found + _stopped(flags, speeds, seconds)
 
 
@@ -119,7 +124,9 @@ def _stopped(flags: Array, speeds: Array, seconds: Array) -> list[Violation]:
     return [one for bit in SafetyFlags(_STOPS) for one in _after_stop(bit, flags, speeds, seconds)]
 
 
-def _beyond(rule: str, values: Array, limits: Array, seconds: Array, *, slack: float = 0.0) -> list[Violation]:
+def _beyond(
+    rule: str, values: Array, limits: Array, seconds: Array, *, slack: float = 0.0
+) -> list[Violation]:
     """The first value of each axis beyond its limit."""
     found: list[Violation] = []
     for axis in range(values.shape[1]):
@@ -133,7 +140,11 @@ def _beyond(rule: str, values: Array, limits: Array, seconds: Array, *, slack: f
 
 def _first(rule: str, values: Array, allowed: float, seconds: Array) -> list[Violation]:
     wrong = np.flatnonzero(values > allowed)
-    return [Violation(rule, -1, float(seconds[wrong[0]]), float(values[wrong].max()), allowed)] if len(wrong) else []
+    return (
+        [Violation(rule, -1, float(seconds[wrong[0]]), float(values[wrong].max()), allowed)]
+        if len(wrong)
+        else []
+    )
 
 
 def _after_stop(bit: SafetyFlags, flags: Array, speeds: Array, seconds: Array) -> list[Violation]:

@@ -190,7 +190,10 @@ class Outside:
         """Do it."""
         match self.what:
             case "garbage":
-                with contextlib.suppress(OSError), socket.create_connection(address(arm), timeout=5.0) as stranger:
+                with (
+                    contextlib.suppress(OSError),
+                    socket.create_connection(address(arm), timeout=5.0) as stranger,
+                ):
                     stranger.sendall(bytes(range(256)) * 4)
             case "recover":
                 arm.operator.clear()
@@ -228,11 +231,15 @@ postures = st.builds(Posture, st.integers(0, len(TAUGHT) - 1), _offsets)
 _speeds = st.sampled_from((0.2, 1.0))
 moves = st.builds(
     Move,
-    st.sampled_from(("ptp", "ptp pose", "ptp near", "lin", "lin turned", "lin_rel", "spline", "program", "home")),
+    st.sampled_from(
+        ("ptp", "ptp pose", "ptp near", "lin", "lin turned", "lin_rel", "spline", "program", "home")
+    ),
     postures,
     _speeds,
     st.sampled_from(("position", "position", "joint", "cartesian")),
-    st.sampled_from(("no", "no", "no", "cancel", "stop path", "stop fast", "override", "pause", "lost", "force", *FAULTS)),
+    st.sampled_from(
+        ("no", "no", "no", "cancel", "stop path", "stop fast", "override", "pause", "lost", "force", *FAULTS)
+    ),
     st.sampled_from((0.02, 0.3, 0.8)),
 )
 streams = st.builds(
@@ -245,7 +252,10 @@ streams = st.builds(
     st.sampled_from(("leave", "leave", "error", "lost", "stop", "fault")),
     st.sampled_from(("smart", "direct")),
 )
-outside = st.builds(Outside, st.sampled_from(("recover", "recover", "garbage", "push", "t1", "aut", "tool", "no tool", *FAULTS)))
+outside = st.builds(
+    Outside,
+    st.sampled_from(("recover", "recover", "garbage", "push", "t1", "aut", "tool", "no tool", *FAULTS)),
+)
 programs = st.lists(st.one_of(moves, streams, moves, streams, outside), min_size=1, max_size=5)
 
 

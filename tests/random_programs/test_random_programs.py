@@ -63,7 +63,9 @@ class Rig:
                 step.run(self.arm)
         self.restore()
         assert np.abs(self.arm.state.q - HOME).max() < 1e-3
-        return self.judge.violations(compliant=any(getattr(step, "mode", "position") != "position" for step in program))
+        return self.judge.violations(
+            compliant=any(getattr(step, "mode", "position") != "position" for step in program)
+        )
 
 
 @pytest.fixture(scope="module")

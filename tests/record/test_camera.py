@@ -191,13 +191,13 @@ def test_what_cannot_be_drawn_is_refused_in_one_sentence_and_leaves_an_old_file_
     with peer.arm() as arm:
         with pytest.raises(ShapeError, match="camera must be"):
             arm.record(old, camera="front")  # type: ignore[arg-type]
-        rec = arm.record(old, rate=400, camera=ha.Camera(scene="kitchen"))
+        rec = arm.record(old, rate=400, camera=ha.Camera(scene="kitchen"), overwrite=True)
         with pytest.raises(CommandRejected, match="scene must be a file .* got 'kitchen'"):
             rec.start()
         assert arm.state_rate == 200.0, "the rate is as before"
         monkeypatch.setenv("MUJOCO_GL", "paper")
         with pytest.raises(CommandRejected, match="cannot draw the pictures") as raised:
-            arm.record(old, camera=SMALL).start()
+            arm.record(old, camera=SMALL, overwrite=True).start()
         assert "paper" in raised.value.text and "libegl1" in raised.value.hint
     assert old.read_bytes() == b"old"
 

@@ -200,7 +200,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.mcap").write_text("hello, this is text")
     with pytest.raises(CommandRejected, match="MCAP"):
         load(tmp_path / "text.mcap")
-    with pytest.raises(CommandRejected, match="No such file"):
+    with pytest.raises(CommandRejected, match="no such file"):
         load(tmp_path / "nothing.mcap")
     with pytest.raises(CommandRejected, match="cannot be written"):
         RecordingFile(Path("/proc/nothing/run.mcap"), FACTS, epoch=0, chunk=1000)

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from heptarm.model.kinematics import jacobian
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
+from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.motion.hand_guiding import HandGuide, hand_guide
+from tests.sim import motions
 from tests.sim.driving import Ear, ready, run
 
 NAN = np.nan
 SIDEWAYS = (0.0, 60.0, 0.0)
+#: Bounds that are hardly felt.
+QUICK: dict[str, Any] = {"joint_velocity": 2.0, "cartesian_velocity": 2.0}
 
 
 def begun(guide: HandGuide | None = None, *, model: str = "iiwa14") -> tuple[Plant, Ear]:
     """An arm that is guided by hand."""
     plant, ear = ready(model), Ear()
-    plant.submit(Order(1, "guide", guide=guide or hand_guide(), listener=ear))
+    plant.submit(MotionCommand(1, motions.guide(guide or hand_guide()), listener=ear))
     plant.safety.guide()
     plant.step(50)
     return plant, ear
@@ -54,7 +60,7 @@ def one(axis: int, value: float) -> list[float]:
 def test_it_waits_until_the_switch_is_held_and_does_not_sink() -> None:
     plant, ear = ready(), Ear()
     start = plant.snapshot.q
-    plant.submit(Order(1, "guide", guide=hand_guide(), listener=ear))
+    plant.submit(MotionCommand(1, motions.guide(hand_guide()), listener=ear))
     plant.step(100)
     plant.apply_wrench(SIDEWAYS)
     plant.step(300)
@@ -100,7 +106,7 @@ def test_no_axis_leaves_its_own_limits(force: tuple[float, ...]) -> None:
 
 
 def test_a_limit_holds_one_axis_and_leaves_the_others_free() -> None:
-    plant, _ = begun(hand_guide(q_max=one(0, 0.2)))
+    plant, _ = begun(hand_guide(q_max=one(0, 0.2), **QUICK))
     q, dq = push_along(plant, SIDEWAYS, 1.5)
     assert 0.15 < q[-1, 0] < 0.2 and q[:, 0].max() < 0.2
     assert abs(dq[-1, 0]) < 0.02
@@ -110,7 +116,7 @@ def test_a_limit_holds_one_axis_and_leaves_the_others_free() -> None:
 
 
 def test_a_limit_can_hold_all_axes_until_the_switch_is_let_go() -> None:
-    plant, ear = begun(hand_guide(q_max=one(0, 0.2), at_limit="all"))
+    plant, ear = begun(hand_guide(q_max=one(0, 0.2), at_limit="all", **QUICK))
     q, _ = push_along(plant, SIDEWAYS, 2.0)
     assert q[:, 0].max() < 0.2
     assert np.abs(q[-1] - q[-500]).max() < 2e-3
@@ -140,12 +146,41 @@ def test_speed_limits() -> None:
     assert 0.05 < max(speeds) < 0.15
 
 
+def speeds(plant: Plant, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """Speeds of the flange [m/s]."""
+    steps = zip(q[::20], dq[::20], strict=True)
+    return np.array([np.linalg.norm(jacobian(plant.robot, a)[:3] @ b) for a, b in steps])
+
+
+@pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 15.0), (30.0, 30.0, 0.0)])
+def test_without_limits_of_its_own_it_is_bounded(force: tuple[float, ...]) -> None:
+    plant, ear = begun()
+    q, dq = push_along(plant, force, 2.0)
+    assert 0.1 < speeds(plant, q, dq).max() <= 0.25
+    assert (np.abs(dq) <= 0.52 * plant.robot.dq_max).all()
+    finish(plant)
+    assert ear.causes == ["started", "done"]
+
+
+@pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 60.0)])
+def test_floating_joints_are_damped_and_bounded(force: tuple[float, ...]) -> None:
+    plant, ear = ready(), Ear()
+    plant.submit(MotionCommand(1, motions.hold(10.0), mode=JointImpedance(0.0, damping=0.0), listener=ear))
+    plant.step(50)
+    _, dq = push_along(plant, force, 2.0)
+    fastest = np.abs(dq)
+    assert fastest.max() > 0.1 and (fastest <= 0.52 * plant.robot.dq_max).all()
+    plant.step(1000)
+    assert np.abs(plant.snapshot.dq).max() < 1e-2, "it comes to rest where it is left"
+    assert ear.causes == ["started"]
+
+
 def test_reduced_speed_in_t1() -> None:
     plant, ear = ready(), Ear()
     plant.safety.choose(plant.safety.mode.T1)
     plant.safety.guide()
     plant.resume()
-    plant.submit(Order(1, "guide", guide=hand_guide(), listener=ear))
+    plant.submit(MotionCommand(1, motions.guide(hand_guide()), listener=ear))
     plant.step(50)
     q, dq = push_along(plant, (0.0, 0.0, 40.0), 1.0)
     speeds = [
@@ -195,7 +230,7 @@ def test_errors_end_it_at_rest() -> None:
 def test_what_comes_behind_it_begins_where_it_was_led_to() -> None:
     plant, ear = begun()
     after = Ear()
-    plant.submit(Order(2, "ptp", joints=(0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0), listener=after))
+    plant.submit(MotionCommand(2, motions.ptp((0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)), listener=after))
     push_along(plant, SIDEWAYS, 0.5)
     plant.safety.let_go()
     track = run(plant)

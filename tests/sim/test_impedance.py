@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, LimitError
 from heptarm.model.kinematics import jacobian
+from heptarm.values.arrays import Array
 from heptarm.values.frames import BASE
+from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
@@ -90,7 +92,7 @@ def test_it_begins_without_a_jerk() -> None:
 def test_a_direction_without_stiffness_can_be_led_and_stays_where_it_is_left() -> None:
     arm = Arm(CartesianImpedance((0.0, 2000.0, 2000.0, 200.0, 200.0, 200.0)))
     arm.push = turned(arm.wanted.rotation, along(0, 5.0))
-    arm.step(0.4)
+    arm.step(1.0)
     led = arm.law.deviation[0]
     assert led > 0.02
     arm.push = np.zeros(6)
@@ -99,6 +101,59 @@ def test_a_direction_without_stiffness_can_be_led_and_stays_where_it_is_left() -
     arm.step(1.0)
     assert arm.law.deviation[0] == pytest.approx(left, abs=5e-4), "it does not drift on"
     assert arm.law.deviation[1:] == pytest.approx(np.zeros(5), abs=2e-3)
+
+
+FREE = {
+    "all": compliance("xyzabc"),
+    "along": compliance("xyz", frame="base"),
+    "raw": CartesianImpedance(0.0, damping=0.1, nullspace_stiffness=0.0),
+}
+
+
+def guided(
+    mode: CartesianImpedance, push: tuple[float, ...], *, overlaid: bool = False
+) -> tuple[Arm, Array, Array]:
+    """Push for 2 s; the arm, speeds of the hand [m/s] and of the joints as fractions of their maxima."""
+    arm = Arm(mode, tcp=HAND)
+    arm.sensed.is_overlaid = overlaid
+    arm.push = np.array([*push, 0.0, 0.0, 0.0])
+    hand, fractions = [], []
+    for _ in range(2000):
+        arm.tick()
+        hand.append(np.linalg.norm(arm.law.velocity[:3]))
+        fractions.append(np.abs(arm.data.qvel[:7]) / arm.robot.dq_max)
+    return arm, np.array(hand), np.array(fractions)
+
+
+@pytest.mark.parametrize("push", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 15.0), (-15.0, 0.0, 0.0)])
+@pytest.mark.parametrize("mode", FREE.values(), ids=FREE)
+def test_guiding_is_damped_and_bounded(mode: CartesianImpedance, push: tuple[float, ...]) -> None:
+    arm, hand, fractions = guided(mode, push)
+    assert 0.05 < hand.max() <= 0.25 and fractions.max() <= 0.5
+    arm.push = np.zeros(6)
+    arm.step(3.0)
+    assert arm.quick < 2e-2, "it comes to rest where it is left"
+    assert arm.law.violation == ""
+
+
+def test_a_hard_push_is_braked_at_the_bound() -> None:
+    _, hand, fractions = guided(FREE["all"], (0.0, 0.0, 60.0))
+    assert 0.2 < hand.max() <= 0.27 and fractions.max() <= 0.5
+
+
+def test_the_bound_of_guiding_is_adjustable() -> None:
+    push = (20.0, 40.0, 0.0)
+    slow, hand, _ = guided(compliance("xyzabc", speed=0.1, turning_speed=0.3), push)
+    assert hand.max() < 0.125 and slow.law.violation == ""  # it would stop a quarter above the bound
+    _, quick, _ = guided(compliance("xyzabc", speed=0.6, turning_speed=4.0), push)
+    assert 0.3 < quick.max() <= 0.6
+    with pytest.raises(LimitError, match="speed must be in"):
+        compliance("x", speed=0.0)
+
+
+def test_under_an_overlay_of_a_client_the_guard_bounds_the_speed() -> None:
+    _, hand, _ = guided(FREE["all"], (15.0, 15.0, 0.0), overlaid=True)
+    assert hand.max() > 0.3
 
 
 # ------------------------------------------------------------------------------------------- in motion

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heptarm.planning.command import Order
 from heptarm.planning.seam import ServoTiming
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready
 
 KINDS = ("servo", "direct")
 HERE = np.array(READY)
 
 
-def serving(kind: str = "servo", **terms: object) -> tuple[Plant, Ear]:
+def serving(kind: str = "servo", timing: ServoTiming | None = None, **terms: Any) -> tuple[Plant, Ear]:
     plant, ear = ready(), Ear()
-    plant.submit(Order(7, kind, listener=ear, **terms))  # type: ignore[arg-type]
+    mode = terms.pop("mode", None)
+    motion = (motions.direct if kind == "direct" else motions.servo)(timing, **terms)
+    plant.submit(MotionCommand(7, motion, mode=mode, listener=ear))
     plant.step(2)
     return plant, ear
 
@@ -116,14 +121,14 @@ def test_a_passing_velocity_is_kept_for_a_moment_then_the_arm_rests() -> None:
 
 
 def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
-    plant, ear = serving(servo_timing=ServoTiming(goal_timeout=0.3))
+    plant, ear = serving(timing=ServoTiming(goal_timeout=0.3))
     plant.shared.post(7, HERE + 0.05)
     to_rest(plant)
     assert ear.causes == ["started", "done"]
 
 
 def test_a_velocity_that_goes_out_of_the_limits_stops_the_arm() -> None:
-    plant, ear = serving(servo_timing=ServoTiming(speed_timeout=1.0))
+    plant, ear = serving(timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
     plant.shared.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))
@@ -168,7 +173,7 @@ def test_without_stiffness_the_arm_floats_away_from_a_push() -> None:
 def test_impedance_follows_a_motion_and_rests(stiffness: float) -> None:
     plant, ear = ready(), Ear()
     target = HERE + [0.5, 0, 0, 0.2, 0, 0, 0.5]
-    plant.submit(Order(1, "ptp", joints=tuple(target), mode=JointImpedance(stiffness), listener=ear))
+    plant.submit(MotionCommand(1, motions.ptp(tuple(target)), mode=JointImpedance(stiffness), listener=ear))
     to_rest(plant, most=8000)
     assert ear.causes == ["started", "done"]
     assert np.abs(plant.snapshot.q - target).max() < 2e-3
@@ -206,8 +211,8 @@ def test_stiff_again_the_arm_stays_where_it_was_pushed_to() -> None:
 def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -> None:
     plant, ear = ready(), Ear()
     plant.apply_wrench((0.0, 20.0, 0.0))
-    plant.submit(Order(1, "hold", duration=2.0, mode=JointImpedance(100.0)))
-    plant.submit(Order(2, "ptp", joints=READY, listener=ear))
+    plant.submit(MotionCommand(1, motions.hold(2.0), mode=JointImpedance(100.0)))
+    plant.submit(MotionCommand(2, motions.ptp(READY), listener=ear))
     fastest = 0.0
     while not plant.idle:
         plant.tick()
@@ -273,3 +278,26 @@ def test_resumed_before_it_rests_a_servo_motion_rests_and_then_goes_on(kind: str
     change = np.abs(np.diff(path, n=2, axis=0)) * 1e6
     assert (change <= plant.robot.ddq_max * 1.5).all(), "no jump"
     assert np.abs(plant.snapshot.q - target).max() < 1e-3
+
+
+@pytest.mark.parametrize(("target", "speed"), [(119.0, 1.2), (119.9, 2.0), (110.0, 2.0), (90.0, 2.0)])
+@pytest.mark.parametrize("acceleration", [0.2, 1.0])
+def test_a_target_that_is_passed_before_a_limit_leaves_room_to_brake(
+    target: float, speed: float, acceleration: float
+) -> None:
+    """As when the program that streams velocities dies beside a limit."""
+    plant, ear = Plant("iiwa14", q=tuple(np.radians([0, 30, 0, -90, 0, 80, 0]).tolist())), Ear()
+    plant.submit(
+        MotionCommand(
+            7,
+            motions.servo(joint_velocity=(1.0,) * 7, joint_acceleration=(acceleration,) * 7),
+            listener=ear,
+        )
+    )
+    plant.step(2)
+    plant.shared.post(7, np.radians([0, 30, 0, -90, 0, target, 0]), speed * np.eye(7)[5])
+    q = commands(plant, 2500)[:, 5]
+    rate = np.diff(q) * 1e3
+    assert np.radians(target) - 0.02 < q.max() <= plant.robot.q_max[5]
+    assert np.abs(np.diff(rate)).max() * 1e3 <= acceleration * plant.robot.ddq_max[5] * (1 + 1e-6)
+    assert abs(rate[-1]) < 1e-9 and ear.causes == ["started"]

@@ -113,9 +113,9 @@ def test_files(tmp_path: Path) -> None:
     broken = tmp_path / "broken.npz"
     broken.write_bytes(file.read_bytes()[:200])
     for wrong in (other, broken):
-        with pytest.raises(ha.CommandRejected, match="no trajectory"):
+        with pytest.raises(ha.CommandRejected, match="is not a trajectory"):
             ha.Trajectory.load(wrong)
-    with pytest.raises(OSError, match="missing"):
+    with pytest.raises(ha.CommandRejected, match="missing"):
         ha.Trajectory.load(tmp_path / "missing.npz")
 
 

@@ -888,7 +888,7 @@ struct Pose {
 
 /// KUKA's redundancy of an LBR pose.
 struct Redundancy {
-    double e1 = unset;  ///< arm angle; NaN: keep the current one [rad]
+    double e1 = unset;  ///< E1, the angle of A3; NaN: keep the current one [rad]
     std::int32_t status = -1;  ///< -1: keep
     std::int32_t turn = -1;  ///< -1: not given
 
@@ -1167,8 +1167,8 @@ struct Hold {
 struct HandGuide {
     std::array<double, 7> q_min = filled<7>(unset);  ///< NaN: the axis' own limit [rad]
     std::array<double, 7> q_max = filled<7>(unset);  ///< [rad]
-    double joint_velocity = unset;  ///< limit of every axis; NaN keeps the cabinet's limit, also in the next field [rad/s]
-    double cartesian_velocity = unset;  ///< of the motion frame [m/s]
+    double joint_velocity = unset;  ///< limit of every axis; NaN: half of the slowest axis' maximum [rad/s]
+    double cartesian_velocity = unset;  ///< of the motion frame; NaN: 0.25 m/s [m/s]
     bool freezes_all = false;  ///< at a limit every axis stops until the switch is released; otherwise only the axis at its limit, outwards
     bool pulls_back = false;  ///< an axis that is beyond its limit at the start is pulled back; otherwise it can only be guided back
 
@@ -1225,7 +1225,7 @@ struct CartesianImpedance {
     std::array<double, 6> additional_force = filled<6>(unset);  ///< [N, Nm]
     std::array<double, 6> max_force = filled<6>(unset);  ///< NaN: off [N, Nm]
     bool max_force_stops = false;
-    std::array<double, 6> max_velocity = filled<6>(unset);  ///< exceeding it stops; NaN: off [m/s, rad/s]
+    std::array<double, 6> max_velocity = filled<6>(unset);  ///< exceeding it stops; NaN: off, but 0.3125 m/s and 1.25 rad/s in a direction of less than 10 N/m or 0.5 Nm/rad, which a hand can guide [m/s, rad/s]
     std::array<double, 6> max_deviation = filled<6>(unset);  ///< exceeding it stops; NaN: off [m, rad]
     std::string frame;  ///< frame of the axes; "": the motion frame
 

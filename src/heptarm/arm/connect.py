@@ -170,7 +170,9 @@ def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
         CommandRejected: the cabinet does not know the tool; the text lists those that it knows.
     """
     saved.mark_used()
-    arm.name, arm.speed = saved.name, saved.speed
+    arm.name = saved.name
+    if saved.speed is not None:
+        arm.speed = saved.speed
     newest = arm.connection.newest()
     mode = None if newest is None else newest.groups.mode
     if control and saved.tool and (mode is None or mode.tool != saved.tool):

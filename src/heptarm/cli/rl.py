@@ -232,8 +232,9 @@ def _ask(arm: Any, network: Policy, settings: DeploySettings) -> int:
 
 def _refuse_reports(out: Path | None, *, overwrite: bool) -> None:
     """Refuse, before anything runs, a name under which there is a report."""
-    for suffix in () if out is None else (".npz", ".json", ".png"):
-        refuse_existing(out.with_suffix(suffix), overwrite=overwrite, name="out")
+    if out is not None:
+        for suffix in (".npz", ".json", ".png"):
+            refuse_existing(out.with_suffix(suffix), overwrite=overwrite, name="out")
 
 
 def _report(report: EpisodeReport, out: Path | None, *, film: bool, overwrite: bool, as_json: bool) -> int:

@@ -32,7 +32,7 @@ def show(*, as_json: Json = False) -> int:
             continue
         more = [f"key: {_key(one) or 'none'}"]
         more += [f"tool: {one.tool}"] if one.tool else []
-        more += [f"speed: {one.speed:g}"] if one.speed < 1.0 else []
+        more += [f"speed: {one.speed:g}"] if one.speed is not None else []
         more += [f"flange: {one.flange}"] if one.flange else []
         print(f"{one.name:12} {one.address:24} {', '.join(more)}; last used: {used}")
     if not found and not as_json:
@@ -59,7 +59,12 @@ def add(
         Parameter(name="--key-file", help="File with its key. Default: the key stored for its address."),
     ] = None,
     tool: Annotated[str, Parameter(help="Tool that is attached when a client takes control.")] = "",
-    speed: Annotated[float, Parameter(help="Ceiling of the speed of all motions, (0, 1].")] = 1.0,
+    speed: Annotated[
+        float | None,
+        Parameter(
+            help="Ceiling of the speed of all motions, (0, 1]. Default: 0.25 of a real robot, 1 of a simulator."
+        ),
+    ] = None,
     flange: Annotated[
         str, Parameter(help="Media flange of the robot: plain, touch, or its height above a plain one [m].")
     ] = "",

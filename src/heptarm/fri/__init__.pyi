@@ -30,6 +30,9 @@ from .loop.law_interface import (
 from .loop.law_interface import (
     Memory as Memory,
 )
+from .loop.parameters import (
+    Param as Param,
+)
 from .loop.user_api import (
     Output as Output,
 )

@@ -6,7 +6,7 @@ The file is heptarm/targets.toml in the folder of the user's settings, one table
     address = "172.31.1.147"
     key_file = "~/keys/lab1"     # otherwise the key is looked up as for any address
     tool = "gripper"             # attached when a client takes control
-    speed = 0.3                  # ceiling of the speed
+    speed = 0.3                  # ceiling of the speed; otherwise 0.25 of a real robot, 1 of a simulator
     flange = "touch"             # media flange of the robot
 
 When a target was last used is the time of a file of its name in the folder beside it.
@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import re
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from heptarm.errors import CommandRejected
-from heptarm.io.keys import settings_folder
+from heptarm.io.folders import private_folder, settings_folder
 from heptarm.values.arrays import shown
 from heptarm.values.files import read_text
 from heptarm.values.robot import flange
@@ -52,7 +51,7 @@ class SavedTarget:
         address: what to connect to, as in `heptarm.connect`.
         key_file: file with the key; "": the key is looked up elsewhere.
         tool: attached when a client takes control; "": none.
-        speed: ceiling of the speed of all motions, (0, 1].
+        speed: ceiling of the speed of all motions, (0, 1]; None: 0.25 of a real robot, 1 of a simulator.
         flange: media flange of the robot: "plain", "touch", or its height [m]; "": not stated.
     """
 
@@ -60,7 +59,7 @@ class SavedTarget:
     address: str
     key_file: str = ""
     tool: str = ""
-    speed: float = 1.0
+    speed: float | None = None
     flange: str = ""
 
     @property
@@ -74,7 +73,7 @@ class SavedTarget:
     def mark_used(self) -> None:
         """Note that a client has connected to it; where that cannot be written, nothing is noted."""
         with contextlib.suppress(OSError):
-            _mark(self.name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            private_folder(_mark(self.name).parent)
             _mark(self.name).touch()
 
 
@@ -162,7 +161,9 @@ def check_target(target: SavedTarget, where: str) -> SavedTarget:
             raise CommandRejected(
                 f"{where}: {key} must have no NUL, got {shown(getattr(target, key))}", parameter=key
             )
-    if isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0:
+    if speed is not None and (
+        isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0
+    ):
         raise CommandRejected(
             f"{where}: speed must be in (0, 1], got {speed!r}",
             parameter="speed",
@@ -199,7 +200,7 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
         for key in ("key_file", "tool", "flange")
         if getattr(target, key)
     ]
-    if not math.isclose(target.speed, 1.0):
+    if target.speed is not None:
         lines.append(f"speed = {float(target.speed)!r}")
     before = _content().rstrip("\n")
     _write((f"{before}\n\n" if before else "") + "\n".join(lines) + "\n")
@@ -254,7 +255,7 @@ def _write(text: str) -> None:
     file = targets_file()
     part = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(file.parent)
         part.write_text(text, encoding="utf-8")
         part.replace(file)
     except OSError as error:

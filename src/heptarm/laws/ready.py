@@ -18,7 +18,9 @@ from heptarm._library import Unavailable, extension_file
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
-from heptarm.values.arrays import Array, array, finite, instance, integer, numbers, scalar, within, word
+from heptarm.fri.loop.parameters import Param
+from heptarm.model.dynamics import ROTOR, rigid_bodies
+from heptarm.values.arrays import Array, array, frozen, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
@@ -28,10 +30,18 @@ _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
 #: Time constant of the low pass of the velocities [s].
 FILTER = 0.002
-#: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
-ROTOR = 0.1
 #: Fraction of the robot's torques that a law may use.
 TORQUE_FRACTION = 0.3
+#: Largest stiffness of the flange, as that of Sunrise's Cartesian impedance, and of a joint [N/m, Nm/rad].
+STIFFNESS: Array = frozen([5000.0] * 3 + [300.0] * 3)
+JOINT_STIFFNESS = 2000.0
+#: Largest mass and damping of a flange that moves under forces [kg, kg m²], [N s/m, Nm s/rad].
+MASS: Array = frozen([500.0] * 3 + [50.0] * 3)
+DAMPING: Array = frozen([1e4] * 3 + [1e3] * 3)
+#: Largest force and moment that a law exerts [N, Nm].
+WRENCH: Array = frozen([150.0] * 3 + [50.0] * 3)
+#: Further away than anything that an arm reaches [m].
+FAR = 1e3
 
 
 def shared_library() -> Path:
@@ -46,18 +56,6 @@ def shared_library() -> Path:
         raise CommandRejected(
             f"the ready laws are not available: {error}", parameter="law", hint=error.hint
         ) from None
-
-
-def constants(arm: RobotModel, load: Body | None = None) -> Array:
-    """`struct robot` of dynamics.h: the links, the load on the flange, the motors; shape (105,)."""
-    links = arm.links
-    inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
-    body = load or Body(0.0, np.zeros(3))
-    parts = (
-        *(links.origin, links.mass, links.com, inertia, links.flange),
-        *([body.mass], body.com, body.inertia, [ROTOR]),
-    )
-    return np.concatenate([np.ravel(part) for part in parts])
 
 
 class ReadyLaw(LibraryLaw):
@@ -127,18 +125,20 @@ def cartesian_impedance(
     return ReadyLaw(
         "cartesian_impedance",
         {
-            "robot": lambda arm: constants(arm, load),
-            "goal": _ANYWHERE if goal is None else instance(goal, Pose, "goal").array,
-            "stiffness": _positive(array(stiffness, 6, "stiffness"), "stiffness"),
-            "damping": within(damping, "damping", 0.0, 2.0),
-            "force_max": within(force_max, "force_max", 0.0, 500.0, unit="N"),
-            "moment_max": within(moment_max, "moment_max", 0.0, 100.0, unit="Nm"),
-            "speed": within(speed, "speed", 0.0, 2.0, above=True, unit="m/s"),
-            "turn_speed": within(turn_speed, "turn_speed", 0.0, 6.0, above=True, unit="rad/s"),
-            "posture": _ANYWHERE if posture is None else array(posture, 7, "posture"),
-            "posture_stiffness": within(posture_stiffness, "posture_stiffness", 0.0, 500.0, unit="Nm/rad"),
+            "robot": lambda arm: Param(rigid_bodies(arm, load, rotor=ROTOR), live=False),
+            "goal": _pose(goal),
+            "stiffness": _vector(stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS),
+            "damping": _number(damping, "damping", high=2.0, rate=10.0),
+            "force_max": _number(force_max, "force_max", high=500.0, unit="N", rate=1000.0),
+            "moment_max": _number(moment_max, "moment_max", high=100.0, unit="Nm", rate=200.0),
+            "speed": _number(speed, "speed", high=2.0, above=True, unit="m/s"),
+            "turn_speed": _number(turn_speed, "turn_speed", high=6.0, above=True, unit="rad/s"),
+            "posture": _joints(posture, "posture", rate=1.0),
+            "posture_stiffness": _number(
+                posture_stiffness, "posture_stiffness", high=500.0, unit="Nm/rad", rate=1000.0
+            ),
             "tau_max": _torques(tau_max),
-            "filter": FILTER,
+            "filter": Param(FILTER, live=False),
         },
         {
             "goal": _ZEROS7,
@@ -181,14 +181,16 @@ def joint_impedance(
     return ReadyLaw(
         "joint_impedance",
         {
-            "robot": lambda arm: constants(arm, load),
-            "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
-            "stiffness": _positive(array(stiffness, 7, "stiffness"), "stiffness"),
-            "damping": within(damping, "damping", 0.0, 2.0),
-            "smoothing": within(smoothing, "smoothing", 0.0, 10.0, unit="s"),
+            "robot": lambda arm: Param(rigid_bodies(arm, load, rotor=ROTOR), live=False),
+            "goal": _joints(goal, "goal"),
+            "stiffness": _vector(
+                stiffness, "stiffness", high=(JOINT_STIFFNESS,) * 7, unit="Nm/rad", rate=2.0 * JOINT_STIFFNESS
+            ),
+            "damping": _number(damping, "damping", high=2.0, rate=10.0),
+            "smoothing": _number(smoothing, "smoothing", high=10.0, unit="s", rate=1.0),
             "speed": _speeds(speed),
             "tau_max": _torques(tau_max),
-            "filter": FILTER,
+            "filter": Param(FILTER, live=False),
         },
         {
             "q": _ZEROS7,
@@ -232,37 +234,33 @@ def free_guiding(
         tau_max: largest torques, shape (7,) [Nm]; None: 30 % of the robot's.
     """
     _check_body(extra, "extra")
-    given = numbers(((-1e3,) * 3, (1e3,) * 3) if box is None else box, "box", "two corners")
+    given = numbers(((-FAR,) * 3, (FAR,) * 3) if box is None else box, "box", "two corners")
     if given.shape != (2, 3):
         raise ShapeError(f"box must have shape (2, 3), got {given.shape}", parameter="box", value=box)
-    corners = array(given[0], 3, "box"), array(given[1], 3, "box")
-    if not (corners[0] < corners[1]).all():
-        raise CommandRejected(
-            f"the lower corner of the box must be below the upper one, got {corners[0].tolist()} and "
-            f"{corners[1].tolist()} m",
-            parameter="box",
-            value=box,
-            hint="box=((x, y, z), (x, y, z)), lower corner first",
-        )
     return ReadyLaw(
         "free_guiding",
         {
-            "robot": constants,
-            "damping": _positive(array(damping, 7, "damping"), "damping"),
-            "low": corners[0],
-            "high": corners[1],
-            "wall_stiffness": within(wall_stiffness, "wall_stiffness", 0.0, 1e4, unit="N/m"),
-            "wall_damping": within(wall_damping, "wall_damping", 0.0, 1e3, unit="N s/m"),
-            "force_max": within(force_max, "force_max", 0.0, 500.0, unit="N"),
-            "q_low": lambda arm: arm.q_min,
-            "q_high": lambda arm: arm.q_max,
-            "margin": within(margin, "margin", 0.0, 1.0, unit="rad"),
-            "joint_stiffness": within(joint_stiffness, "joint_stiffness", 0.0, 1e3, unit="Nm/rad"),
-            "extra_mass": 0.0 if extra is None else extra.mass,
-            "extra_com": _ZEROS3 if extra is None else extra.com,
-            "gravity": (0.0, 0.0, -9.81),
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
+            "damping": _vector(damping, "damping", high=(100.0,) * 7, unit="Nm s/rad", rate=200.0),
+            "box": Param(
+                given, low=-FAR, high=FAR, unit="m", rate=0.5, check=_check_box, name="box"
+            ),
+            "wall_stiffness": _number(wall_stiffness, "wall_stiffness", high=1e4, unit="N/m", rate=2e4),
+            "wall_damping": _number(wall_damping, "wall_damping", high=1e3, unit="N s/m", rate=2e3),
+            "force_max": _number(force_max, "force_max", high=500.0, unit="N", rate=1000.0),
+            "q_low": lambda arm: Param(arm.q_min, live=False),
+            "q_high": lambda arm: Param(arm.q_max, live=False),
+            "margin": _number(margin, "margin", high=1.0, unit="rad", rate=1.0),
+            "joint_stiffness": _number(joint_stiffness, "joint_stiffness", high=1e3, unit="Nm/rad", rate=2e3),
+            "extra_mass": _number(
+                0.0 if extra is None else extra.mass, "extra_mass", high=50.0, unit="kg", rate=2.0
+            ),
+            "extra_com": _vector(
+                _ZEROS3 if extra is None else extra.com, "extra_com", low=-1.0, high=(1.0,) * 3, unit="m", rate=0.5
+            ),
+            "gravity": Param((0.0, 0.0, -9.81), live=False),
             "tau_max": _torques(tau_max),
-            "filter": FILTER,
+            "filter": Param(FILTER, live=False),
         },
         {"force": _ZEROS3, "dq": _ZEROS7, "started": 0.0, "saturated": 0.0},
         kind="torque",
@@ -298,15 +296,15 @@ def admittance(
     return ReadyLaw(
         "admittance_of_the_flange",
         {
-            "robot": constants,
-            "wrench": array(wrench, 6, "wrench"),
-            "mass": _positive(array(mass, 6, "mass"), "mass", above=True),
-            "damping": _positive(array(damping, 6, "damping"), "damping"),
-            "stiffness": _positive(array(stiffness, 6, "stiffness"), "stiffness"),
-            "dead_band": within(dead_band, "dead_band", 0.0, 100.0, unit="N"),
-            "moment_dead_band": within(moment_dead_band, "moment_dead_band", 0.0, 30.0, unit="Nm"),
-            "speed": within(speed, "speed", 0.0, 1.0, above=True, unit="m/s"),
-            "turn_speed": within(turn_speed, "turn_speed", 0.0, 3.0, above=True, unit="rad/s"),
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
+            "wrench": _vector(wrench, "wrench", low=-WRENCH, high=WRENCH, unit="N or Nm", rate=5.0 * WRENCH),
+            "mass": _vector(mass, "mass", high=MASS, above=True, unit="kg or kg m²", rate=MASS),
+            "damping": _vector(damping, "damping", high=DAMPING, unit="N s/m or Nm s/rad", rate=DAMPING),
+            "stiffness": _vector(stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS),
+            "dead_band": _number(dead_band, "dead_band", high=100.0, unit="N", rate=100.0),
+            "moment_dead_band": _number(moment_dead_band, "moment_dead_band", high=30.0, unit="Nm", rate=30.0),
+            "speed": _number(speed, "speed", high=1.0, above=True, unit="m/s"),
+            "turn_speed": _number(turn_speed, "turn_speed", high=3.0, above=True, unit="rad/s"),
         },
         {
             "q": _ZEROS7,
@@ -366,15 +364,20 @@ def hybrid(
     return ReadyLaw(
         "hybrid_of_the_flange",
         {
-            "robot": constants,
-            "goal": _ANYWHERE if goal is None else instance(goal, Pose, "goal").array,
-            "turn": np.ravel(turn),
-            "force_axes": chosen,
-            "wrench": exerted,
-            "mass": _positive(array(mass, 6, "mass"), "mass", above=True),
-            "damping": _positive(array(damping, 6, "damping"), "damping", above=True),
-            "speed": within(speed, "speed", 0.0, 1.0, above=True, unit="m/s"),
-            "turn_speed": within(turn_speed, "turn_speed", 0.0, 3.0, above=True, unit="rad/s"),
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
+            "goal": _pose(goal),
+            "turn": Param(np.ravel(turn), live=False),
+            "force_axes": Param(chosen, live=False),
+            # zero along axes that are controlled by position
+            "wrench": _vector(
+                exerted, "wrench", low=-WRENCH * chosen, high=WRENCH * chosen, unit="N or Nm", rate=5.0 * WRENCH
+            ),
+            "mass": _vector(mass, "mass", high=MASS, above=True, unit="kg or kg m²", rate=MASS),
+            "damping": _vector(
+                damping, "damping", high=DAMPING, above=True, unit="N s/m or Nm s/rad", rate=DAMPING
+            ),
+            "speed": _number(speed, "speed", high=1.0, above=True, unit="m/s"),
+            "turn_speed": _number(turn_speed, "turn_speed", high=3.0, above=True, unit="rad/s"),
         },
         {
             "goal": _ZEROS7,
@@ -407,9 +410,9 @@ def minimum_jerk(
     return ReadyLaw(
         "minimum_jerk_targets",
         {
-            "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
+            "goal": _joints(goal, "goal"),
             "speed": _speeds(speed),
-            "acceleration": _quarter(acceleration, "acceleration", "ddq_max"),
+            "acceleration": _limits(acceleration, "acceleration", "ddq_max", fraction=0.25, unit="rad/s²"),
         },
         {"q": _ZEROS7, "dq": _ZEROS7, "ddq": _ZEROS7, "goal": _ZEROS7, "left": 0.0, "started": 0.0},
         kind="position",
@@ -437,10 +440,10 @@ def jerk_limited(
     return ReadyLaw(
         "jerk_limited_targets",
         {
-            "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
+            "goal": _joints(goal, "goal"),
             "speed": _speeds(speed),
-            "acceleration": _quarter(acceleration, "acceleration", "ddq_max"),
-            "jerk": _quarter(jerk, "jerk", "dddq_max"),
+            "acceleration": _limits(acceleration, "acceleration", "ddq_max", fraction=0.25, unit="rad/s²"),
+            "jerk": _limits(jerk, "jerk", "dddq_max", fraction=0.25, unit="rad/s³"),
         },
         {"q": _ZEROS7, "dq": _ZEROS7, "ddq": _ZEROS7, "is_there": 0.0, "started": 0.0},
         kind="position",
@@ -462,10 +465,10 @@ def low_pass(
     return ReadyLaw(
         "low_pass_of_targets",
         {
-            "goal": _ANYWHERE if goal is None else array(goal, 7, "goal"),
-            "frequency": within(frequency, "frequency", 0.0, 100.0, above=True, unit="Hz"),
-            "damping": within(damping, "damping", 0.0, 5.0),
-            "order": float(order),
+            "goal": _joints(goal, "goal"),
+            "frequency": _number(frequency, "frequency", high=100.0, above=True, unit="Hz", rate=50.0),
+            "damping": _number(damping, "damping", high=5.0, rate=10.0),
+            "order": Param(float(order), live=False),
         },
         {"q": _ZEROS7, "dq": _ZEROS7, "started": 0.0},
         kind="position",
@@ -487,9 +490,9 @@ def low_pass_readings(*, frequency: float = 10.0, order: int = 1, damping: float
     return ReadyLaw(
         "low_pass_of_readings",
         {
-            "frequency": within(frequency, "frequency", 0.0, 500.0, above=True, unit="Hz"),
-            "damping": within(damping, "damping", 0.0, 5.0),
-            "order": float(order),
+            "frequency": _number(frequency, "frequency", high=500.0, above=True, unit="Hz", rate=250.0),
+            "damping": _number(damping, "damping", high=5.0, rate=10.0),
+            "order": Param(float(order), live=False),
         },
         {
             "dq": _ZEROS7,
@@ -534,15 +537,16 @@ def search(
     return ReadyLaw(
         "search_by_force",
         {
-            "push": force,
-            "first": first,
-            "second": second,
-            "amplitude": within(amplitude, "amplitude", 0.0, 100.0, unit="N"),
-            "frequency": rate,
-            "second_frequency": rate * within(ratio, "ratio", 0.0, 10.0, above=True),
-            "phase": finite(phase, "phase", unit="rad"),
-            "rise": within(rise, "rise", 0.1, 600.0, unit="s"),
-            "is_spiral": float(pattern == "spiral"),
+            "push": _vector(force, "push", low=-WRENCH[:3], high=WRENCH[:3], unit="N", rate=100.0),
+            "first": Param(first, live=False),
+            "second": Param(second, live=False),
+            "amplitude": _number(amplitude, "amplitude", high=100.0, unit="N", rate=50.0),
+            # the phase is frequency times time: a change on the way would be a step of the force
+            "frequency": Param(rate, live=False),
+            "second_frequency": Param(rate * within(ratio, "ratio", 0.0, 10.0, above=True), live=False),
+            "phase": _number(phase, "phase", low=-FAR, high=FAR, unit="rad", rate=3.0),
+            "rise": Param(within(rise, "rise", 0.1, 600.0, unit="s"), live=False),
+            "is_spiral": Param(float(pattern == "spiral"), live=False),
         },
         {"force": _ZEROS3, "turns": 0.0, "done": 0.0},
         kind="wrench",
@@ -559,19 +563,64 @@ def across(direction: Array) -> tuple[Array, Array]:
     return first, np.cross(axis, first) * (1.0 if axis[np.argmax(np.abs(axis))] >= 0.0 else -1.0)
 
 
-def _positive(values: Array, name: str, *, above: bool = False) -> Array:
-    """Numbers that are not negative; with `above`, positive."""
-    wrong = values <= 0.0 if above else values < 0.0
-    if wrong.any():
-        index = int(np.argmax(wrong))
-        bound = "above 0" if above else "0 or more"
-        raise CommandRejected(
-            f"{name} must be {bound}, got {scalar(values[index], name):g} at index {index}",
-            parameter=f"{name}[{index}]",
-            value=float(values[index]),
-            allowed=bound,
-        )
-    return values
+_ByRobot: TypeAlias = Callable[[RobotModel], Param]
+
+
+def _number(
+    value: float,
+    name: str,
+    *,
+    low: float = 0.0,
+    high: float,
+    above: bool = False,
+    unit: str = "",
+    rate: float = math.inf,
+) -> Param:
+    return Param(
+        scalar(value, name, unit=unit), low=low, high=high, above=above, unit=unit, rate=rate, name=name
+    )
+
+
+def _vector(
+    value: npt.ArrayLike,
+    name: str,
+    *,
+    low: npt.ArrayLike = 0.0,
+    high: npt.ArrayLike,
+    above: bool = False,
+    unit: str = "",
+    rate: npt.ArrayLike = math.inf,
+) -> Param:
+    """A vector as long as its upper bound."""
+    given = array(value, len(np.asarray(high)), name)
+    return Param(given, low=low, high=high, above=above, unit=unit, rate=rate, name=name)
+
+
+def _pose(goal: Pose | None) -> Param:
+    """A goal of the flange; the law follows it at its largest speeds."""
+    given = _ANYWHERE if goal is None else instance(goal, Pose, "goal").array
+    return Param(
+        given, low=-FAR, high=FAR, unit="m", nan=True, check=_check_pose, name="goal"
+    )
+
+
+def _joints(values: npt.ArrayLike | None, name: str, *, rate: float = math.inf) -> _ByRobot:
+    """Joint positions within the robot's limits; None: where the arm is."""
+    given = array(_ANYWHERE if values is None else values, 7, name, nan=values is None)
+    return lambda arm: Param(
+        given, low=arm.q_min, high=arm.q_max, unit="rad", nan=True, rate=rate, name=name
+    )
+
+
+def _check_pose(values: Array) -> str:
+    norm = float(np.linalg.norm(values[3:]))
+    return "" if abs(norm - 1.0) <= 1e-3 else f"the quaternion must have norm 1, got {norm:.6g}"
+
+
+def _check_box(corners: Array) -> str:
+    if (corners[0] < corners[1]).all():
+        return ""
+    return f"the lower corner of the box must be below the upper one, got {corners.tolist()} m"
 
 
 def _check_body(body: Body | None, name: str) -> None:
@@ -579,20 +628,35 @@ def _check_body(body: Body | None, name: str) -> None:
         instance(body, Body, name)
 
 
-def _torques(values: npt.ArrayLike | None) -> Array | Callable[[RobotModel], Array]:
-    if values is None:
-        return lambda arm: TORQUE_FRACTION * arm.tau_max
-    return _positive(array(values, 7, "tau_max"), "tau_max")
+def _torques(values: npt.ArrayLike | None) -> _ByRobot:
+    """Largest torques; None: a fraction of the robot's."""
+    given = None if values is None else _vector(values, "tau_max", high=(math.inf,) * 7, unit="Nm").value
+    return lambda arm: Param(
+        TORQUE_FRACTION * arm.tau_max if given is None else given,
+        low=0.0,
+        high=arm.tau_max,
+        unit="Nm",
+        rate=5.0 * arm.tau_max,
+        name="tau_max",
+    )
 
 
-def _speeds(values: npt.ArrayLike | None) -> Array | Callable[[RobotModel], Array]:
-    if values is None:
-        return lambda arm: 0.5 * arm.dq_max
-    return _positive(array(values, 7, "speed"), "speed", above=True)
+def _limits(
+    values: npt.ArrayLike | None, name: str, limit: str, *, fraction: float, unit: str
+) -> _ByRobot:
+    """Limits of the joints; None: a fraction of the robot's, which has them as `limit`."""
+    given = None
+    if values is not None:
+        given = _vector(values, name, high=(math.inf,) * 7, above=True, unit=unit).value
+
+    def made(arm: RobotModel) -> Param:
+        most = np.asarray(getattr(arm, limit))
+        return Param(
+            fraction * most if given is None else given, low=0.0, high=most, above=True, unit=unit, name=name
+        )
+
+    return made
 
 
-def _quarter(values: npt.ArrayLike | None, name: str, limit: str) -> Array | Callable[[RobotModel], Array]:
-    """Limits of the joints; None: a quarter of the robot's, which has them as `limit`."""
-    if values is None:
-        return lambda arm: 0.25 * np.asarray(getattr(arm, limit))
-    return _positive(array(values, 7, name), name, above=True)
+def _speeds(values: npt.ArrayLike | None) -> _ByRobot:
+    return _limits(values, "speed", "dq_max", fraction=0.5, unit="rad/s")

@@ -28,11 +28,12 @@ from heptarm.model.dynamics import (
     inverse_dynamics,
     mass_matrix,
 )
-from heptarm.model.inverse_kinematics import intervals, redundancy, solve, solve_all
+from heptarm.model.inverse_kinematics import arm_angle, intervals, redundancy, solve, solve_all
 from heptarm.model.kinematics import forward, jacobian, jacobian_derivative, manipulability, nullspace
 
 __all__ = [
     "RedundancyBatch",
+    "arm_angle",
     "coriolis",
     "coriolis_matrix",
     "forward",

@@ -1,95 +1,66 @@
 """Rigid-body dynamics of an LBR: M(q) ddq + C(q, dq) dq + g(q) = tau.
 
-Newton's and Euler's laws of every link, projected on the joints by the Jacobians Jv, Jw of its centre of mass
-(Siciliano, Sciavicco, Villani, Oriolo, "Robotics", 2009, section 7.1):
-
-    M = sum m Jv' Jv + Jw' I Jw
-    C = sum m Jv' dJv + Jw' (I dJw + [w] I Jw)
-    g = - sum m Jv' g0
-
-With this C the matrix dM/dt - 2 C is skew-symmetric. Rotor inertia is not in it, and friction only as you give it: the
-torque sensors sit behind the gears. The link data are nominal, see `heptarm.values.robot`.
+`native/dynamics.h` computes it by the recursion of Newton and Euler (Featherstone, "Rigid Body Dynamics
+Algorithms", 2008, chapter 5), and C by the Jacobians of the links (Siciliano, Sciavicco, Villani, Oriolo,
+"Robotics", 2009, section 7.1): with it the matrix dM/dt - 2 C is skew-symmetric. Rotor inertia is not in it, and
+friction only as you give it: the torque sensors sit behind the gears. The link data are nominal, see
+`heptarm.values.robot`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array, array, instance
-from heptarm.values.robot import Body, Friction, RobotModel, symmetric
+from heptarm.model.native import Joints, Reals, Square, Vector, one, reals
+from heptarm.values.arrays import Array, array, frozen, instance
+from heptarm.values.robot import Body, Friction, RobotModel
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
 GRAVITY = (0.0, 0.0, -9.81)
+#: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
+ROTOR = 0.1
 
-_Y, _Z = 1, 2
-# axis of each joint in its link, and its sign
-_AXES = ((_Z, 1.0), (_Y, 1.0), (_Z, 1.0), (_Y, -1.0), (_Z, 1.0), (_Y, 1.0), (_Z, 1.0))
+_STILL = Joints()
+_WEIGHTLESS = Vector()
 
 
-@dataclass(frozen=True, slots=True)
-class _Posture:
-    """Joints and bodies in the base frame; n bodies: seven links and perhaps a load.
+@lru_cache(maxsize=64)
+def rigid_bodies(robot: RobotModel, load: Body | None = None, *, rotor: float = 0.0) -> Array:
+    """`struct robot` of dynamics.h: the links, the load on the flange, the inertia of the motors; shape (105,).
 
-    `axis` and `origin` of the joints have shape (7, 3); `mass` (n,), `com` (n, 3), `inertia` (n, 3, 3) of the bodies;
-    `moves` (n, 7) is 1 where a joint moves a body.
+    Args:
+        robot: the robot.
+        load: on the flange.
+        rotor: inertia that each motor shows behind its gear [kg m²].
     """
-
-    axis: Array
-    origin: Array
-    mass: Array
-    com: Array
-    inertia: Array
-    moves: Array
-
-    @property
-    def linear(self) -> Array:
-        """Jacobians of the centres of mass, shape (n, 7, 3)."""
-        lever = self.com[:, None, :] - self.origin[None, :, :]
-        return np.cross(self.axis[None, :, :], lever) * self.moves[:, :, None]
-
-    @property
-    def angular(self) -> Array:
-        """Jacobians of the rotations, shape (n, 7, 3)."""
-        result: Array = self.axis[None, :, :] * self.moves[:, :, None]
-        return result
-
-
-def _posture(robot: RobotModel, q: npt.ArrayLike, load: Body | None) -> _Posture:
     links = instance(robot, RobotModel, "robot").links
-    turn, place = np.eye(3), np.zeros(3)
-    turns, axis, origin = np.empty((7, 3, 3)), np.empty((7, 3)), np.empty((7, 3))
-    for index, angle in enumerate(array(q, 7, "q").tolist()):
-        direction, sign = _AXES[index]
-        place = place + turn @ links.origin[index]
-        turn = turn @ _about(direction, sign * angle)
-        turns[index], axis[index], origin[index] = turn, sign * turn[:, direction], place
-    mass, inertia = links.mass, turns @ links.inertia @ turns.transpose(0, 2, 1)
-    com = origin + (turns @ links.com[:, :, None])[:, :, 0]
-    moves = np.tri(7)
-    if load is not None:
-        instance(load, Body, "load")
-        at_flange = place + turn @ (links.flange + load.com)
-        mass, com = np.append(mass, load.mass), np.vstack([com, at_flange])
-        inertia = np.concatenate([inertia, (turn @ symmetric(load.inertia) @ turn.T)[None]])
-        moves = np.vstack([moves, np.ones(7)])
-    return _Posture(axis, origin, mass, com, inertia, moves)
+    inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
+    body = Body(0.0, np.zeros(3)) if load is None else instance(load, Body, "load")
+    parts = (
+        *(links.origin, links.mass, links.com, inertia, links.flange),
+        *([body.mass], body.com, body.inertia, [rotor]),
+    )
+    return frozen(np.concatenate([np.ravel(part) for part in parts]))
 
 
-def _about(axis: int, angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    if axis == _Z:
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+def _bodies(robot: RobotModel, load: Body | None) -> Reals:
+    return _in_c(instance(robot, RobotModel, "robot"), load)
 
 
-def _mass_matrix(posture: _Posture) -> Array:
-    jv, jw = posture.linear, posture.angular
-    result: Array = np.einsum("n,nia,nja->ij", posture.mass, jv, jv)
-    result += np.einsum("nia,nab,njb->ij", jw, posture.inertia, jw)
-    return result
+@lru_cache(maxsize=64)
+def _in_c(robot: RobotModel, load: Body | None) -> Reals:
+    return reals(rigid_bodies(robot, load))
+
+
+def _joints(value: npt.ArrayLike, name: str) -> Reals:
+    return Joints(*array(value, 7, name).tolist())
+
+
+def _fall(acceleration: npt.ArrayLike) -> Reals:
+    return Vector(*array(acceleration, 3, "acceleration").tolist())
 
 
 def mass_matrix(robot: RobotModel, q: npt.ArrayLike, *, load: Body | None = None) -> Array:
@@ -103,30 +74,9 @@ def mass_matrix(robot: RobotModel, q: npt.ArrayLike, *, load: Body | None = None
     Returns:
         Shape (7, 7) [kg m²], symmetric and positive definite.
     """
-    return _mass_matrix(_posture(robot, q, load))
-
-
-def _coriolis_matrix(posture: _Posture, dq: Array) -> Array:
-    axis, origin = posture.axis, posture.origin
-    jv, jw = posture.linear, posture.angular
-    # what carries axis j turns with the joints before it
-    carrier = np.vstack([np.zeros(3), np.cumsum(axis * dq[:, None], axis=0)[:-1]])
-    axis_rate = np.cross(carrier, axis)
-    before = np.tri(7, k=-1)[:, :, None]  # joint i moves the origin of joint j if i < j
-    between = np.cross(axis[None, :, :], origin[:, None, :] - origin[None, :, :]) * before
-    origin_rate = np.einsum("jia,i->ja", between, dq)
-    com_rate = np.einsum("nja,j->na", jv, dq)
-    lever = posture.com[:, None, :] - origin[None, :, :]
-    lever_rate = com_rate[:, None, :] - origin_rate[None, :, :]
-    djv = np.cross(axis_rate[None], lever) + np.cross(axis[None], lever_rate)
-    djv *= posture.moves[:, :, None]
-    djw = axis_rate[None] * posture.moves[:, :, None]
-    spin = np.einsum("nja,j->na", jw, dq)
-    momentum = np.einsum("nab,njb->nja", posture.inertia, jw)
-    turning = np.einsum("nab,njb->nja", posture.inertia, djw) + np.cross(spin[:, None, :], momentum)
-    result: Array = np.einsum("n,nia,nja->ij", posture.mass, jv, djv)
-    result += np.einsum("nia,nja->ij", jw, turning)
-    return result
+    found = Square()
+    one().hd_mass_matrix(_bodies(robot, load), _joints(q, "q"), found)
+    return np.array(found).reshape(7, 7)
 
 
 def coriolis_matrix(
@@ -143,20 +93,22 @@ def coriolis_matrix(
     Returns:
         Shape (7, 7) [Nm s/rad].
     """
-    return _coriolis_matrix(_posture(robot, q, load), array(dq, 7, "dq"))
+    found = Square()
+    one().hd_coriolis_matrix(_bodies(robot, load), _joints(q, "q"), _joints(dq, "dq"), found)
+    return np.array(found).reshape(7, 7)
 
 
 def coriolis(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike, *, load: Body | None = None) -> Array:
     """Coriolis and centrifugal torques C(q, dq) dq, shape (7,) [Nm]; arguments as for `coriolis_matrix`."""
-    rates = array(dq, 7, "dq")
-    return _coriolis_matrix(_posture(robot, q, load), rates) @ rates
+    return _torques(robot, q, _joints(dq, "dq"), _STILL, _WEIGHTLESS, load)
 
 
-def _gravity(posture: _Posture, acceleration: npt.ArrayLike) -> Array:
-    held: Array = np.einsum(
-        "n,nia,a->i", posture.mass, posture.linear, array(acceleration, 3, "acceleration")
-    )
-    return -held
+def _torques(
+    robot: RobotModel, q: npt.ArrayLike, dq: Reals, ddq: Reals, fall: Reals, load: Body | None
+) -> Array:
+    found = Joints()
+    one().hd_inverse(_bodies(robot, load), _joints(q, "q"), dq, ddq, fall, found)
+    return np.array(found)
 
 
 def gravity(
@@ -173,7 +125,7 @@ def gravity(
     Returns:
         Shape (7,) [Nm].
     """
-    return _gravity(_posture(robot, q, load), acceleration)
+    return _torques(robot, q, _STILL, _STILL, _fall(acceleration), load)
 
 
 def inverse_dynamics(
@@ -200,14 +152,12 @@ def inverse_dynamics(
     Returns:
         Shape (7,) [Nm].
     """
-    posture, rates = _posture(robot, q, load), array(dq, 7, "dq")
-    inertial = _mass_matrix(posture) @ array(ddq, 7, "ddq")
-    rigid = inertial + _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
-    return rigid + _friction(friction, rates)
+    rigid = _torques(robot, q, _joints(dq, "dq"), _joints(ddq, "ddq"), _fall(acceleration), load)
+    return rigid + _friction(friction, dq)
 
 
-def _friction(friction: Friction | None, rates: Array) -> Array:
-    return np.zeros(7) if friction is None else instance(friction, Friction, "friction").torque(rates)
+def _friction(friction: Friction | None, dq: npt.ArrayLike) -> Array:
+    return np.zeros(7) if friction is None else instance(friction, Friction, "friction").torque(dq)
 
 
 def forward_dynamics(
@@ -234,7 +184,8 @@ def forward_dynamics(
     Returns:
         Shape (7,) [rad/s²].
     """
-    posture, rates = _posture(robot, q, load), array(dq, 7, "dq")
-    bias = _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
-    bias = bias + _friction(friction, rates)
-    return np.asarray(np.linalg.solve(_mass_matrix(posture), array(tau, 7, "tau") - bias), dtype=np.float64)
+    bodies, angles, rates = _bodies(robot, load), _joints(q, "q"), _joints(dq, "dq")
+    driving = array(tau, 7, "tau") - _friction(friction, dq)
+    found = Joints()
+    one().hd_forward(bodies, angles, rates, Joints(*driving.tolist()), _fall(acceleration), found)
+    return np.array(found)

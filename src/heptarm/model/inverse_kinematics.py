@@ -1,211 +1,81 @@
-"""Analytic inverse kinematics of an LBR with KUKA's redundancy: arm angle E1, Status and Turn.
+"""Inverse kinematics of an LBR with KUKA's redundancy: E1, Status and Turn; and the arm angle.
 
-Geometry after Shimizu, Kakuya, Yoon, Kitagaki, Kosuge, "Analytical Inverse Kinematic Computation for 7-DOF
-Redundant Manipulators With Joint Limits and Its Application to Redundancy Resolution", IEEE T-RO 24(5),
-2008, with KUKA's zero of the arm angle: E1 is the angle about the shoulder-wrist line away from the arm that
-reaches the wrist with A3 = 0 in the same Status. Status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0;
-bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
+E1 is the angle of A3, as in Sunrise. Status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0; bit 2, A6 <= 0.
+Turn: bit i, A(i+1) < 0. E1 and Status belong to one arm position of a pose. The arm angle is the elbow's turn about
+the shoulder-wrist line, from the arm with A3 = 0 in the same Status. `native/redundancy.c` computes all of it and
+names its sources.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
-from math import atan2, cos, hypot, isnan, pi, sin, sqrt
-from typing import TypeAlias
+from math import isnan, nan, sqrt
 
 import numpy as np
+import numpy.typing as npt
 
-from heptarm.errors import ShapeError, Unreachable
-from heptarm.model.kinematics import Columns, Vec, flange
-from heptarm.model.null_space import events
+from heptarm.errors import CommandRejected, ShapeError, Unreachable
+from heptarm.model.native import Joints, Matrix, Reals, Spans, constants, one
 from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
 from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.robot import RobotModel
 
-#: Rows of a rotation matrix.
-Rows: TypeAlias = tuple[Vec, Vec, Vec]
-
-#: Below it sin(b) does not determine the other two angles, and the wrist is neither before nor behind A1.
-SINGULAR = 1e-10
-_NARROW = 1e-9
-#: Largest step of the arm angle [rad] when the best of an interval is looked for.
-_STEP = pi / 36
-#: Where a solution is looked for when nothing is known: elbow down in front, wrist bent.
-_USUAL = (0.0, 0.3, 0.0, -pi / 2, 0.0, pi / 3, 0.0)
-_USUAL_STATUS = 2
+#: Outcomes of a solution in C.
+FOUND, TOO_FAR = 1, 0
+#: Solutions this far outside the joint limits are on them [rad].
+_ON_LIMIT = 1e-9
+#: Where a joint position is undetermined and nothing is known.
+_MIDDLE = Joints()
 
 
-def rows(pose: Pose | Array) -> tuple[Rows, Vec]:
-    """Rotation rows and position of a pose or a homogeneous matrix, as floats."""
-    if not isinstance(pose, Pose):
-        given = finite_entries(numbers(pose, "pose", "a Pose or a matrix of shape (4, 4)"), "pose")
-        if given.shape not in ((4, 4), (3, 4)):
-            raise ShapeError(f"pose must have shape (4, 4), got {given.shape}", parameter="pose", value=pose)
-        m = given.tolist()
-    else:
-        m = pose.matrix.tolist()
-    return (tuple(m[0][:3]), tuple(m[1][:3]), tuple(m[2][:3])), (m[0][3], m[1][3], m[2][3])
+def _matrix(pose: Pose | Array) -> Reals:
+    """A pose or a homogeneous matrix for C."""
+    if isinstance(pose, Pose):
+        return Matrix(*pose.matrix.ravel().tolist())
+    given = finite_entries(numbers(pose, "pose", "a Pose or a matrix of shape (4, 4)"), "pose")
+    if given.shape not in ((4, 4), (3, 4)):
+        raise ShapeError(f"pose must have shape (4, 4), got {given.shape}", parameter="pose", value=pose)
+    return Matrix(*given.ravel().tolist())
 
 
-def _times(a: Rows, b: Rows) -> Rows:
-    (b00, b01, b02), (b10, b11, b12), (b20, b21, b22) = b
-    r = [
-        (
-            x * b00 + y * b10 + z * b20,
-            x * b01 + y * b11 + z * b21,
-            x * b02 + y * b12 + z * b22,
-        )
-        for x, y, z in a
-    ]
-    return r[0], r[1], r[2]
+def _robot(robot: RobotModel) -> RobotModel:
+    return instance(robot, RobotModel, "robot")
 
 
-def _transposed(a: Rows) -> Rows:
-    t = list(zip(*a, strict=True))
-    return t[0], t[1], t[2]
-
-
-def _about(u: Vec, angle: float) -> Rows:
-    """Rotation about the unit vector u (Rodrigues)."""
-    x, y, z = u
-    c, s = cos(angle), sin(angle)
-    k = 1.0 - c
-    return (
-        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
-        (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
-        (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
+def too_far(robot: RobotModel, pose: Reals) -> Unreachable:
+    """The refusal of a pose, 16 numbers, whose wrist is too far from the shoulder, or too near."""
+    wrist = [pose[4 * i + 3] - robot.d_wf * pose[4 * i + 2] for i in range(3)]
+    away = sqrt(wrist[0] ** 2 + wrist[1] ** 2 + (wrist[2] - robot.d_bs) ** 2)
+    near, far = abs(robot.d_se - robot.d_ew), robot.d_se + robot.d_ew
+    return Unreachable(
+        f"the wrist would be {away:.3f} m from the shoulder; the {robot.title} reaches {near:.3f} to {far:.3f} m",
+        code=51,
+        value=round(away, 4),
+        allowed=f"[{near:.3f}, {far:.3f}] m",
+        hint="bring the target nearer, or change its orientation",
     )
 
 
-def _zy(a: float, b: float) -> Rows:
-    """Rz(a) Ry(b)."""
-    ca, sa, cb, sb = cos(a), sin(a), cos(b), sin(b)
-    return (ca * cb, -sa, ca * sb), (sa * cb, ca, sa * sb), (-sb, 0.0, cb)
-
-
-def _wrap(angle: float) -> float:
-    return angle - 2 * pi if angle > pi else angle + 2 * pi if angle <= -pi else angle
-
-
-def _zyz(r: Rows, negative: bool, near: float) -> Vec:
-    """Angles a, b, c of r = Rz(a) Ry(b) Rz(c) with b of the wanted sign; where b is 0, a keeps `near`.
-
-    c comes from a + c = atan2(r10 - r01, r00 + r11), or where b is near pi from a - c, so that r is
-    reproduced to the last digits however little b determines a.
-    """
-    s = hypot(r[0][2], r[1][2])
-    upright = r[2][2] >= 0
-    if s < SINGULAR:
-        a, b = near, 0.0 if upright else -pi if negative else pi
-    elif negative:
-        a, b = atan2(-r[1][2], -r[0][2]), -atan2(s, r[2][2])
-    else:
-        a, b = atan2(r[1][2], r[0][2]), atan2(s, r[2][2])
-    if upright:
-        return a, b, _wrap(atan2(r[1][0] - r[0][1], r[0][0] + r[1][1]) - a)
-    return a, b, _wrap(a - atan2(-r[1][0] - r[0][1], r[1][1] - r[0][0]))
-
-
-def _reference(robot: RobotModel, w: Vec, q4: float, behind: bool) -> tuple[float, float]:
-    """A1 and A2 of the arm with A3 = 0 whose wrist is at w (from the shoulder)."""
-    radius = hypot(w[0], w[1])
-    q1 = atan2(w[1], w[0])
-    if behind:
-        q1, radius = q1 + pi, -radius
-    return q1, atan2(radius, w[2]) - atan2(-robot.d_ew * sin(q4), robot.d_se + robot.d_ew * cos(q4))
-
-
-def _elbow(robot: RobotModel, w: Vec) -> float:
-    """|A4| from the shoulder-wrist distance; half-angle form, accurate near the straight arm.
-
-    Raises:
-        Unreachable: the wrist is too far from or too near to the shoulder.
-    """
-    square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    far, near = robot.d_se + robot.d_ew, abs(robot.d_se - robot.d_ew)
-    above, below = far * far - square, square - near * near
-    if above < -1e-9 or below < -1e-9 or square < 1e-9:
-        raise Unreachable(
-            f"the wrist would be {sqrt(square):.3f} m from the shoulder; the {robot.title} reaches "
-            f"{max(near, 0.0):.3f} to {far:.3f} m",
+def _no_posture(robot: RobotModel, e1: float, status: int, fixed: str) -> Unreachable:
+    low, high = robot.q_min[2], robot.q_max[2]
+    if not isnan(e1) and not low <= e1 <= high:
+        return Unreachable(
+            f"E1 is the angle of A3, which must be in [{np.degrees(low):.0f}, {np.degrees(high):.0f}] deg on the "
+            f"{robot.title}, got {np.degrees(e1):.2f} deg",
             code=51,
-            value=round(sqrt(square), 4),
-            allowed=f"[{near:.3f}, {far:.3f}] m",
-            hint="bring the target nearer, or change its orientation",
+            value=e1,
+            allowed=f"[{low:.4f}, {high:.4f}] rad",
+            hint="keep E1 inside the limits of A3, or leave it free",
         )
-    return 2.0 * atan2(sqrt(max(above, 0.0)), sqrt(max(below, 0.0)))
+    return Unreachable(
+        f"the pose is within reach, but every arm position that reaches it{fixed} violates a joint limit",
+        code=51,
+        hint="change the orientation" + (f", or leave{fixed.partition(' that')[2]} free" if fixed else ""),
+    )
 
 
-def _wrist(robot: RobotModel, r: Rows, p: Vec) -> Vec:
-    """Wrist as seen from the shoulder."""
-    d = robot.d_wf
-    return (p[0] - d * r[0][2], p[1] - d * r[1][2], p[2] - d * r[2][2] - robot.d_bs)
-
-
-def raw(
-    robot: RobotModel,
-    r: Rows,
-    p: Vec,
-    e1: float,
-    status: int,
-    near: Sequence[float] | None = None,
-    *,
-    continuous: bool = False,
-) -> tuple[float, ...]:
-    """Joint positions of a flange pose for an arm angle and a Status; limits are not checked.
-
-    Args:
-        robot: the robot.
-        r: rows of the flange's rotation.
-        p: position of the flange in the base frame [m].
-        e1: arm angle [rad].
-        status: bit 0 selects the reference arm of E1; bits 0 and 2 select A2's and A6's branch, unless
-            `continuous`.
-        near: joint positions that decide where a singularity leaves a choice.
-        continuous: of the two branches of the shoulder and of the wrist take the one next to `near`, so that
-            a path may pass through A2 = 0 or A6 = 0.
-
-    Raises:
-        Unreachable: out of reach.
-    """
-    w = _wrist(robot, r, p)
-    q4 = _elbow(robot, w)
-    if status & 2:
-        q4 = -q4
-    a1, a2 = _reference(robot, w, q4, bool(status & 1))
-    length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    r03 = _times(_about((w[0] / length, w[1] / length, w[2] / length), e1), _zy(a1, a2))
-    hint = near if near is not None else (a1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if continuous and near is not None:
-        shoulder = _next(_zyz(r03, False, hint[0]), _zyz(r03, True, hint[0]), hint[0], hint[1])
-    else:
-        shoulder = _zyz(r03, False, hint[0])
-        # bit 0: sign of the wrist's x in the frame of A1
-        ahead = w[0] * cos(shoulder[0]) + w[1] * sin(shoulder[0])
-        if abs(ahead) < SINGULAR:
-            same = cos(shoulder[0] - a1) > 0
-        else:
-            same = (ahead < 0) == bool(status & 1)
-        if not same:
-            shoulder = _zyz(r03, True, hint[0])
-    r47 = _times(_transposed(_times(r03, _zy(0.0, -q4))), r)
-    if continuous and near is not None:
-        wrist = _next(_zyz(r47, False, hint[4]), _zyz(r47, True, hint[4]), hint[4], hint[5])
-    else:
-        wrist = _zyz(r47, bool(status & 4), hint[4])
-    return (*shoulder, q4, *wrist)
-
-
-def _next(one: Vec, other: Vec, a: float, b: float) -> Vec:
-    """The branch whose first two angles are nearer to (a, b)."""
-
-    def distance(v: Vec) -> float:
-        return abs(_wrap(v[0] - a)) + abs(v[1] - b)
-
-    return one if distance(one) <= distance(other) else other
-
-
-def inside(robot: RobotModel, q: Sequence[float], tolerance: float = 1e-9) -> bool:
+def inside(robot: RobotModel, q: Sequence[float], tolerance: float = _ON_LIMIT) -> bool:
     """Whether all joints are within their limits."""
     return all(
         low - tolerance <= value <= high + tolerance
@@ -215,43 +85,38 @@ def inside(robot: RobotModel, q: Sequence[float], tolerance: float = 1e-9) -> bo
 
 def status_of(robot: RobotModel, q: Sequence[float]) -> int:
     """Status bits of a joint position."""
-    columns, p = flange(robot, q)
-    w = _wrist(robot, _rows(columns), p)
-    behind = w[0] * cos(q[0]) + w[1] * sin(q[0]) < -SINGULAR
-    return behind | (q[3] < 0) << 1 | (q[5] <= 0) << 2
+    return int(one().hi_status(constants(robot), Joints(*q)))
 
 
-def _rows(columns: Columns) -> Rows:
-    x, y, z = columns
-    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+def arm_angle(robot: RobotModel, q: npt.ArrayLike) -> float:
+    """Arm angle of a joint position: the elbow's turn about the shoulder-wrist line.
+
+    It is measured from the arm that reaches the wrist with A3 = 0 in the same Status (Shimizu et al. 2008). It is not
+    Sunrise's E1, which is the angle of A3. Where the arm is straight, or the wrist above the shoulder, the posture
+    does not determine it well.
+
+    Args:
+        robot: the robot.
+        q: joint positions, shape (7,) [rad].
+
+    Returns:
+        In (-pi, pi] [rad].
+    """
+    return float(one().hi_arm_angle(constants(_robot(robot)), Joints(*array(q, 7, "q").tolist())))
 
 
-def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
-    """E1 [rad] of a joint position, against the reference arm of Status bit 0 = `behind`."""
-    columns, p = flange(robot, q)
-    w = _wrist(robot, _rows(columns), p)
-    length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    a1, a2 = _reference(robot, w, q[3], behind)
-    c, s = cos(q[2]), sin(q[2])
-    turned = _times(
-        _times(_zy(q[0], q[1]), ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), _transposed(_zy(a1, a2))
-    )
-    axial = (turned[2][1] - turned[1][2]) * w[0] + (turned[0][2] - turned[2][0]) * w[1]
-    axial += (turned[1][0] - turned[0][1]) * w[2]
-    return atan2(axial / length, turned[0][0] + turned[1][1] + turned[2][2] - 1.0)
-
-
-def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
-    """E1, Status and Turn of a joint position, shape (7,) [rad]."""
-    instance(robot, RobotModel, "robot")
+def redundancy(robot: RobotModel, q: npt.ArrayLike) -> Redundancy:
+    """E1 (the angle of A3), Status and Turn of a joint position, shape (7,) [rad]."""
+    _robot(robot)
     values = array(q, 7, "q").tolist()
-    status = status_of(robot, values)
     turn = sum((value < 0) << index for index, value in enumerate(values))
-    return Redundancy(arm_angle(robot, values, bool(status & 1)), status, turn)
+    return Redundancy(values[2], status_of(robot, values), turn)
 
 
 def intervals(robot: RobotModel, pose: Pose | Array, status: int) -> list[tuple[float, float]]:
     """Arm angles at which a flange pose can be held in a Status within the joint limits.
+
+    `solve(..., arm_angle=, status=)` gives the joint positions for one of them.
 
     Args:
         robot: the robot.
@@ -259,46 +124,17 @@ def intervals(robot: RobotModel, pose: Pose | Array, status: int) -> list[tuple[
         status: bits 0-2.
 
     Returns:
-        Closed intervals of E1 [rad], ascending, the lower end in (-pi, pi]; one that passes through pi goes
+        Closed intervals of arm angles [rad], ascending, the lower end in (-pi, pi]; one that passes through pi goes
         on above it.
 
     Raises:
         Unreachable: out of reach.
     """
-    r, p = rows(pose)
-    return _intervals(instance(robot, RobotModel, "robot"), r, p, integer(status, "status", 0, 7))
-
-
-def _intervals(robot: RobotModel, r: Rows, p: Vec, status: int) -> list[tuple[float, float]]:
-    w = _wrist(robot, r, p)
-    q4 = _elbow(robot, w)
-    if status & 2:
-        q4 = -q4
-    if abs(q4) > robot.q_max[3] + 1e-9:
-        return []
-    u = np.array(w) / sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    reference = np.array(_zy(*_reference(robot, w, q4, bool(status & 1))))
-
-    def feasible(e1: float) -> bool:
-        return inside(robot, raw(robot, r, p, e1, status))
-
-    marks = events(robot, u, reference, np.array(r), q4)
-    if not marks:
-        return [(-pi, pi)] if feasible(0.0) else []
-    pairs = list(zip(marks, [*marks[1:], marks[0] + 2 * pi], strict=True))
-    found: list[tuple[float, float]] = []
-    for low, high in pairs:
-        if not feasible((low + high) / 2):
-            continue
-        if found and low - found[-1][1] <= _NARROW:
-            found[-1] = (found[-1][0], high)
-        else:
-            found.append((low, high))
-    # the last interval may end where the first begins, one turn on
-    if len(found) > 1 and found[0][0] + 2 * pi - found[-1][1] <= _NARROW:
-        first = found.pop(0)
-        found[-1] = (found[-1][0], first[1] + 2 * pi)
-    return found
+    given, spans = _matrix(pose), Spans()
+    count = one().hi_intervals(constants(_robot(robot)), given, integer(status, "status", 0, 7), spans)
+    if count < 0:
+        raise too_far(robot, given)
+    return [(spans[2 * index], spans[2 * index + 1]) for index in range(count)]
 
 
 def solve(
@@ -307,79 +143,96 @@ def solve(
     *,
     e1: float | None = None,
     status: int | None = None,
-    near: Sequence[float] | None = None,
+    near: npt.ArrayLike | None = None,
+    arm_angle: float | None = None,
 ) -> Array:
     """Solve the inverse kinematics: joint positions within the limits for a flange pose.
 
-    E1 and Status are kept if given; otherwise they are taken from `near` if that gives a solution within the limits. If
-    not, the result is the solution closest to `near` (by default a bent arm), in the same Status if possible, then in
-    any. If there is a solution within the limits, one is found.
+    E1, Status and arm angle are kept if given. Otherwise A3 and Status stay those of `near`, unless another arm
+    position needs less than a fifth of that way: then it is the one nearest to `near`. If there is a solution within
+    the limits, one is found. Where axes coincide, so that the pose does not determine joints (A2, A4 or A6 near 0),
+    those joints stay as near to `near` as the pose allows within 1e-9 m and rad. Without `near`, a usual bent arm takes
+    its place.
 
     Args:
         robot: the robot.
         pose: of the flange in the base frame.
-        e1: arm angle [rad]; None: not given.
+        e1: angle of A3 [rad]; None: not given.
         status: bits 0-2; None or -1: not given.
         near: joint positions, shape (7,) [rad].
+        arm_angle: see `model.arm_angle` [rad]; None: not given.
 
     Returns:
-        Shape (7,) [rad].
+        Shape (7,) [rad]. A joint that the pose needs up to 2e-5 rad beyond its limit, as by noise, is on the limit.
 
     Raises:
+        CommandRejected: both E1 and an arm angle are given.
         LimitError: a value is outside its range, such as Status 8.
         Unreachable: no solution within the joint limits; the text names the cause.
     """
-    instance(robot, RobotModel, "robot")
-    r, p = rows(pose)
-    hint = None if near is None else array(near, 7, "near").tolist()
+    _robot(robot)
+    matrix = _matrix(pose)
+    hint = None if near is None else Joints(*array(near, 7, "near").tolist())
     given = Redundancy(NOT_GIVEN if e1 is None else e1, -1 if status is None else status)
-    e1 = None if isnan(given.e1) else given.e1
-    wanted = status = None if given.status < 0 else given.status
-    if hint is not None:
-        own = redundancy(robot, hint)
-        wanted = own.status if status is None else status
-        candidate = raw(robot, r, p, own.e1 if e1 is None else e1, wanted, hint)
-        if inside(robot, candidate):
-            return np.array(candidate)
-    elif wanted is None:
-        wanted = _USUAL_STATUS
-    best = _nearest(robot, r, p, e1, [wanted], hint)
-    if best is None and status is None:
-        best = _nearest(robot, r, p, e1, [s for s in range(8) if s != wanted], hint)
-    if best is None:
-        fixed = " with that E1 or Status" if e1 is not None or status is not None else ""
-        raise Unreachable(
-            f"the pose is within reach, but every arm position that reaches it{fixed} violates a joint limit",
-            code=51,
-            hint="change the orientation" + (", or leave E1 and Status free" if fixed else ""),
-        )
-    return np.array(best)
+    if arm_angle is not None:
+        if not isnan(given.e1):
+            raise CommandRejected(
+                "both e1 and arm_angle are given",
+                parameter="arm_angle",
+                hint="give one of them: each fixes the elbow",
+            )
+        angle = finite(arm_angle, "arm_angle", unit="rad")
+        return _with_arm_angle(robot, matrix, angle, given.status, hint)
+    outcome, found = _solved(robot, matrix, given.e1, given.status, hint)
+    if outcome == FOUND:
+        return np.array(found)
+    if outcome == TOO_FAR:
+        raise too_far(robot, matrix)
+    fixed = " with that E1 or Status" if not isnan(given.e1) or given.status >= 0 else ""
+    raise _no_posture(robot, given.e1, given.status, fixed)
 
 
-def _nearest(
-    robot: RobotModel, r: Rows, p: Vec, e1: float | None, states: Sequence[int], hint: Sequence[float] | None
-) -> tuple[float, ...] | None:
-    """The solution next to `hint`, each joint's distance counted in its range; None if there is none."""
-    goal = _USUAL if hint is None else hint
-    weights = (1.0 / (robot.q_max - robot.q_min) ** 2).tolist()
+def _solved(
+    robot: RobotModel, matrix: Reals, e1: float, status: int, near: Reals | None
+) -> tuple[int, Reals]:
+    outcome, found = ctypes.c_int(), Joints()
+    one().hi_solve(
+        constants(robot),
+        1,
+        matrix,
+        ctypes.byref(ctypes.c_double(e1)),
+        ctypes.byref(ctypes.c_int(status)),
+        near,
+        not isnan(e1),
+        found,
+        ctypes.byref(outcome),
+    )
+    return outcome.value, found
 
-    def distance(q: Sequence[float]) -> float:
-        return float(sum(w * (x - y) * (x - y) for w, x, y in zip(weights, q, goal, strict=True)))
 
-    found: list[tuple[float, ...]] = []
-    for status in states:
-        angles = [e1] if e1 is not None else _samples(_intervals(robot, r, p, status))
-        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status, hint)))
-    return min(found, key=distance, default=None)
+def at_arm_angle(
+    robot: RobotModel, matrix: Reals, angle: float, status: int, near: Reals | None
+) -> tuple[float, ...]:
+    """Joint positions of a pose for an arm angle and a Status; limits are not checked.
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    found = Joints()
+    if not one().hi_with_arm_angle(constants(robot), matrix, angle, status, near or _MIDDLE, found):
+        raise too_far(robot, matrix)
+    return tuple(found)
 
 
-def _samples(spans: Sequence[tuple[float, float]]) -> list[float]:
-    """Arm angles from the insides of intervals: their ends lie on joint limits."""
-    result = []
-    for low, high in spans:
-        count = 1 + int((high - low) / _STEP)
-        result += [low + (high - low) * (i + 0.5) / count for i in range(count)]
-    return result
+def _with_arm_angle(robot: RobotModel, matrix: Reals, angle: float, status: int, near: Reals | None) -> Array:
+    """The solution with an arm angle that is nearest to `near`; without it, in the lowest Status."""
+    states = range(8) if status < 0 else (status,)
+    found = [q for s in states if inside(robot, q := at_arm_angle(robot, matrix, angle, s, near))]
+    if not found:
+        raise _no_posture(robot, nan, status, " with that arm angle or Status")
+    goal = np.array(found[0] if near is None else near)
+    best = min(found, key=lambda q: float(np.sum((np.array(q) - goal) ** 2)))
+    return np.clip(best, robot.q_min, robot.q_max)
 
 
 def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None) -> list[Array]:
@@ -388,20 +241,66 @@ def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None)
     Args:
         robot: the robot.
         pose: of the flange in the base frame.
-        e1: arm angle [rad]; None: the middle of each interval of arm angles.
+        e1: angle of A3 [rad]; None: the middle of each interval of arm angles.
 
     Returns:
-        For an arm angle: one for each Status that has one, up to 8. Without: one for each interval of each
+        For an E1: one for each Status that has one, up to 8. Without: one for each interval of each
         Status. Each has shape (7,) [rad].
 
     Raises:
         Unreachable: out of reach.
     """
-    instance(robot, RobotModel, "robot")
-    r, p = rows(pose)
-    e1 = None if e1 is None else finite(e1, "e1", unit="rad")
-    found: list[tuple[float, ...]] = []
-    for status in range(8):
-        angles = [(a + b) / 2 for a, b in _intervals(robot, r, p, status)] if e1 is None else [e1]
-        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status)))
-    return [np.array(q) for q in found]
+    matrix = _matrix(pose)
+    if e1 is not None:
+        angle = finite(e1, "e1", unit="rad")
+        solved = [_solved(_robot(robot), matrix, angle, status, None) for status in range(8)]
+        if solved[0][0] == TOO_FAR:
+            raise too_far(robot, matrix)
+        return [np.array(found) for outcome, found in solved if outcome == FOUND]
+    middles = [(status, (a + b) / 2) for status in range(8) for a, b in intervals(robot, pose, status)]
+    solutions = [at_arm_angle(robot, matrix, angle, status, None) for status, angle in middles]
+    return [np.array(q) for q in solutions if inside(robot, q)]
+
+
+class PathInverse:
+    """Joint positions along a path of the tool frame, each next to the ones before; limits are not checked.
+
+    Args:
+        robot: the robot.
+        tcp: flange to tool frame.
+    """
+
+    __slots__ = ("_arm", "_robot", "_solve", "_tool")
+
+    def __init__(self, robot: RobotModel, tcp: Pose) -> None:
+        back = tcp.inverse()
+        self._robot, self._arm, self._solve = robot, constants(robot), one().hi_joints
+        self._tool = Joints(*back.xyz.tolist(), *back.quat.tolist())
+
+    def joints(self, point: Sequence[float], quat: Sequence[float], near: Array, *, a3: float = nan) -> Array:
+        """Joint positions next to `near` for the tool frame at a point with an orientation, shape (7,) [rad].
+
+        Args:
+            point: in the base, 3 [m].
+            quat: in the base, x y z w.
+            near: joint positions, shape (7,) [rad]; A3 stays, unless another arm position is much nearer.
+            a3: angle that A3 must have [rad]; NaN: any.
+
+        Raises:
+            Unreachable: out of reach, or not with this A3.
+        """
+        found = Joints()
+        fixed = not isnan(a3)
+        outcome = self._solve(self._arm, self._tool, *point, *quat, a3, fixed, Joints(*near.tolist()), found)
+        if outcome == FOUND:
+            return np.array(found)
+        if outcome == TOO_FAR:
+            place = Pose(np.array(point), np.array(quat)) @ Pose(
+                np.array(self._tool[:3]), np.array(self._tool[3:])
+            )
+            raise too_far(self._robot, _matrix(place))
+        raise Unreachable(
+            f"no arm position has A3 at {np.degrees(a3):.1f} deg there",
+            code=51,
+            hint="leave E1 free, or change it",
+        )

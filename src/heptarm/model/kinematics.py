@@ -1,21 +1,19 @@
 """Forward kinematics and Jacobian of an LBR.
 
 The chain is Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7) with all offsets along z: base to shoulder, to
-elbow, to wrist, to flange. A rotation about z or y mixes two columns of the rotation matrix, so the product
-is six sums a joint; it is written with plain floats because numpy's overhead on 3x3 matrices is ten times
-its work.
+elbow, to wrist, to flange. `native/kinematics.h` computes it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, sin
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
+from heptarm.model.native import Jacobian, Joints, Matrix, Reals, Vector, Vectors, constants, one
 from heptarm.values.arrays import Array, array, instance, integer
 from heptarm.values.robot import RobotModel
 
@@ -24,38 +22,12 @@ Vec: TypeAlias = tuple[float, float, float]
 Columns: TypeAlias = tuple[Vec, Vec, Vec]
 
 
-def _mix(u: Vec, v: Vec, c: float, s: float) -> Vec:
-    return (c * u[0] + s * v[0], c * u[1] + s * v[1], c * u[2] + s * v[2])
-
-
-def _turn_z(m: Columns, angle: float) -> Columns:
-    """M Rz(angle)."""
-    c, s = cos(angle), sin(angle)
-    return _mix(m[0], m[1], c, s), _mix(m[1], m[0], c, -s), m[2]
-
-
-def _turn_y(m: Columns, angle: float) -> Columns:
-    """M Ry(angle)."""
-    c, s = cos(angle), sin(angle)
-    return _mix(m[0], m[2], c, -s), m[1], _mix(m[2], m[0], c, s)
-
-
-def _along(p: Vec, d: Vec, length: float) -> Vec:
-    return (p[0] + length * d[0], p[1] + length * d[1], p[2] + length * d[2])
-
-
-_IDENTITY: Columns = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
 def flange(robot: RobotModel, q: Sequence[float]) -> tuple[Columns, Vec]:
     """Columns of the flange's rotation and its position [m] in the base frame; plain floats, for the tick."""
-    m = _turn_y(_turn_z(_IDENTITY, q[0]), q[1])
-    p = _along((0.0, 0.0, robot.d_bs), m[2], robot.d_se)
-    m = _turn_y(_turn_z(m, q[2]), -q[3])
-    p = _along(p, m[2], robot.d_ew)
-    m = _turn_y(_turn_z(m, q[4]), q[5])
-    p = _along(p, m[2], robot.d_wf)
-    return _turn_z(m, q[6]), p
+    found = Matrix()
+    one().hk_forward(constants(robot), 1, Joints(*q), found)
+    a, b, c, x, d, e, f, y, g, h, i, z, *_ = found
+    return ((a, d, g), (b, e, h), (c, f, i)), (x, y, z)
 
 
 def forward(robot: RobotModel, q: npt.ArrayLike, *, link: int | None = None) -> Array:
@@ -75,43 +47,25 @@ def forward(robot: RobotModel, q: npt.ArrayLike, *, link: int | None = None) -> 
         LimitError: one is not finite, or no such link.
     """
     instance(robot, RobotModel, "robot")
-    angles = array(q, 7, "q").tolist()
-    if link is not None:
-        return _link(robot, angles, integer(link, "link", 1, 7))
-    columns, position = flange(robot, angles)
-    result = np.eye(4)
-    result[:3, :3] = np.array(columns).T
-    result[:3, 3] = position
-    return result
-
-
-def _link(robot: RobotModel, q: Sequence[float], link: int) -> Array:
-    """Pose of the frame of link 1 to 7, shape (4, 4) [m]."""
-    columns, position = _IDENTITY, np.zeros(3)
-    for index in range(link):
-        position = position + np.array(columns).T @ robot.links.origin[index]
-        angle = -q[index] if index == 3 else q[index]
-        columns = _turn_z(columns, angle) if index % 2 == 0 else _turn_y(columns, angle)
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = np.array(columns).T, position
-    return result
+    angles, found = Joints(*array(q, 7, "q").tolist()), Matrix()
+    if link is None:
+        one().hk_forward(constants(robot), 1, angles, found)
+    else:
+        origins = Vectors(*robot.links.origin.ravel().tolist())
+        one().hk_link(origins, angles, integer(link, "link", 1, 7), found)
+    return np.array(found).reshape(4, 4)
 
 
 def joints(robot: RobotModel, q: Sequence[float]) -> tuple[list[Vec], list[Vec], Vec]:
     """Axes and points of the seven joints in the base frame, and the flange's position."""
-    m0 = _turn_z(_IDENTITY, q[0])
-    m1 = _turn_y(m0, q[1])
-    m2 = _turn_z(m1, q[2])
-    m3 = _turn_y(m2, -q[3])
-    m4 = _turn_z(m3, q[4])
-    m5 = _turn_y(m4, q[5])
-    shoulder = (0.0, 0.0, robot.d_bs)
-    elbow = _along(shoulder, m1[2], robot.d_se)
-    wrist = _along(elbow, m3[2], robot.d_ew)
-    minus_y = (-m2[1][0], -m2[1][1], -m2[1][2])
-    axes = [(0.0, 0.0, 1.0), m0[1], m1[2], minus_y, m3[2], m4[1], m5[2]]
-    points = [shoulder, shoulder, shoulder, elbow, wrist, wrist, wrist]
-    return axes, points, _along(wrist, m5[2], robot.d_wf)
+    axes, points, tip = Vectors(), Vectors(), Vector()
+    one().hk_joints(constants(robot), Joints(*q), axes, points, tip)
+    return _vectors(axes), _vectors(points), (tip[0], tip[1], tip[2])
+
+
+def _vectors(flat: Reals) -> list[Vec]:
+    numbers = list(flat)
+    return list(zip(numbers[0::3], numbers[1::3], numbers[2::3], strict=True))
 
 
 def jacobian(
@@ -139,10 +93,11 @@ def jacobian(
             parameter="point",
             hint=f"for example model.forward(robot, q, link={link})[:3, 3]",
         )
-    axes, points, tip = joints(robot, array(q, 7, "q").tolist())
-    target = np.asarray(tip) if point is None else array(point, 3, "point")
-    z = np.array(axes)
-    result = np.vstack([np.cross(z, target - np.array(points)).T, z.T])
+    given = Joints(*array(q, 7, "q").tolist())
+    found = Jacobian()
+    target = None if point is None else Vector(*array(point, 3, "point").tolist())
+    one().hk_jacobian(constants(robot), 1, given, target, found)
+    result = np.array(found).reshape(6, 7)
     result[:, link:] = 0.0
     return result
 

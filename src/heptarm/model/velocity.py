@@ -1,8 +1,9 @@
 """Joint velocities of a stream of velocities: twists to joints, and every limit on the way to positions.
 
-Twists become joint velocities by damped least squares, and an `ElbowTask` uses the redundant joint. `VelocityPath` integrates velocities to positions, so that no
-joint is too fast, accelerates too hard, or cannot brake before its limit; where it has to be slower than commanded, the
-direction stays and a `Slowdown` has the reason. Without arm, loop or clock.
+Twists become joint velocities by damped least squares, and an `ElbowTask` uses the redundant joint. `VelocityPath`
+integrates velocities to positions, so that no joint is too fast, accelerates too hard, or cannot brake before its
+limit; where it has to be slower than commanded, the direction stays and a `Slowdown` has the reason. Poses become joint
+positions in the same manner. Without arm, loop or clock.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model.inverse_kinematics import arm_angle, solve, status_of
+from heptarm.model.inverse_kinematics import arm_angle, solve
 from heptarm.model.kinematics import jacobian
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -29,13 +30,17 @@ ELBOWS: tuple[Elbow, ...] = ("keep", "center")
 _SINGULAR, _DAMPING = 0.08, 0.1
 #: Below it the motion of the elbow is not determined.
 _UNDEFINED = 1e-4
-#: The elbow comes to where it is to be by this fraction of what is left per time [1/s], with "keep" at most so many times
-#: as fast as the fastest joint.
+#: The elbow comes to where it is to be by this fraction of what is left per time [1/s], with "keep" at most so many
+#: times as fast as the fastest joint.
 _GAIN, _BACK = 4.0, 1.0
-#: Derivative of the arm angle by a motion of the joints below which it is damped, and the step of difference quotients [rad].
+#: Derivative of the arm angle by a motion of the joints below which it is damped, and the step of difference quotients
+#: [rad].
 _FLAT, _STEP = 0.1, 1e-6
-#: Of a pose: most steps of the elbow, the smallest one [rad], and the joint movement per step that shows that it led astray.
+#: Of a pose: most steps of the elbow, the smallest one [rad], and the joint movement per step that shows that it led
+#: astray.
 _ROUNDS, _STILL, _ASTRAY = 3, 1e-7, 3.0
+#: With "keep" the elbow moves at most so many times as far as the joints do for the pose.
+_AS_FAR = 3.0
 #: Largest place of a joint in its range, -1 to 1, at which the distance to the limits counts.
 _BRINK = 0.999
 #: Distance that velocities leave to a joint limit, and straight lines to poses [rad].
@@ -78,8 +83,8 @@ class ElbowTask:
         robot: the robot.
         q: joint positions at the start of the stream, shape (7,) [rad].
         elbow: "keep": the arm angle stays that of the start; "center": the joints stay away from their limits.
-        posture: the joints stay as near as they can to these positions, shape (7,) [rad]; None: no posture. It takes the
-            place of `elbow`.
+        posture: the joints stay as near as they can to these positions, shape (7,) [rad]; None: no posture. It takes
+            the place of `elbow`.
     """
 
     def __init__(
@@ -88,8 +93,7 @@ class ElbowTask:
         self._robot, self._posture = robot, posture
         self._keeps = posture is None and elbow == "keep"
         self._middle, self._half = 0.5 * (robot.q_max + robot.q_min), 0.5 * (robot.q_max - robot.q_min)
-        self._behind = bool(status_of(robot, q.tolist()) & 1)
-        self._start = self._last = self._angle(q)
+        self._start = self._last = arm_angle(robot, q)
 
     def rate(self, q: Array, dq: Array, null: Array, *, idle: bool = False) -> float:
         """Wanted velocity along a joint motion that leaves the flange where it is [rad/s].
@@ -110,11 +114,11 @@ class ElbowTask:
         Args:
             q: joint positions, shape (7,) [rad].
             null: that motion, of length 1, shape (7,).
-            moved: by how much the joints move otherwise [rad]: "keep" goes no farther.
+            moved: by how much the joints move otherwise [rad]: "keep" goes no more than some times as far.
             reach: the largest distance [rad].
         """
         if self._keeps:
-            most = min(moved, reach)
+            most = min(_AS_FAR * moved, reach)
             wanted = -_divided(self._error(q), self._slope(q, null))
         else:
             most, wanted = reach, self._left(q, null)
@@ -124,7 +128,8 @@ class ElbowTask:
         """Distance along a motion to the posture, or to the middle of the joints' ranges [rad]: a step of Newton's."""
         if self._posture is not None:
             return float(null @ (self._posture - q))
-        # sum of 1 / (1 - x²): Chan and Dubey, "A weighted least-norm solution based scheme for avoiding joint limits", 1995
+        # sum of 1 / (1 - x²): Chan and Dubey, "A weighted least-norm solution based scheme for avoiding joint limits
+        # for redundant joint manipulators", 1995
         x = np.clip((q - self._middle) / self._half, -_BRINK, _BRINK)
         room = 1.0 - x * x
         slope = 2.0 * x / (room**2 * self._half)
@@ -142,20 +147,18 @@ class ElbowTask:
 
     def _error(self, q: Array) -> float:
         """The arm angle relative to that of the start [rad]."""
-        angle = self._angle(q)
-        # the reference turns over where the wrist passes above or below the shoulder, and the arm does not
-        if abs(_wrapped(angle - self._last)) > 0.5 * pi:
-            self._behind = not self._behind
-            angle = self._angle(q)
-        self._last = angle
-        return _wrapped(angle - self._start)
+        self._last = self._angle(q)
+        return _wrapped(self._last - self._start)
 
     def _slope(self, q: Array, direction: Array) -> float:
         """Derivative of the last arm angle, that of `_error`, along a direction, shape (7,)."""
         return _wrapped(self._angle(q + _STEP * direction) - self._last) / _STEP
 
     def _angle(self, q: Array) -> float:
-        return arm_angle(self._robot, q.tolist(), self._behind)
+        """The arm angle next to the last one [rad]."""
+        angle = arm_angle(self._robot, q)
+        # what it is measured from turns over where the Status changes, and the arm does not
+        return angle if abs(_wrapped(angle - self._last)) < 0.5 * pi else angle + pi
 
 
 def _wrapped(angle: float) -> float:
@@ -205,9 +208,9 @@ def resolved_twist(
     """Joint velocities for a twist at the end of a path, and how much of the twist they achieve.
 
     Those of `joint_velocity`, and a motion in the null space of the Jacobian: the elbow follows its task as far as no
-    joint slows the twist down, and helps where one would, near a limit of its position or of its speed (after Flacco, De
-    Luca and Khatib, "Control of redundant robots under hard joint constraints: saturation in the null space", 2015, with
-    one redundant joint).
+    joint slows the twist down, and helps where one would, near a limit of its position or of its speed (after Flacco,
+    De Luca and Khatib, "Control of redundant robots under hard joint constraints: saturation in the null space", 2015,
+    with one redundant joint).
 
     Args:
         robot: the robot.
@@ -259,7 +262,7 @@ def resolved_pose(robot: RobotModel, pose: Pose, near: Array, *, elbow: ElbowTas
             break
         if float(np.abs(there - q).max()) > _ASTRAY * abs(step):
             break  # a limit is in the way: the next solution is elsewhere
-        q, reach, moved = there, reach - abs(step), moved - abs(step)
+        q, reach = there, reach - abs(step)
     return q
 
 

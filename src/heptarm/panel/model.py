@@ -6,6 +6,7 @@ what a button does can be tested, and refused, in one place.
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections import deque
@@ -532,7 +533,9 @@ class PanelArm:
         self._check_allowed()
         if self._recorder is not None:
             raise CommandRejected("a recording runs", parameter="recording", hint="stop it first")
-        path = self._folder / time.strftime("panel-%Y%m%d-%H%M%S.mcap")
+        begun = time.strftime("panel-%Y%m%d-%H%M%S")
+        names = (f"{begun}{f'-{number}' if number > 1 else ''}.mcap" for number in itertools.count(1))
+        path = next(one for name in names if not (one := self._folder / name).exists())
         self._recorder = self.arm.record(path).start()
         self._say(f"Recording to {path}")
         return path

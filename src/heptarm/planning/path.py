@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from math import pi
+from math import nan, pi, remainder
 from typing import Protocol
 
 import numpy as np
 
-from heptarm.model import inverse_kinematics
-from heptarm.model.kinematics import Vec
-from heptarm.planning.geometry import Geometry, Quat, blend_weight, product
-from heptarm.planning.native_inverse import NativeInverse, inverse_library
+from heptarm.model.inverse_kinematics import PathInverse, status_of
+from heptarm.planning.geometry import Geometry, blend_weight
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
@@ -49,58 +47,6 @@ class JointLine:
         return start + s * span
 
 
-class TcpInverseKinematics:
-    """Joint positions for poses of the tool frame, in the Status of the arm at the start of its motion.
-
-    Args:
-        robot: the robot.
-        start: joint positions at the start, shape (7,) [rad].
-        tcp: flange to tool frame.
-
-    Attributes:
-        status: of the arm at the start.
-        e1: its arm angle [rad].
-    """
-
-    __slots__ = ("_native", "_offset", "_robot", "_turned", "e1", "status")
-
-    def __init__(self, robot: RobotModel, start: Array, tcp: Pose) -> None:
-        self._robot = robot
-        to_flange = tcp.inverse()
-        self._offset: Vec = tuple(to_flange.xyz.tolist())
-        self._turned: Quat | None = tuple(to_flange.quat.tolist()) if to_flange.quat[3] < 1.0 else None
-        library = inverse_library()
-        self._native = (
-            None
-            if library is None
-            else NativeInverse(library, robot, self._offset, self._turned or (0.0, 0.0, 0.0, 1.0))
-        )
-        self.status = inverse_kinematics.status_of(robot, start.tolist())
-        self.e1 = inverse_kinematics.arm_angle(robot, start.tolist(), bool(self.status & 1))
-
-    def joints(self, point: Vec, quat: Quat, e1: float, near: Array) -> Array:
-        """Joint positions next to `near`, shape (7,) [rad]; computes with plain floats, since every tick calls it.
-
-        Raises:
-            Unreachable: out of reach.
-        """
-        if self._native is not None:
-            found = self._native.joints(point, quat, e1, self.status, near)
-            if found is not None:
-                return found
-        r, (x, y, z), (u, v, w) = _rows(quat), point, self._offset
-        p = (
-            x + r[0][0] * u + r[0][1] * v + r[0][2] * w,
-            y + r[1][0] * u + r[1][1] * v + r[1][2] * w,
-            z + r[2][0] * u + r[2][1] * v + r[2][2] * w,
-        )
-        if self._turned is not None:
-            r = _rows(product(quat, self._turned))
-        return np.array(
-            inverse_kinematics.raw(self._robot, r, p, e1, self.status, near.tolist(), continuous=True)
-        )
-
-
 class Sequential:
     """A path whose joint positions have to be computed one after the other."""
 
@@ -110,14 +56,14 @@ class Sequential:
 
 
 class CartesianPath(Sequential):
-    """Path of the tool frame in space, the arm angle linear with s.
+    """Path of the tool frame in space, E1 (the angle of A3) linear with s.
 
     Args:
         robot: the robot.
         start: joint positions at s = 0, shape (7,) [rad].
         geometry: pose of the tool frame over s.
         tcp: flange to tool frame.
-        e1: arm angle at s = 1 [rad]; None: as at the start.
+        e1: at s = 1 [rad]; None: A3 stays, as far as the joints on the path need no long way then.
 
     Attributes:
         length: [m].
@@ -130,29 +76,29 @@ class CartesianPath(Sequential):
     ) -> None:
         self.geometry = geometry
         self.length, self.angle = geometry.length, geometry.angle
-        self._inverse = TcpInverseKinematics(robot, start, tcp)
-        self.status = self._inverse.status
-        self._e1 = self._inverse.e1
-        self._turn = 0.0 if e1 is None else (e1 - self._e1 + pi) % (2 * pi) - pi
-        self._arm = self._linear
+        self._inverse = PathInverse(robot, tcp)
+        self.status, self._start = status_of(robot, start.tolist()), float(start[2])
+        self._turn = 0.0 if e1 is None else remainder(e1, 2 * pi) - self._start
+        self._a3 = self._free if e1 is None else self._linear
 
     def _linear(self, s: float) -> float:
-        return self._e1 + s * self._turn
+        return self._start + s * self._turn
+
+    @staticmethod
+    def _free(s: float) -> float:
+        return nan
 
     def joined(self, other: CartesianPath, geometry: Geometry, last: float, first: float) -> CartesianPath:
-        """The blend of this path's last fraction into another's first, the arm angle blended like the geometry."""
+        """The blend of this path's last fraction into another's first, E1 blended like the geometry."""
         result = copy(self)
         result.geometry, result.length, result.angle = geometry, geometry.length, geometry.angle
-        mine, others = self._linear, other._linear
+        mine, others, corner = self._linear, other._linear, other._start
 
-        def arm(s: float) -> float:
-            return (
-                mine(1.0 - last * blend_weight(s))
-                + others(first * blend_weight(1.0 - s))
-                - other._linear(0.0)
-            )
+        def blended(s: float) -> float:
+            return mine(1.0 - last * blend_weight(s)) + others(first * blend_weight(1.0 - s)) - corner
 
-        result._arm = arm
+        if self._turn or other._turn:
+            result._a3 = blended
         return result
 
     def at(self, s: float, near: Array) -> Array:
@@ -161,17 +107,7 @@ class CartesianPath(Sequential):
         Raises:
             Unreachable: the path leaves the workspace.
         """
-        return self._inverse.joints(self.geometry.point(s), self.geometry.quat(s), self._arm(s), near)
-
-
-def _rows(quat: Quat) -> inverse_kinematics.Rows:
-    """Rows of the rotation of a unit quaternion x y z w."""
-    x, y, z, w = quat
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
+        return self._inverse.joints(self.geometry.point(s), self.geometry.quat(s), near, a3=self._a3(s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -133,7 +133,9 @@ class Policy:
                     f"it must have format {_FORMAT} for this heptarm, got format {about['format']}"
                 )
             count = sum(name.startswith("w") for name in entries)
-            layers = [(entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)]
+            layers: list[tuple[npt.ArrayLike, npt.ArrayLike]] = [
+                (entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)
+            ]
             return cls(
                 ReachTask.from_dict(about["task"]),
                 layers=layers,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, StaleState
 from heptarm.values.arrays import Array, within
 from heptarm.values.condition.condition import Condition
@@ -20,9 +20,6 @@ from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.result import Result
 from heptarm.values.state import State
 
-if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
-
 #: Default of the longest time for teaching [s].
 PATIENCE = 300.0
 #: Longest time from cancelling the motion to its end [s].
@@ -30,12 +27,13 @@ _END_TIMEOUT = 30.0
 
 
 def guide_precisely(
-    arm: Arm,
+    arm: ArmVerbs,
     free: str,
     *,
     frame: str = TOOL,
     seconds: float = 60.0,
     until: Condition | None = None,
+    speed: float | None = None,
 ) -> Result:
     """Let a person guide the arm by hand along some directions only, and hold it stiffly in all others.
 
@@ -48,12 +46,13 @@ def guide_precisely(
         frame: whose axes: "tool" (the motion frame's own at the start), "base", or the name of a frame.
         seconds: duration [s].
         until: break condition that ends it earlier, such as `io.user_button`.
+        speed: bound of the speed along the free axes [m/s]; None: 0.25.
     """
-    return arm.move(hold(seconds), mode=compliance(free, frame=frame), until=until)
+    return arm.move(hold(seconds), mode=compliance(free, frame=frame, speed=speed), until=until)
 
 
 def teach(
-    arm: Arm,
+    arm: ArmVerbs,
     motion: Motion | None = None,
     *,
     mode: Mode | None = None,

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from math import prod
 from pathlib import Path
 from typing import Any, BinaryIO
+from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
@@ -132,6 +133,25 @@ def read_text(path: Path, *, largest: int = LARGEST_TEXT, name: str = "path") ->
             hint="save it as UTF-8 with an editor",
         ) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_xml(path: Path, what: str, *, name: str = "path", hint: str = "") -> ElementTree.Element:
+    """The root of an XML file.
+
+    Args:
+        path: the file.
+        what: it should be, for the error.
+        name: of the parameter.
+        hint: what to do otherwise.
+
+    Raises:
+        CommandRejected: it cannot be read, or is not XML; the text has line and column.
+    """
+    data = read_bytes(path, name=name)
+    try:
+        return ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # an unknown encoding is a LookupError
+        raise unreadable(path, str(error), what=what, name=name, hint=hint) from None
 
 
 def refuse_existing(path: Path, *, overwrite: bool, name: str = "path") -> Path:

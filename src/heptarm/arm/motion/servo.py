@@ -387,8 +387,8 @@ _COSTS = 4096
 #: Time before a tick at which its thread wakes to warm up the caches [s].
 _EARLY = 200e-6
 _DOUBLES = np.dtype(np.float64)
-#: Of a straight servo motion: time between two looks for what slows it down, the time that one takes at most [ns], and that
-#: in which it would be at its target, where nothing slows it down any more [s].
+#: Of a straight servo motion: time between two looks for what slows it down, the time that one takes at most [ns], and
+#: that in which it would be at its target, where nothing slows it down any more [s].
 _LOOK, _LOOK_TIME, _ARRIVED = 50_000_000, 3_000_000, 0.01
 #: A point that is moved by less is not moved [m].
 _ROUNDING = 1e-9
@@ -938,8 +938,8 @@ class LineServo(PoseServo):
     def set(self, pose: Pose) -> Pose:
         """Send a target; the newest one wins. After the end of the motion it has no effect.
 
-        The elbow keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the arm
-        comes to rest on it, and `stats` has the reason; the cabinet refuses a pose that is out of reach altogether.
+        The elbow keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the
+        arm comes to rest on it, and `stats` has the reason; the cabinet refuses a pose that is out of reach altogether.
 
         Returns:
             The pose sent: shifted into `arm.workspace`, if there is one.

@@ -18,7 +18,9 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
-from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
+from heptarm.fri.loop import parameters
+from heptarm.fri.loop.user_api import Params
+from heptarm.fri.loop.wrench import external_wrench
 from heptarm.values.arrays import callback, instance, within
 from heptarm.values.robot import RobotModel, robot
 from heptarm.values.sealed import Sealed
@@ -26,6 +28,7 @@ from heptarm.values.sealed import Sealed
 #: Number of arguments of a law with memory: state, output, parameters, memory.
 WITH_MEMORY = 4
 _Numbers = Mapping[str, interface.Given]
+_Initial = Mapping[str, interface.Initial]
 
 
 def include_dir() -> Path:
@@ -50,7 +53,7 @@ class CompiledLaw(Sealed):
     params: Final[dict[str, Any]]
     memory: Final[dict[str, Any]]
 
-    def __init__(self, params: _Numbers | None = None, memory: _Numbers | None = None) -> None:
+    def __init__(self, params: _Initial | None = None, memory: _Numbers | None = None) -> None:
         _check(params, memory)
         self.params = dict(params or {})
         self.memory = dict(memory or {})
@@ -58,11 +61,6 @@ class CompiledLaw(Sealed):
     def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
         """Parameters and their initial values for a robot."""
         return self.params
-
-    @property
-    def python(self) -> Callable[..., object] | None:
-        """The same law in Python, for a loop without a native part; None if there is none."""
-        return None
 
     def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
         """Compile or load the law in this process.
@@ -80,7 +78,7 @@ class CompiledLaw(Sealed):
         raise NotImplementedError
 
 
-def _check(params: _Numbers | None, memory: _Numbers | None) -> None:
+def _check(params: _Initial | None, memory: _Numbers | None) -> None:
     """Check that both are numbers and arrays by name, or None."""
     for values, what in ((params, "params"), (memory, "memory")):
         if values is not None:
@@ -110,7 +108,7 @@ class NumbaLaw(CompiledLaw):
     def __init__(
         self,
         function: Callable[..., object],
-        params: _Numbers | None = None,
+        params: _Initial | None = None,
         memory: _Numbers | None = None,
     ) -> None:
         super().__init__(params, memory)
@@ -120,11 +118,6 @@ class NumbaLaw(CompiledLaw):
     def __call__(self, *arguments: object) -> object:
         """Run it in Python, for a test."""
         return self._function(*arguments)
-
-    @property
-    def python(self) -> Callable[..., object] | None:
-        """The function itself."""
-        return self._function
 
     def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
         """Compile it with Numba; see `CompiledLaw.load`."""
@@ -147,14 +140,14 @@ def law(function: Callable[..., object]) -> NumbaLaw: ...
 
 @overload
 def law(
-    *, params: _Numbers | None = None, memory: _Numbers | None = None
+    *, params: _Initial | None = None, memory: _Numbers | None = None
 ) -> Callable[[Callable[..., object]], NumbaLaw]: ...
 
 
 def law(
     function: Callable[..., object] | None = None,
     *,
-    params: _Numbers | None = None,
+    params: _Initial | None = None,
     memory: _Numbers | None = None,
 ) -> NumbaLaw | Callable[[Callable[..., object]], NumbaLaw]:
     """Compile a law with Numba when its session opens; the loop then calls it without Python.
@@ -194,7 +187,7 @@ class LibraryLaw(CompiledLaw):
     name: Final[str]
 
     def __init__(
-        self, path: Path, name: str, params: _Numbers | None = None, memory: _Numbers | None = None
+        self, path: Path, name: str, params: _Initial | None = None, memory: _Numbers | None = None
     ) -> None:
         super().__init__(params, memory)
         self.path, self.name = path, name
@@ -245,7 +238,7 @@ class LibraryLaw(CompiledLaw):
 
 
 def law_from(
-    path: str | Path, name: str, *, params: _Numbers | None = None, memory: _Numbers | None = None
+    path: str | Path, name: str, *, params: _Initial | None = None, memory: _Numbers | None = None
 ) -> LibraryLaw:
     """Take a law from a shared library in C or C++, which was built with heptarm_law.h; see `include_dir`.
 
@@ -284,7 +277,7 @@ class LawTrial(Sealed):
         dt: command period [s].
 
     Attributes:
-        params: parameters; assign to them between calls.
+        params: parameters; assign to them between calls, and the law sees them follow at their rates.
         memory: memory; read it or assign to it between calls.
         t: time of the next call [s].
 
@@ -300,7 +293,7 @@ class LawTrial(Sealed):
         self,
         compiled: CompiledLaw,
         *,
-        params: _Numbers | None = None,
+        params: _Initial | None = None,
         memory: _Numbers | None = None,
         model: str | RobotModel = "iiwa14",
         dt: float = 1e-3,
@@ -309,15 +302,17 @@ class LawTrial(Sealed):
         _check(params, memory)
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
         self._dt = within(dt, "dt", 1e-6, 1.0, unit="s")
-        values, schema = interface.flat({**compiled.parameters(arm), **(params or {})}, "params")
+        declared = parameters.merged(compiled.parameters(arm), params)
+        values, schema = interface.flat(declared, "params")
         kept, remembered = interface.flat({**compiled.memory, **(memory or {})}, "memory")
         address, self._kept = compiled.load(schema, remembered)
         self._function = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 4)(address)
         self._params, self._memory = np.append(values, 0.0), np.append(kept, 0.0)
-        self.params = interface.Memory(self._params, schema)
+        self._follower = parameters.Follower(self._params[:-1], parameters.rates(declared))
+        self.params = Params(self._follower.target, schema, changed=lambda: None, declared=declared)
         self.memory = interface.Memory(self._memory, remembered)
         self._state = np.full(_words(interface.STATE), np.nan)
-        self._estimator = WrenchEstimator(chain_of(arm))
+        self._arm = arm
         self._command = np.zeros(_words(interface.COMMAND))
         self._shown = interface.Memory(self._state, _places(interface.STATE))
         self._made = interface.Memory(self._command, _places(interface.COMMAND))
@@ -350,13 +345,17 @@ class LawTrial(Sealed):
         shown.tau_ext, shown.wrench = np.zeros(7), np.zeros(6)
         if tau_ext is not None:
             shown.tau_ext = tau_ext
-            shown.wrench = self._estimator.wrench(np.asarray(q).tolist(), np.asarray(tau_ext).tolist())
+            shown.wrench = external_wrench(self._arm, q, tau_ext)
         if q_ipo is not None or self.t == 0.0:
             shown.q_ipo = q if q_ipo is None else q_ipo
         shown.t, shown.dt = self.t, self._dt
         self._state.view(np.int64)[_words(interface.STATE[:_FLOATS]) :] = 0
         out.q, out.tau, out.wrench = shown.q_ipo, 0.0, 0.0
         out.pose, out.e1 = np.nan, np.nan
+        if self.t > 0.0:
+            self._follower.step(self._dt)
+        else:
+            self._follower.begin(self._follower.target)
         self.t += self._dt
         code = self._function(
             *(one.ctypes.data for one in (self._state, self._command, self._params, self._memory))

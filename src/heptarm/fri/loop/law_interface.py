@@ -14,14 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError, UnknownSetting
+from heptarm.fri.loop.parameters import Param
 from heptarm.fri.protocol.messages import JOINTS
 from heptarm.values.arrays import finite_entries, numbers, shown
 from heptarm.values.pose import Pose
 from heptarm.values.sealed import meant
 
 Floats = npt.NDArray[np.float64]
-#: What a parameter or a member of the memory is given; a pose is x y z [m] and its quaternion x y z w, shape (7,).
+#: What a member of the memory is given; a pose is x y z [m] and its quaternion x y z w, shape (7,).
 Given: TypeAlias = npt.ArrayLike | Pose
+#: What a parameter is given initially: a value, or its declaration with one.
+Initial: TypeAlias = Given | Param
 #: Shape and first word of each member, by name.
 Schema: TypeAlias = Mapping[str, tuple[tuple[int, ...], int]]
 
@@ -61,11 +64,11 @@ COMMAND: tuple[tuple[str, tuple[int, ...], str, str], ...] = (
 )
 
 
-def flat(values: Mapping[str, Given], what: str) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
+def flat(values: Mapping[str, Initial], what: str) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
     """Flatten numbers and arrays by name into words and their schema.
 
     Args:
-        values: numbers, arrays and poses by name.
+        values: numbers, arrays and poses by name, or declarations of parameters.
         what: "params" or "memory", for the text of an error.
 
     Raises:
@@ -81,7 +84,7 @@ def flat(values: Mapping[str, Given], what: str) -> tuple[Floats, dict[str, tupl
     schema: dict[str, tuple[tuple[int, ...], int]] = {}
     start = 0
     for name, value in values.items():
-        given = _numbers(value, name, "a number or an array of numbers")
+        given = value.value if isinstance(value, Param) else _numbers(value, name, "a number or an array of numbers")
         schema[name] = (given.shape, start)
         parts.append(given.reshape(-1))
         start += given.size

@@ -9,6 +9,7 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal, Protocol
 
 import numpy as np
@@ -153,7 +154,10 @@ class Driver:
             return SplineExecution(self._arm, config.joints, self, speed=speed, settings=config.settings)
         if config.values["execution"] == "fri":
             return FriExecution(self._arm, config.joints, self, options=config.fri, settings=config.settings)
-        return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=config.settings)
+        settings = config.settings
+        ceiling = min(settings.rules.speed, self._arm.speed)  # a faster goal is refused, not followed late
+        settings = replace(settings, rules=replace(settings.rules, speed=ceiling))
+        return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=settings)
 
     # -------------------------------------------------------------------------------- life cycle
 

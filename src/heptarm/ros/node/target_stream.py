@@ -25,8 +25,8 @@ from heptarm.values.result import Cause
 
 _log = logging.getLogger("heptarm.ros")
 
-#: A velocity command becomes a target this far ahead [s]; the cabinet keeps the velocity of a target for longer, and then
-#: takes a while to brake.
+#: A velocity command becomes a target this far ahead [s]; the cabinet keeps the velocity of a target for longer, and
+#: then takes a while to brake.
 _AHEAD, _KEPT = 0.05, 0.2
 #: The first velocity command counts as if the one before had come so long ago [s].
 _FIRST = 0.02

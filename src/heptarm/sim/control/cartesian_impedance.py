@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import joints
-from heptarm.planning.command import TICK
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.planning.motion import TICK
+from heptarm.sim.control.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
 from heptarm.values.arrays import Array
 from heptarm.values.frames import BASE, TOOL
 from heptarm.values.mode.impedance import CartesianImpedance
@@ -90,11 +90,18 @@ class OverlaidForce:
 
 #: Duration of a parameter change while the law is in force, and of the rise of added forces [s].
 RAMP = 0.05
-#: A direction without stiffness is damped like one of this stiffness [N/m, Nm/rad], or a touch would make the arm
-#: drift forever.
+#: A direction of less stiffness can be guided by hand [N/m, Nm/rad]. A damping ratio means nothing there: such a
+#: direction is damped critically, like one of the stiffness below.
 LEAST_STIFFNESS = np.array([10.0, 10.0, 10.0, 0.5, 0.5, 0.5])
-#: Least natural frequency for the damper of the null space, for the same reason, and of the Cartesian modes, which
-#: bounds the damper near singularities [rad/s].
+GUIDED_STIFFNESS = np.array([300.0, 300.0, 300.0, 10.0, 10.0, 10.0])
+#: The same for the elbow: the spring of the null space [Nm/rad], and the natural frequency [rad/s].
+LEAST_ELBOW, GUIDED_PULSATION = 5.0, 10.0
+#: Where a guided direction has a velocity that stops the motion, its speed is bounded at this fraction of it.
+BOUND = 0.8
+#: With a higher bound of the speed than by default the bound of the axes grows alike, up to this fraction.
+MOST_AXIS = 0.9
+#: Least natural frequency for the damper of the null space, or a touch would make the elbow drift forever, and of the
+#: Cartesian modes, which bounds the damper near singularities [rad/s].
 LEAST_PULSATION = 1.0
 #: Directions in which the arm's inertia is above 1 / HEAVY² [kg, kg m²] are practically blocked: there the joint spring
 #: replaces the Cartesian one.
@@ -226,6 +233,10 @@ class CartesianImpedanceLaw:
                 ("N", "Nm"),
             ),
         ]
+        self._bounds = GUIDED if limits[1][2] is None else _bounds(limits[1][2])
+        self._fastest = (
+            min(GUIDED_AXIS * max(self._bounds[0] / GUIDED[0], 1.0), MOST_AXIS) * self._robot.dq_max
+        )
         self._limits = [(name, what, most, unit) for name, what, most, unit in limits if most is not None]
         now = self._pattern
         if (
@@ -251,6 +262,11 @@ class CartesianImpedanceLaw:
         self._root = np.sqrt(np.maximum(self._stiffness, LEAST_STIFFNESS))
         self._weight = np.sqrt(self._present[6:12])
         self._elbow, self._elbow_damping = float(self._present[18]), float(self._present[19])
+        self._free = free = freedom(self._stiffness, LEAST_STIFFNESS)
+        self._guided_root = np.sqrt(np.maximum(self._stiffness, GUIDED_STIFFNESS * free))
+        self._guided_weight = self._weight + free * (1.0 - self._weight)
+        self._elbow_pulsation = GUIDED_PULSATION * max(1.0 - self._elbow / LEAST_ELBOW, 0.0)
+        self._is_guided = bool(free.any()) or self._elbow < LEAST_ELBOW
 
     def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
@@ -272,7 +288,9 @@ class CartesianImpedanceLaw:
         rate = velocity - (to_axes @ goal_velocity).T.ravel()
         root = np.linalg.inv(np.linalg.cholesky(sensed.mass))  # of the inverse mass matrix: M^-1 = root' root
         mobility = jacobian @ root.T
-        force = self._spring(deviation, rate, mobility @ mobility.T)
+        is_guided = self._is_guided and not sensed.is_overlaid
+        damping = (self._guided_root, self._guided_weight) if is_guided else (self._root, self._weight)
+        force = self._spring(deviation, rate, mobility @ mobility.T, *damping)
         self.deviation, self.velocity, self.force = deviation, velocity, force
         if not self.violation:
             self._watch()
@@ -283,7 +301,11 @@ class CartesianImpedanceLaw:
             not sensed.is_overlaid
         ):  # a client's set-points may jump, and the arm shall not be thrown after them
             torque += sensed.mass @ ((sensed.after - 2 * sensed.now + sensed.before) * 1e6)
-        torque += self._null(mobility, root, sensed.mass, sensed.now - sensed.q, speed - sensed.dq)
+        slip = sensed.dq - speed
+        least = max(self._elbow_pulsation if is_guided else 0.0, LEAST_PULSATION)
+        torque += self._null(mobility, root, sensed.mass, sensed.now - sensed.q, -slip, least)
+        if is_guided:
+            torque += sensed.mass @ braking(slip, self._too_fast(slip, rate))
         self._time += TICK
         self._old_time += TICK
         return torque
@@ -321,12 +343,18 @@ class CartesianImpedanceLaw:
         result: Array = shift @ self._flange.jacobian
         return result
 
-    def _spring(self, deviation: Array, rate: Array, mobility: Array) -> Array:
+    def _too_fast(self, slip: Array, rate: Array) -> float:
+        """Largest ratio of a velocity from the set-point's to its bound in guiding by hand."""
+        velocity = np.where(self._free > 0.0, rate, 0.0)
+        along, about = float(np.linalg.norm(velocity[:3])), float(np.linalg.norm(velocity[3:]))
+        axis = float((np.abs(slip) / self._fastest).max())
+        return max(axis, along / self._bounds[0], about / self._bounds[1])
+
+    def _spring(self, deviation: Array, rate: Array, mobility: Array, root: Array, weight: Array) -> Array:
         """Force of spring and damper with the added forces; mobility: Λ^-1, shape (6, 6)."""
-        root = self._root
         pulsation2, modes = np.linalg.eigh(root[:, None] * mobility * root)
         np.maximum(pulsation2, LEAST_PULSATION**2, out=pulsation2)
-        modes *= (root * self._weight)[:, None]
+        modes *= (root * weight)[:, None]
         force: Array = self._added - self._stiffness * deviation
         force -= modes @ ((rate @ modes) * 2.0 / np.sqrt(pulsation2))
         if self._pattern is not None or self._old_pattern is not None:
@@ -347,7 +375,9 @@ class CartesianImpedanceLaw:
             force += (1.0 - fraction) * old.force(self._old_time, deviation)
         return force
 
-    def _null(self, mobility: Array, root: Array, mass: Array, error: Array, rate: Array) -> Array:
+    def _null(
+        self, mobility: Array, root: Array, mass: Array, error: Array, rate: Array, least: float
+    ) -> Array:
         """Torques that hold the elbow without accelerating the tool frame."""
         squares, vectors = np.linalg.eigh(mobility.T @ mobility)
         torque = np.zeros(7)
@@ -358,7 +388,7 @@ class CartesianImpedanceLaw:
             weight = (1.0 - sqrt(max(0.0, square)) / HEAVY) ** 2
             direction = vectors[:, index] @ root  # J direction = 0, direction' M direction = 1
             push = mass @ direction
-            pulsation = max(LEAST_PULSATION, sqrt(self._elbow * float(direction @ direction)))
+            pulsation = max(least, sqrt(self._elbow * float(direction @ direction)))
             pull = self._elbow * float(direction @ error) + 2.0 * self._elbow_damping * pulsation * float(
                 push @ rate
             )
@@ -381,6 +411,15 @@ class CartesianImpedanceLaw:
 
 def _base(mode: CartesianImpedance | SineImpedance) -> CartesianImpedance:
     return mode.base if isinstance(mode, SineImpedance) else mode
+
+
+def _bounds(most: Array) -> tuple[float, float]:
+    """Bounds of the speed along and about axes, from velocities that stop the motion; without them the defaults."""
+    along, about = float(most[:3].min()), float(most[3:].min())
+    return (
+        BOUND * along if along < inf else GUIDED[0],
+        BOUND * about if about < inf else GUIDED[1],
+    )
 
 
 def _unless_open(limits: Array) -> Array | None:

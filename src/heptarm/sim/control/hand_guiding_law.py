@@ -7,19 +7,21 @@ that it can still stop before it.
 
 from __future__ import annotations
 
+from math import isnan
+
 import numpy as np
 
+from heptarm.planning.seam import HandGuide
 from heptarm.sim.control.cartesian_impedance import FlangeKinematics
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control.laws import BRAKING, GUIDED, GUIDED_AXIS, MeasuredState
 from heptarm.values.arrays import Array
-from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.robot import RobotModel
 
 #: Decay rate of allowed velocities, so that the arm does not drift [1/s].
 CALM = 5.0
 #: Decay rate of excess velocities [1/s].
 STRICT = 600.0
-#: Default speed limit of an axis, as a fraction of its maximum.
+#: Highest speed limit of an axis, as a fraction of its maximum.
 ROOM = 0.9
 #: Fraction of an axis' acceleration assumed for stopping before a limit.
 RESERVE = 0.4
@@ -67,16 +69,17 @@ class HandGuidingLaw:
         low = np.fmax(guide.q_min, robot.q_min) + MARGIN
         high = np.fmin(guide.q_max, robot.q_max) - MARGIN
         self._low, self._high = low, high
-        self._fastest = np.fmin(guide.joint_velocity, ROOM * robot.dq_max)
-        self._ceiling = float(np.fmin(guide.cartesian_velocity, ceiling))
+        speed, along = guide.joint_velocity, guide.cartesian_velocity
+        self._fastest = GUIDED_AXIS * robot.dq_max if isnan(speed) else np.minimum(speed, ROOM * robot.dq_max)
+        self._ceiling = BRAKING * min(GUIDED[0] if isnan(along) else along, ceiling)
         self._slowing = 2.0 * RESERVE * robot.ddq_max
         self._inside = (low < q) & (q < high)
-        pulls = guide.outside == "pull"
+        pulls = guide.pulls_back
         # the limits of an axis that begins beyond its limit and may stay there follow it inwards
         self._floor: Array = low if pulls else np.minimum(low, q)
         self._roof: Array = high if pulls else np.maximum(high, q)
         self._back = -np.where(self._inside, RETURN, PULL)
-        self._freezes = guide.at_limit == "all"
+        self._freezes = guide.freezes_all
         self.is_frozen = False
 
     def torque(self, sensed: MeasuredState) -> Array:

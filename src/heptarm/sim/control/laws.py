@@ -14,8 +14,9 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.values.arrays import Array, frozen
+from heptarm.values.robot import RobotModel
 
 #: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's.
 #: The order of 10 kNm/rad is that of DLR's publications on the LWR's joints, the value of each axis is assumed: see
@@ -31,6 +32,13 @@ PRELOAD_FADING = 0.1
 LEAST_DAMPER = 0.5
 #: Duration of a stiffness change while a law is in force [s].
 RAMP = 0.05
+#: Guiding by hand: highest speed of the tool frame, along [m/s] and about axes [rad/s], and of an axis as a fraction of
+#: its maximum. Sunrise's own bounds are unknown; see docs/explanation/fidelity.md.
+GUIDED, GUIDED_AXIS = (0.25, 1.0), 0.5
+#: Fraction of such a bound at which braking begins, and the decay rate of velocities above that [1/s].
+BRAKING, STRICT = 0.8, 1000.0
+#: A joint of less stiffness can be guided by hand [Nm/rad], and its velocity decays at this rate [1/s].
+LEAST_STIFFNESS, CALM = 5.0, 10.0
 
 
 @dataclass(slots=True)
@@ -143,13 +151,34 @@ class PositionLaw:
         return torque
 
 
+def braking(dq: Array, ratio: float) -> Array:
+    """Acceleration that keeps velocities within a bound, shape (7,) [rad/s²].
+
+    All joints slow down alike, so that the arm keeps its direction and what is held stays held.
+
+    Args:
+        dq: velocities, shape (7,) [rad/s].
+        ratio: the largest of their ratios to a bound.
+    """
+    result: Array = -STRICT * (1.0 - BRAKING / max(ratio, BRAKING)) * dq
+    return result
+
+
+def freedom(stiffness: Array, least: Array | float) -> Array:
+    """How far directions can be guided by hand: 1 without stiffness, 0 from the least stiffness of a spring on."""
+    result: Array = np.maximum(1.0 - stiffness / least, 0.0)
+    return result
+
+
 class JointImpedanceLaw:
     """Joint impedance: a spring and a damper in every joint.
 
     The damping ratio is that of each joint alone, with its inertia at the present posture:
     d = 2 ζ √(k m).
+    A joint without stiffness is guided by hand: its damper is a real one, and its speed is bounded.
 
     Args:
+        robot: the robot.
         stiffness: shape (7,) [Nm/rad].
         damping: ratio, shape (7,).
     """
@@ -159,7 +188,8 @@ class JointImpedanceLaw:
     stays = False
     violation = ""
 
-    def __init__(self, stiffness: Array, damping: Array) -> None:
+    def __init__(self, robot: RobotModel, stiffness: Array, damping: Array) -> None:
+        self._fastest = GUIDED_AXIS * robot.dq_max
         self._stiffness = self._from = self._goal = stiffness
         self._damping = damping
         self._ramp = RAMP
@@ -176,8 +206,15 @@ class JointImpedanceLaw:
             self._stiffness = self._from + fraction * (self._goal - self._from)
         damper = 2.0 * self._damping * np.sqrt(self._stiffness * sensed.mass.diagonal())
         np.maximum(damper, LEAST_DAMPER, out=damper)
+        free = np.zeros(7) if sensed.is_overlaid else freedom(self._stiffness, LEAST_STIFFNESS)
+        if free.any():
+            np.maximum(damper, CALM * free * sensed.mass.diagonal(), out=damper)
         torque = sensed.bias - sensed.passive + self._stiffness * (sensed.now - sensed.q) - damper * sensed.dq
         if not sensed.is_overlaid:  # no feed-forward of a client's set-points, which may jump
             torque += sensed.mass @ ((sensed.after - 2 * sensed.now + sensed.before) * 1e6)
             torque += damper * ((sensed.after - sensed.before) * 500.0)
+        if free.any():
+            slip = sensed.dq - (sensed.after - sensed.before) * 500.0
+            fast = np.where(free > 0.0, np.abs(slip) / self._fastest, 0.0)
+            torque += sensed.mass @ braking(slip, float(fast.max()))
         return torque

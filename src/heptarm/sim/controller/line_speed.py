@@ -1,8 +1,8 @@
 """How fast a trajectory of the tool frame may be followed, so that every axis stays within its limits.
 
 A trajectory over its own time is sampled ahead. The largest rate of that time, 1 at most, is found by reachability
-analysis (Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", 2018): it
-brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before the path ends.
+analysis (Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", 2018):
+it brakes on the path before an axis would be too fast, accelerate too hard or leave its range, and before its end.
 """
 
 from __future__ import annotations
@@ -10,25 +10,26 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import sqrt, tau
+from math import tau
 from operator import le
 
 import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.velocity import NEAREST
+from heptarm.planning.motion import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
-#: How far ahead a trajectory is looked at, in its own time, and the time between two samples where it is straight [s]; and
-#: the part of what was seen after which it is looked at again.
+#: How far ahead a trajectory is looked at, in its own time, and the time between two samples where it is straight [s];
+#: and the part of what was seen after which it is looked at again.
 HORIZON, _APART, _LOOK = 0.35, 0.07, 0.3
 #: Most samples: where more are needed, an axis is so slow that it needs to look less far ahead.
 _MOST = 80
 #: The same at the start, where the arm moves already.
 _FIRST = 1e-3
-#: Samples are so dense that the joints between two are near to the line between them: squares of twice the distance [rad²],
-#: and of its ratio to the step, which does not count below a smallest distance ...
+#: Samples are so dense that the joints between two are near to the line between them: squares of twice the distance
+#: [rad²], and of its ratio to the step, which does not count below a smallest distance ...
 _BENT, _SLANT, _STILL = 1e-3**2, 0.05**2, 3e-6**2
 #: ... unless they would be nearer than this [s]: there the joints jump.
 _LEAST = 1e-6
@@ -36,45 +37,76 @@ _LEAST = 1e-6
 _SPEED, _GRIP = 0.985, 0.9
 #: The square of the rate at the start may exceed what the samples allow by this factor, and be so large at rest.
 _ROUNDING, _AT_REST = 1.02, 1e-6
+#: Ticks of a slowed trajectory that are checked before it is followed: until the next target, usually.
+_CHECKED = 12
 _TINY = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
 class RateProfile:
-    """Rate at which the time of a trajectory passes, over that time: its square is linear between samples.
+    """How the time of a trajectory passes: the square of its rate is linear over it between samples.
 
-    Attributes:
+    Args:
         times: samples of the trajectory's time, ascending [s].
         squares: of the rate there.
-        is_whole: ends where the trajectory does, or where an axis could not go on.
+        q: joint positions there, shape (n, 7) [rad].
+        slopes: their derivatives by the trajectory's time, likewise.
+        is_whole: it ends where the trajectory does, or where an axis could not go on.
+
+    Attributes:
+        is_whole: likewise.
+        duration: until the end [s].
+        next_look: when the trajectory is to be looked at again, before the arm brakes at the end of this [s].
     """
 
-    times: list[float]
-    squares: list[float]
-    is_whole: bool
+    __slots__ = ("_clock", "_q", "_rates", "_slopes", "_times", "duration", "is_whole", "next_look")
+
+    def __init__(
+        self, times: list[float], squares: list[float], *, q: Array, slopes: Array, is_whole: bool
+    ) -> None:
+        self._q, self._slopes = q, slopes
+        rates = np.sqrt(squares)
+        steps = 2.0 * np.diff(times) / np.maximum(rates[1:] + rates[:-1], _TINY)
+        self._times, self._rates = times, rates.tolist()
+        self._clock: list[float] = [0.0, *np.cumsum(steps).tolist()]
+        self.duration = self._clock[-1]
+        self.is_whole = is_whole
+        first, last = times[0], times[-1]
+        self.next_look = float(np.interp(first + _LOOK * (last - first), times, self._clock))
+
+    def at(self, elapsed: float) -> tuple[float, float]:
+        """Time of the trajectory and its rate when so much time has passed [s]."""
+        clock, times, rates = self._clock, self._times, self._rates
+        k = min(bisect_right(clock, elapsed), len(clock) - 1)
+        begin, end = rates[k - 1], rates[k]
+        later = elapsed - clock[k - 1]
+        if elapsed >= clock[k]:  # behind the end: at rest, or on with the rate there
+            return times[k] + end * (elapsed - clock[k]), end
+        change = (end - begin) / (clock[k] - clock[k - 1])
+        return times[k - 1] + (begin + 0.5 * change * later) * later, begin + change * later
 
     @property
-    def next_look(self) -> float:
-        """Time of the trajectory from which on it is to be looked at again, before the arm brakes at the end of this [s]."""
-        return self.times[0] + _LOOK * (self.times[-1] - self.times[0])
+    def first_ticks(self) -> list[float]:
+        """Moments at which set-points show whether the axes can get on to it [s]: more where it is slowed."""
+        slowed = any(abs(self.at(moment)[1] - 1.0) > _TINY for moment in (TICK, _CHECKED * TICK))
+        return [TICK * (1 + k) for k in range(_CHECKED if slowed else 2)]
 
-    def at(self, time: float) -> tuple[float, float]:
-        """Rate and its change [1/s] at a time of the trajectory [s]."""
-        times, squares = self.times, self.squares
-        if time >= times[-1]:
-            return sqrt(squares[-1]), 0.0
-        k = max(1, bisect_right(times, time))
-        slope = (squares[k] - squares[k - 1]) / (times[k] - times[k - 1])
-        return sqrt(max(0.0, squares[k - 1] + slope * (time - times[k - 1]))), 0.5 * slope
+    def near(self, time: float) -> Array:
+        """Joint positions near to those at a time of the trajectory [s], as it was sampled, shape (7,) [rad]."""
+        times = self._times
+        k = min(max(1, bisect_right(times, time)), len(times) - 1)
+        gap = times[k] - times[k - 1]
+        s = min(1.0, (time - times[k - 1]) / gap)
+        # Hermite's cubic
+        begin, end = self._q[k - 1], self._q[k]
+        way, u = end - begin, 1.0 - s
+        bent = u * (gap * self._slopes[k - 1] - way) - s * (gap * self._slopes[k] - way)
+        place: Array = begin + s * way + (s * u) * bent
+        return place
 
-    def advanced(self, time: float, dt: float) -> float:
-        """Time of the trajectory after another `dt` seconds."""
-        rate, change = self.at(time)
-        end = rate + change * dt
-        if end < 0.0:  # it comes to rest before
-            return min(self.times[-1], time - 0.5 * rate * rate / change)
-        later = time + 0.5 * (rate + end) * dt
-        return later if self.squares[-1] > 0.0 else min(later, self.times[-1])
+    def change(self, elapsed: float) -> float:
+        """Change of the rate over the ticks beside a moment [1/s]."""
+        before, after = max(0.0, elapsed - TICK), elapsed + TICK
+        return (self.at(after)[1] - self.at(before)[1]) / (after - before)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +126,19 @@ class AxisLimits:
 
     def __init__(self, robot: RobotModel) -> None:
         self._velocity, self._acceleration = _SPEED * robot.dq_max, _GRIP * robot.ddq_max
+        self._fastest, self._hardest = robot.dq_max, robot.ddq_max
         self._low, self._high = robot.q_min + NEAREST, robot.q_max - NEAREST
+
+    def joins(self, speed: Array, *q: Array) -> bool:
+        """Whether the axes can go on to set-points, tick by tick.
+
+        Args:
+            speed: of the axes now, shape (7,) [rad/s].
+            q: set-points, the first one now, shape (7,) [rad].
+        """
+        speeds = np.diff(np.array(q), axis=0) / TICK
+        changes = np.diff(np.vstack([speed, speeds]), axis=0) / TICK
+        return bool((np.abs(changes) <= self._hardest).all() and (np.abs(speeds) <= self._fastest).all())
 
     def profile(
         self,
@@ -134,10 +178,14 @@ class AxisLimits:
         first[0] = slopes[0] - 0.5 * gaps[0] * second[0]
         first[-1] = slopes[-1] + 0.5 * gaps[-1] * second[-1]
         rests = samples.is_open or samples.is_blocked
-        squares = self._fastest(first, second, gaps, rate * rate, 0.0 if rests else 1.0)
-        return None if squares is None else RateProfile(samples.times, squares, not samples.is_open)
+        squares = self._greatest(first, second, gaps, rate * rate, 0.0 if rests else 1.0)
+        return (
+            None
+            if squares is None
+            else RateProfile(samples.times, squares, q=q, slopes=first, is_whole=not samples.is_open)
+        )
 
-    def _fastest(
+    def _greatest(
         self, first: Array, second: Array, gaps: Array, begin: float, end: float
     ) -> list[float] | None:
         """Squares of the rate at the samples; None: there is no profile from the first one.
@@ -162,7 +210,10 @@ class AxisLimits:
         for k in range(len(steps) - 1, -1, -1):
             step, last = steps[k], most[k + 1]
             inverse, then = 1.0 / step, last / step
-            most[k] = min(most[k], last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)))
+            most[k] = min(
+                most[k],
+                last + step * min(a + b * last for a, b in zip(rows[k + 1], turns[k + 1], strict=True)),
+            )
             for a, b in zip(rows[k], turns[k], strict=True):
                 if inverse > b:
                     most[k] = min(most[k], (then + a) / (inverse - b))
@@ -179,8 +230,11 @@ class AxisLimits:
             for a, b in zip(rows[k + 1], turns[k + 1], strict=True):
                 if (share := 1.0 + b * step) > 0.0:
                     gain, loss = min(gain, (a - b * z) / share), max(loss, (-a - b * z) / share)
-            squares.append(max(0.0, z + step * loss, min(most[k + 1], z + step * gain)))
-        return squares if squares[-1] <= end + _AT_REST else None
+            then = max(0.0, z + step * loss, min(most[k + 1], z + step * gain))
+            if then > most[k + 1] * _ROUNDING + _AT_REST:
+                return None
+            squares.append(then)
+        return squares
 
     # ---------------------------------------------------------------------------------- sampling
 

@@ -14,17 +14,18 @@ from math import atan2, cos, sin, sqrt
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
+from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import DEFAULT_TIMING, TICK, Order
 from heptarm.planning.geometry import Quat, product
-from heptarm.planning.path import TcpInverseKinematics
-from heptarm.planning.seam import ServoTiming, StraightLimits
-from heptarm.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
+from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK, ServoMotion, fractions
+from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 
+#: Of a follower that only comes to rest.
+_NO_TIMING = ServoTiming()
 #: Position, velocity and acceleration.
 OtgState = tuple[Array, Array, Array]
 
@@ -164,15 +165,14 @@ class StraightServoLimits:
     timing: ServoTiming
 
     @staticmethod
-    def of(order: Order) -> StraightServoLimits:
-        """Limits of a command; defaults are those of a linear motion, and jerk scales with acceleration."""
+    def of(motion: ServoStraight) -> StraightServoLimits:
+        """Limits of a motion; defaults are those of a linear motion, and jerk scales with acceleration."""
         default = np.repeat((CARTESIAN_DEFAULT, ORIENTATION_DEFAULT), 3, axis=0).T
-        given = order.straight_limits or StraightLimits()
-        velocity = np.where(np.isnan(given.velocity), default[0], given.velocity)
-        acceleration = np.where(np.isnan(given.acceleration), default[1], given.acceleration)
-        axes = np.eye(3) if order.reference is None else rotation(order.reference)
+        velocity = np.where(np.isnan(motion.velocity), default[0], motion.velocity)
+        acceleration = np.where(np.isnan(motion.acceleration), default[1], motion.acceleration)
+        axes = np.eye(3) if motion.axes is None else rotation(motion.axes)
         return StraightServoLimits(
-            velocity, acceleration, acceleration * default[2] / default[1], axes, order.servo_timing
+            velocity, acceleration, acceleration * default[2] / default[1], axes, motion.timing
         )
 
     @property
@@ -200,31 +200,36 @@ class _Trajectory:
 class StraightFollower:
     """Follows poses of the tool frame on straight lines, as fast as the axes can.
 
-    A trajectory is taken up only if all axes can brake on it before a limit; until then the last one goes on, which ends
-    at rest.
+    A trajectory is taken up only if all axes can brake on it before a limit; until then the last one goes on, which
+    ends at rest.
 
     Args:
         robot: the robot.
-        order: the servo motion.
+        motion: the servo motion.
         here: first set-point, at rest, shape (7,) [rad].
+        tcp: flange to motion frame, x y z [m], quaternion.
 
     Attributes:
         resting: time since the target was reached [s]; 0 while it is not.
     """
 
-    def __init__(self, robot: RobotModel, order: Order, here: Array) -> None:
-        tcp = Pose.of(order.tcp[:3], order.tcp[3:])
-        origin = Pose.from_matrix(forward(robot, here)) @ tcp
-        limits = self._limits = StraightServoLimits.of(order)
+    def __init__(
+        self, robot: RobotModel, motion: ServoStraight, here: Array, *, tcp: tuple[float, ...]
+    ) -> None:
+        frame = Pose.of(tcp[:3], tcp[3:])
+        origin = Pose.from_matrix(forward(robot, here)) @ frame
+        limits = self._limits = StraightServoLimits.of(motion)
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
-        self._inverse = TcpInverseKinematics(robot, here, tcp)
+        self._inverse, self._a3 = PathInverse(robot, frame), float(here[2])
         self._q = here.copy()
+        self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
         self._centre: Quat = tuple(origin.quat.tolist())  # orientation at rest
         self._followed: _Trajectory | None = None
         self._goal: Array | None = None  # that no trajectory leads to yet
-        self._waited = 0.0
+        self._elapsed = 0.0  # since the profile began [s]
+        self._waited = 0.0  # since the last target [s]
         self._stopping = False
         self.resting = 0.0
 
@@ -253,11 +258,15 @@ class StraightFollower:
             self.resting += dt
             return self._q
         otg = one.otg
-        otg.time = one.profile.advanced(otg.time, dt)
+        self._elapsed += dt
+        otg.time = one.profile.at(self._elapsed)[0]
         self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        self._q = self._joints(otg, one.centre, otg.time, self._q)
-        if not (one.profile.is_whole or self._stopping) and otg.time > one.profile.next_look:
-            self._look(one)
+        near = one.profile.near(otg.time)
+        before, self._q = self._q, self._joints(otg, one.centre, otg.time, near)
+        if dt > 0.0:
+            self._speed = (self._q - before) / dt
+        if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
+            self._go_on(one, rate=one.profile.at(self._elapsed)[1])
         return self._q
 
     def brake(self, *, scale: float, rate: float) -> None:
@@ -279,23 +288,19 @@ class StraightFollower:
         otg = self._new_trajectory()
         otg.limit(acceleration, jerk)
         centre = self._turned(turn)
-        if otg.halt((_unrotated(place), along, by)) and self._follow(otg, centre):
+        if otg.halt((_unrotated(place), along, by)) and self._follow(otg, centre, scale=scale):
             return
         # the axes cannot brake that hard: as soon as they can, on the trajectory they follow
-        now = one.profile.at(one.otg.time)[0] * scale
+        now = one.profile.at(self._elapsed)[1] * scale
         for horizon in _STOPS:
-            profile = self._profile(one.otg, one.centre, rate=now, horizon=horizon)
-            if profile is not None:
-                self._followed = replace(one, profile=profile)
+            if self._go_on(one, rate=now, horizon=horizon):
                 return
 
     @property
     def is_still(self) -> bool:
         """Whether a braked motion has come to rest."""
         one = self._followed
-        return self._stopping and (
-            one is None or one.otg.over >= 0.0 or one.otg.time >= one.profile.times[-1]
-        )
+        return self._stopping and (one is None or self._elapsed >= one.profile.duration)
 
     # ------------------------------------------------------------------------- trajectories ahead
 
@@ -314,19 +319,27 @@ class StraightFollower:
         minimum = self._limits.timing.min_trajectory_time
         return otg.aim(start, target, speed=np.zeros(6), minimum=minimum) and self._follow(otg, centre)
 
-    def _follow(self, otg: OnlineTrajectory, centre: Quat) -> bool:
-        """Follow a trajectory from its start; False: the axes could not brake on it."""
+    def _follow(self, otg: OnlineTrajectory, centre: Quat, *, scale: float = 1.0) -> bool:
+        """Follow a trajectory from its start; False: the axes could not brake on it, or not get on to it."""
         profile = self._profile(otg, centre, rate=1.0)
         if profile is None:
             return False
-        self._followed, self.resting = _Trajectory(otg, centre, profile), 0.0
+        ahead = [self._q]
+        for elapsed in profile.first_ticks:
+            time = profile.at(elapsed)[0]
+            ahead.append(self._joints(otg, centre, time, profile.near(time)))
+        if not self._axes.joins(scale * self._speed, *ahead):
+            return False
+        self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
         return True
 
-    def _look(self, one: _Trajectory) -> None:
-        """Look farther ahead; where that shows nothing better, the arm comes to rest where it was to."""
-        profile = self._profile(one.otg, one.centre, rate=one.profile.at(one.otg.time)[0])
-        if profile is not None:
-            self._followed = replace(one, profile=profile)
+    def _go_on(self, one: _Trajectory, *, rate: float, horizon: float = HORIZON) -> bool:
+        """Look farther ahead; False: that shows nothing better, so the arm comes to rest where it was to."""
+        profile = self._profile(one.otg, one.centre, rate=rate, horizon=horizon)
+        if profile is None:
+            return False
+        self._followed, self._elapsed = replace(one, profile=profile), 0.0
+        return True
 
     def _profile(
         self, otg: OnlineTrajectory, centre: Quat, *, rate: float, horizon: float = HORIZON
@@ -354,7 +367,7 @@ class StraightFollower:
             x, y, z = (self._turned_axes @ (x, y, z)).tolist()
             turn = (self._turned_axes @ turn).tolist()
         i, j, k, w = _rotated(centre, turn)
-        return self._inverse.joints((x, y, z), (i, j, k, w), self._inverse.e1, near)
+        return self._inverse.joints((x, y, z), (i, j, k, w), near, a3=self._a3)
 
     def _turned(self, turn: Array) -> Quat:
         """Orientation at a rotation from the centre, quaternion."""
@@ -373,7 +386,7 @@ class StraightFollower:
         else:
             low, high = max(0.0, time - _STEP), time + _STEP
             change = (_spin(otg, high) - _spin(otg, low)) / (high - low)
-        rate, growth = one.profile.at(time)
+        rate, growth = one.profile.at(self._elapsed)[1], one.profile.change(self._elapsed)
         speed = np.concatenate([v[:3], _spin(otg, time)])
         change = rate * rate * np.concatenate([a[:3], change]) + growth * speed
         speed = rate * speed
@@ -458,13 +471,32 @@ class ServoLimits:
         velocity: largest speed of each axis, shape (7,) [rad/s].
         acceleration: shape (7,) [rad/s²].
         jerk: shape (7,) [rad/s³].
+        lowest: positions, shape (7,) [rad].
+        highest: likewise.
         timing: times of the motion.
     """
 
     velocity: Array
     acceleration: Array
     jerk: Array
+    lowest: Array
+    highest: Array
     timing: ServoTiming
+
+    def bounded(self, q: Array, dq: Array, later: float) -> Array:
+        """Velocities with which every axis comes to rest before the limits of its position, shape (7,) [rad/s].
+
+        Args:
+            q: positions, shape (7,) [rad].
+            dq: wanted velocities, shape (7,) [rad/s].
+            later: time after which it brakes [s].
+        """
+        # from v at no acceleration it takes at most v² / 2 a + v a / 2 j
+        late = self.acceleration * later + self.acceleration**2 / (2.0 * self.jerk)
+        room = np.maximum(np.where(dq > 0.0, self.highest - q, q - self.lowest), 0.0)
+        most = np.minimum(MARGIN * self.velocity, np.sqrt(late**2 + 2.0 * self.acceleration * room) - late)
+        bounded: Array = np.clip(dq, -most, most)
+        return bounded
 
     @staticmethod
     def of(
@@ -472,13 +504,15 @@ class ServoLimits:
         *,
         velocity: tuple[float, ...],
         acceleration: tuple[float, ...],
-        timing: ServoTiming = DEFAULT_TIMING,
+        timing: ServoTiming = _NO_TIMING,
     ) -> ServoLimits:
         """From fractions of a robot's limits, seven each; jerk scales with acceleration."""
         return ServoLimits(
             np.array(velocity) * robot.dq_max,
             np.array(acceleration) * robot.ddq_max,
             np.array(acceleration) * robot.dddq_max,
+            robot.q_min,
+            robot.q_max,
             timing,
         )
 
@@ -520,11 +554,7 @@ class SmartFollower:
         if self._stopping:
             return
         self._goal = q, dq
-        pass_at = (
-            np.zeros(7)
-            if dq is None
-            else np.clip(dq, -MARGIN * self._limits.velocity, MARGIN * self._limits.velocity)
-        )
+        pass_at = np.zeros(7) if dq is None else self._limits.bounded(q, dq, 4.0 * TICK)
         if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._limits.timing.min_trajectory_time):
             self._passes = bool(pass_at.any())
             self.resting = 0.0
@@ -537,7 +567,7 @@ class SmartFollower:
         self._otg.time += dt
         over = self._otg.over
         if over >= 0.0:
-            if self._passes and over > self._limits.timing.speed_timeout:
+            if self._passes and (over > self._limits.timing.speed_timeout or self._nears_limit()):
                 self._halt(self._state())
             elif not self._passes:
                 self.resting = over
@@ -569,6 +599,11 @@ class SmartFollower:
         otg = OnlineTrajectory(7, synchronization=Synchronization.Time, halting=Synchronization.No)
         otg.limit(self._limits.acceleration, self._limits.jerk, velocity=self._limits.velocity)
         return otg
+
+    def _nears_limit(self) -> bool:
+        """Whether an axis has to brake now, since it passed its target with a velocity."""
+        q, dq, _ = self._state()
+        return bool((np.abs(self._limits.bounded(q, dq, 2.0 * TICK)) < np.abs(dq) - _TINY).any())
 
     def _halt(self, state: OtgState) -> None:
         self._passes = False
@@ -642,6 +677,16 @@ class DirectFollower:
 Follower = SmartFollower | DirectFollower | StraightFollower
 
 
+def braking_axes(robot: RobotModel, here: Array, speed: Array, *, jerk: float = 1.0) -> SmartFollower:
+    """A follower whose axes brake, each by itself and as hard as it may; arguments as of `AxisStop`."""
+    limits = ServoLimits(
+        robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, _NO_TIMING
+    )
+    braking = SmartFollower(limits, here)
+    braking.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+    return braking
+
+
 class AxisStop:
     """Brakes every axis by itself: how a safety stop acts on a servo motion, which has no path to keep.
 
@@ -653,9 +698,7 @@ class AxisStop:
     """
 
     def __init__(self, robot: RobotModel, here: Array, speed: Array, *, jerk: float) -> None:
-        limits = ServoLimits(robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, DEFAULT_TIMING)
-        self._stop = SmartFollower(limits, here)
-        self._stop.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+        self._stop = braking_axes(robot, here, speed, jerk=jerk)
 
     @property
     def is_over(self) -> bool:
@@ -667,14 +710,14 @@ class AxisStop:
         return self._stop.advance(TICK)
 
 
-def follower(robot: RobotModel, order: Order, here: Array) -> Follower:
+def follower(robot: RobotModel, motion: ServoMotion, here: Array, *, tcp: tuple[float, ...]) -> Follower:
     """The follower of a servo motion that begins at rest, at a set-point of shape (7,) [rad]."""
-    if order.kind == "straight":
-        return StraightFollower(robot, order, here)
+    if isinstance(motion, ServoStraight):
+        return StraightFollower(robot, motion, here, tcp=tcp)
     limits = ServoLimits.of(
         robot,
-        velocity=order.joint_velocity,
-        acceleration=order.joint_acceleration,
-        timing=order.servo_timing,
+        velocity=fractions(motion.dynamics.velocity),
+        acceleration=fractions(motion.dynamics.acceleration),
+        timing=motion.timing,
     )
-    return (DirectFollower if order.kind == "direct" else SmartFollower)(limits, here)
+    return (DirectFollower if isinstance(motion, ServoDirect) else SmartFollower)(limits, here)

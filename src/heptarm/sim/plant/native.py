@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from heptarm._library import Unavailable, library
+from heptarm.model.native import constants
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
@@ -25,7 +25,7 @@ from heptarm.values.robot import RobotModel
 
 AXES = 7
 #: What the functions return.
-DONE, LOADED, ASK, STRAINED, ELSEWHERE = range(5)
+DONE, LOADED, STRAINED, ELSEWHERE = range(4)
 
 #: MuJoCo's functions that a tick calls, and the members of `struct tick` that point to them.
 _CALLED = {"mj_step1": "step1", "mj_step2": "step2", "mj_mulM": "multiply"}
@@ -41,8 +41,8 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ),
     # what a tick computes
     ("reals", 0, "torque tau_cmd tau load wrench"),
-    ("word", 0, "stride pulls is_misjudged has_e1 flags mode order left is_awaited"),
-    ("real", 0, "d_bs d_se d_ew d_wf straight on_axis mass_damping stiffness_damping e1"),
+    ("word", 0, "stride pulls is_misjudged flags mode order left is_awaited"),
+    ("real", 0, "mass_damping stiffness_damping"),
     # the running motion: its table, where it is in that, how far its time and an axis come in a tick; where the part
     # begins and ends whose progress is shown, and where the next one begins
     ("table", 0, "table"),
@@ -51,8 +51,8 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", 0, "step part_begin part_end mark"),
     ("real", AXES, "stiffness most"),
     ("real", 3 * AXES, "points"),
-    # MuJoCo's model and state, its functions, and vectors of all its degrees of freedom for them
-    ("address", 0, "model data"),
+    # `struct arm` of the robot; MuJoCo's model and state, its functions, and vectors of all its degrees of freedom
+    ("address", 0, "arm model data"),
     ("step", 0, "step1 step2"),
     ("product", 0, "multiply"),
     ("reals", 0, "vector product"),
@@ -76,7 +76,6 @@ class _Memory(ctypes.Structure):
 CONSTANTS: dict[str, int] = {
     "DONE": DONE,
     "LOADED": LOADED,
-    "ASK": ASK,
     "STRAINED": STRAINED,
     "ELSEWHERE": ELSEWHERE,
     "SLOTS": SLOTS,
@@ -113,7 +112,7 @@ def tick_library() -> ctypes.CDLL:
     """
     made = library(holds_gil=True)
     made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
-    made.ht_write.restype = made.ht_publish.restype = _WORD
+    made.ht_write.restype, made.ht_publish.restype = None, _WORD
     made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
     made.ht_command.restype = None
     made.ht_strained.argtypes = (_POINTER, _WORD)
@@ -138,8 +137,6 @@ class NativeTick:
         model: MuJoCo's model.
         data: its state.
         shared: where the states are published.
-        on_axis: below this an elbow lies on its axis [m].
-        straight: closer to the straight arm than this the arm angle is asked for [rad].
         ranges: of the drives' supervision, see `DriveMonitor`; None: it is off.
         arrays: vectors of the members of `struct tick` that are pointers; they stay where they are.
 
@@ -154,8 +151,6 @@ class NativeTick:
         data: mujoco.MjData,
         shared: SharedState,
         *,
-        on_axis: float,
-        straight: float,
         ranges: Array | None,
         **arrays: Array,
     ) -> None:
@@ -168,7 +163,8 @@ class NativeTick:
         self._words = (0, 0, 0)
         self._at = ctypes.addressof(memory)
         arrays |= {"vector": np.zeros(model.nv), "product": np.zeros(model.nv)}
-        self._kept = (model, data, shared, ranges, arrays)
+        arm = constants(robot)
+        self._kept = (model, data, shared, ranges, arrays, arm)
         memory.model, memory.data = model._address, data._address
         functions = _mujoco()
         for name, member in _CALLED.items():
@@ -179,9 +175,7 @@ class NativeTick:
         memory.pulls = arrays["pulled"].size
         if ranges is not None:
             memory.ranges = ranges.ctypes.data
-        for name in ("d_bs", "d_se", "d_ew", "d_wf"):
-            setattr(memory, name, getattr(robot, name))
-        memory.straight, memory.on_axis = straight, on_axis
+        memory.arm = ctypes.cast(arm, _POINTER).value
         memory.mass_damping, memory.stiffness_damping = MASS_DAMPING, STIFFNESS_DAMPING
         memory.stiffness[:], memory.most[:] = STIFFNESS.tolist(), robot.tau_max.tolist()
         self._points = np.frombuffer(memory.points).reshape(3, AXES)
@@ -210,7 +204,7 @@ class NativeTick:
 
         Returns:
             `DONE`, or what is left to do: `ELSEWHERE`: all of it; `LOADED`: from the wrench on; `STRAINED`: from the
-            supervision of the drives on; `ASK`: the state.
+            supervision of the drives on.
         """
         rows = self._points
         rows[0], rows[1], rows[2] = points.before, points.now, points.after
@@ -303,7 +297,6 @@ class NativeTick:
         self,
         tick: int,
         after: Array,
-        e1: Callable[[], float],
         *,
         words: tuple[int, int, int],
         times: tuple[float, float],
@@ -313,16 +306,13 @@ class NativeTick:
         Args:
             tick: its number.
             after: the set-point of the next tick, shape (7,) [rad].
-            e1: computes the arm angle [rad] where that is not simple.
             words: flags, mode and order.
             times: progress and remaining time.
         """
         self._points[2] = after
         if words != self._words:
             self._show(words)
-        if self._write(self._at, tick, *times) == ASK:
-            self._memory.e1, self._memory.has_e1 = e1(), 1
-            self._write(self._at, tick, *times)
+        self._write(self._at, tick, *times)
 
     def publish(self, tick: int) -> bool:
         """Let readers see the state of a tick that was written; returns whether one waits for it."""

@@ -7,15 +7,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import atan2, cos, inf, nan, sin, sqrt
+from math import inf, nan
 
 import mujoco
 import numpy as np
 
 from heptarm._library import Unavailable
-from heptarm.model import inverse_kinematics
+from heptarm.model.inverse_kinematics import status_of
 from heptarm.model.kinematics import flange
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
@@ -26,7 +26,7 @@ from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
-from heptarm.sim.plant.native import ASK, DONE, ELSEWHERE, LOADED, NativeTick
+from heptarm.sim.plant.native import DONE, ELSEWHERE, LOADED, NativeTick
 from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.safety_monitor import UNLIMITED, ExternalTorqueMonitor, SafetyLimits
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
@@ -38,38 +38,6 @@ from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import Body, RobotModel, robot
 
 log = logging.getLogger("heptarm.sim")
-
-#: Closer to the straight arm than this [rad] the elbow does not determine the arm angle well.
-_STRAIGHT = 1e-2
-_ON_AXIS = 1e-10
-
-
-def posture(robot: RobotModel, q: Sequence[float]) -> tuple[float, int]:
-    """E1 [rad] and Status of joint positions [rad]."""
-    q4 = q[3]
-    s2, c2, s4, c4 = sin(q[1]), cos(q[1]), sin(q4), cos(q4)
-    d_se, d_ew = robot.d_se, robot.d_ew
-    # shoulder to wrist: first in the frame of A2, then in the frame of A1
-    x, y, z = -d_ew * s4 * cos(q[2]), -d_ew * s4 * sin(q[2]), d_se + d_ew * c4
-    x, z = c2 * x + s2 * z, c2 * z - s2 * x
-    behind = x < -_ON_AXIS
-    status = behind | (q4 < 0) << 1 | (q[5] <= 0) << 2
-    if abs(s4) < _STRAIGHT:
-        return inverse_kinematics.arm_angle(robot, q, behind), status
-    # elbow of the reference arm (A3 = 0): in the plane of z and w, on the side given by the sign of A4
-    radius = sqrt(x * x + y * y)
-    if radius < _ON_AXIS:
-        return inverse_kinematics.arm_angle(robot, q, behind), status
-    side = -radius if behind else radius
-    a2 = atan2(side, z) - atan2(-d_ew * s4, d_se + d_ew * c4)
-    sa, ca = sin(a2), cos(a2)
-    ux, uy = (x / side) * sa, (y / side) * sa
-    # across = w . (reference x elbow) / |w|, along = components across w; the elbow is (s2, 0, c2)
-    length = sqrt(x * x + y * y + z * z)
-    across = (x * uy * c2 + y * (ca * s2 - ux * c2) - z * uy * s2) / length
-    with_w = (x * ux + y * uy + z * ca) * (x * s2 + z * c2) / (length * length)
-    return atan2(across, ux * s2 + ca * c2 - with_w), status
-
 
 #: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after this many ticks.
 BRAKE_SPEED = 0.02
@@ -230,8 +198,6 @@ class Plant:
                 self.model,
                 d,
                 self.shared,
-                on_axis=_ON_AXIS,
-                straight=_STRAIGHT,
                 ranges=None if monitor is None else monitor.scales,
                 q=self._q,
                 dq=self._dq,
@@ -471,7 +437,7 @@ class Plant:
             self._simulate()
         elif left == LOADED:
             self._load.resolve(is_loaded=True)
-        if left != ASK and self._monitor is not None and not self._tripped:
+        if self._monitor is not None and not self._tripped:
             self._supervise(self._monitor)
         self._write(progress, remaining)
 
@@ -621,15 +587,12 @@ class Plant:
         self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
         self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
 
-    def _e1(self) -> float:
-        return posture(self.robot, self._measured.tolist())[0]
-
     def _write(self, progress: float, remaining: float) -> None:
         """Write the state after the next tick into its slot; readers see it after `_publish`."""
         k, shared, after = self.tick_count + 1, self.shared, self.interpolator.command.after
         given = self._words()
         if self._native is not None:
-            self._native.write(k, after, self._e1, words=given, times=(progress, remaining))
+            self._native.write(k, after, words=given, times=(progress, remaining))
             return
         words, reals = shared.ints[k % SLOTS], shared.floats[k % SLOTS]
         words[StateWords.SEQ] = 2 * k + 1
@@ -647,7 +610,7 @@ class Plant:
         reals[StateWords.WRENCH] = self._load.wrench
         words[StateWords.FLAGS], words[StateWords.MODE], words[StateWords.ORDER] = given
         reals[StateWords.PROGRESS], reals[StateWords.REMAINING] = progress, remaining
-        reals[StateWords.E1], words[StateWords.STATUS] = posture(self.robot, values)
+        reals[StateWords.E1], words[StateWords.STATUS] = values[2], status_of(self.robot, values)
         words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
 
     def _words(self) -> tuple[int, int, int]:

@@ -7,10 +7,17 @@ of the cabinet drive; see `heptarm.sim.plant.gripper`.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import mujoco
+import numpy as np
+
+from heptarm.errors import CommandRejected
+from heptarm.values.arrays import shown
+from heptarm.values.files import read_xml, unreadable
 
 FOLDER = Path(__file__).parents[1] / "scenes"
 #: Put before all names of a scene, so that they differ from those of the arm.
@@ -22,6 +29,23 @@ GRIPPER = "gripper"
 #: What a scene decides in `<option>`: how contacts are solved. All else is the arm's.
 _CONTACT_OPTIONS = ("cone", "impratio", "noslip_iterations", "noslip_tolerance", "iterations", "tolerance")
 _SUFFIX = ".xml"
+#: Attributes that are names, whatever they look like.
+_NAMES = (
+    "name",
+    "class",
+    "childclass",
+    "mesh",
+    "material",
+    "texture",
+    "file",
+    "body",
+    "joint",
+    "geom",
+    "site",
+    "target",
+)
+#: Largest mesh [m]; a part in millimetres is larger, a hall is not.
+_LARGEST_MESH = 30.0
 #: Parts of scenes, which are no scene by themselves.
 _PARTS = ("two-finger-gripper",)
 
@@ -78,8 +102,8 @@ class Scene:
         ready = FOLDER / f"{text}{_SUFFIX}"
         if text in names():
             return Scene(ready)
-        path = Path(text).expanduser()
-        if not path.is_file():
+        path = Path(os.path.expanduser(text))
+        if not os.path.isfile(path):  # False, too, for names that no file can have
             raise ValueError(
                 f"scene must be a file in MuJoCo's format or one of {', '.join(names())}; got {text!r}"
             )
@@ -89,26 +113,57 @@ class Scene:
         """The scene as MuJoCo reads it; it may include ready scenes and the ready gripper by their file names.
 
         Raises:
-            ValueError: the file is not in MuJoCo's format.
+            CommandRejected: the file cannot be read, is not in MuJoCo's format, or has a number that is not finite.
         """
         if self.path.parent == FOLDER:
             return mujoco.MjSpec.from_file(str(self.path))
-        text = read_text(self.path, name="scene")
-        if (wrong := _NOT_FINITE.search(text)) is not None:
-            line = text.count("\n", 0, wrong.start()) + 1
-            raise unreadable(
-                self.path,
-                f"line {line}: {wrong[1]} has {wrong[2]}, which is no finite number",
-                what=_WHAT,
-                name="scene",
-                hint="correct the number",
-            )
+        _check_numbers(self.path)
         ready = {path.name: path.read_bytes() for path in FOLDER.glob(f"*{_SUFFIX}")}
         try:
             return mujoco.MjSpec.from_file(str(self.path), include=ready)
         except (ValueError, mujoco.FatalError) as error:
-            why = " ".join(str(error).removeprefix("Error: ").split())
-            raise unreadable(self.path, why, what=_WHAT, name="scene") from None
+            raise self.unreadable(error) from None
+
+    def unreadable(self, error: Exception | str) -> CommandRejected:
+        """The error of a scene that MuJoCo cannot read or compile."""
+        why = " ".join(str(error).removeprefix("Error: ").split())
+        return unreadable(self.path, why, what="a scene", name="scene")
+
+    def compile(self, spec: mujoco.MjSpec) -> mujoco.MjModel:
+        """Compile a description to which this scene was attached.
+
+        Raises:
+            CommandRejected: MuJoCo cannot compile it, a number in it is not finite, or a mesh is not in metres.
+        """
+        try:
+            model = spec.compile()
+        except (ValueError, mujoco.FatalError) as error:
+            raise self.unreadable(error) from None
+        for kind, count, arrays in (
+            ("body", model.nbody, ("body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos")),
+            ("joint", model.njnt, ("jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness")),
+            ("geom", model.ngeom, ("geom_pos", "geom_quat", "geom_size", "geom_friction", "geom_solref")),
+            ("site", model.nsite, ("site_pos", "site_quat")),
+        ):
+            for array in arrays:
+                rows = np.isfinite(getattr(model, array).reshape(count, -1)).all(axis=1)
+                if not rows.all():
+                    name = plain(getattr(model, kind)(int(np.argmin(rows))).name)
+                    what = array.partition("_")[2]
+                    raise self.unreadable(f"{what} of the {kind} {name!r} is not finite")
+        for index in range(model.nmesh):
+            first, count = int(model.mesh_vertadr[index]), int(model.mesh_vertnum[index])
+            size = float(np.ptp(model.mesh_vert[first : first + count], axis=0).max())
+            if size > _LARGEST_MESH:
+                raise unreadable(
+                    self.path,
+                    f"the mesh {plain(model.mesh(index).name)!r} is {size:.3g} m large, at most {_LARGEST_MESH:g} m "
+                    "are allowed: millimetres?",
+                    what="a scene",
+                    name="scene",
+                    hint='a mesh in millimetres needs scale="0.001 0.001 0.001" in the scene',
+                )
+        return model
 
     def attach_to(self, arm: mujoco.MjSpec) -> None:
         """Add the scene to the description of an arm: the tool to its flange, all else to the world.
@@ -138,6 +193,32 @@ class Scene:
             ValueError: the text `gripper` of the scene names something else.
         """
         return Wiring.of(" ".join(one.data for one in self.read().texts if one.name == GRIPPER))
+
+
+def _check_numbers(file: Path) -> None:
+    """Refuse numbers that are not finite, which MuJoCo takes as they are.
+
+    Raises:
+        CommandRejected: there is one; the text names the element and its attribute. Or it is no XML.
+    """
+    for one in read_xml(file, "a scene", name="scene").iter():
+        for attribute, text in one.attrib.items():
+            if attribute not in _NAMES and _has_no_number(text):
+                named = f" {one.get('name')!r}" if one.get("name") else ""
+                raise unreadable(
+                    file,
+                    f"{attribute} of the {one.tag}{named} must be finite numbers, got {shown(text)}",
+                    what="a scene",
+                    name="scene",
+                )
+
+
+def _has_no_number(text: str) -> bool:
+    """Whether a text is numbers of which one is not finite."""
+    try:
+        return not all(isfinite(float(part)) for part in text.split())
+    except ValueError:  # a word
+        return False
 
 
 def names() -> tuple[str, ...]:

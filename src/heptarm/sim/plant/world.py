@@ -161,7 +161,7 @@ def compiled(
         spec.option.disableflags |= NO_TREES
     if camera is not None:
         _add_camera(spec, camera)
-    return spec.compile()
+    return spec.compile() if scene is None else scene.compile(spec)
 
 
 def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:

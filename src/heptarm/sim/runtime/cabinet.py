@@ -23,6 +23,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, cast, get_args, get_type_hints
 
+from heptarm._resources import cabinet_sources
 from heptarm.errors import HeptarmError, without_java
 from heptarm.fri.protocol.version import Version
 from heptarm.io.keys import find_key
@@ -36,6 +37,7 @@ from heptarm.sim.plant.shared_state import PositionsFile, Trace
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
+from heptarm.sim.runtime.application import PROJECT
 from heptarm.sim.runtime.operator import LONGEST_WAIT, SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import (
     ANSWER_GAP,
@@ -99,12 +101,14 @@ def arguments(argv: list[str] | None = None) -> SimulatorOptions:
 
 
 def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
-    """Process data of the project, overridden by the command line; a value keeps its type in the project.
+    """Process data as `heptarm install-cabinet` writes them, overridden by the project and by the command line.
+
+    A value keeps its type in the project.
 
     Raises:
         ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
-    data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
+    data = project.read_process_data(cabinet_sources() / "project" / PROJECT)
     if options.project is not None:
         addresses = AddressMap.of(options.map)
         for name, value in project.read_process_data(options.project).items():

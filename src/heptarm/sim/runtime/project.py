@@ -11,15 +11,14 @@ from xml.etree import ElementTree
 
 from heptarm.errors import CommandRejected
 from heptarm.values.arrays import shown
-from heptarm.values.files import read_bytes, unreadable
+from heptarm.values.files import read_xml, unreadable
 
 Value = str | int | float | bool
 
+_WHAT, _HINT = "a project file", "give the file that Sunrise Workbench has written"
 _TRUTH = {"true": True, "false": False}
 #: Range of Java's Integer.
 _INTEGERS = range(-(2**31), 2**31)
-#: Largest file that is read [bytes]; those of projects have some hundred kilobytes.
-_LARGEST = 64 * 2**20
 
 
 def _convert(kind: str, text: str) -> Value:
@@ -64,26 +63,8 @@ def _finite(text: str, what: str) -> float:
     return number
 
 
-def read_xml(file: Path, what: str) -> ElementTree.Element:
-    """The root of an XML file.
-
-    Args:
-        file: to read.
-        what: it should be, for the error.
-
-    Raises:
-        CommandRejected: it cannot be read, is too large, or not XML; the text has line and column.
-    """
-    data = read_bytes(file, largest=_LARGEST, name="project")
-    try:
-        return ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:  # an unknown encoding is a LookupError
-        raise _unreadable(file, what, str(error)) from None
-
-
-def _unreadable(file: Path, what: str, why: str) -> CommandRejected:
-    hint = "give the file that Sunrise Workbench has written"
-    return unreadable(file, why, what=what, name="project", hint=hint)
+def _unreadable(file: Path, why: str) -> CommandRejected:
+    return unreadable(file, why, what=_WHAT, name="project", hint=_HINT)
 
 
 def like(old: Value | None, text: str) -> Value:
@@ -102,7 +83,7 @@ def read_process_data(file: Path) -> dict[str, Value]:
     Raises:
         CommandRejected: the file cannot be read or is not XML, or a value does not fit its type.
     """
-    root = read_xml(file, _WHAT)
+    root = read_xml(file, _WHAT, name="project", hint=_HINT)
     found: dict[str, Value] = {}
     for one in root.iter("processData"):
         name, kind = one.get("id"), one.get("dataType", "java.lang.String")
@@ -112,11 +93,9 @@ def read_process_data(file: Path) -> dict[str, Value]:
         try:
             found[name] = _convert(kind, text)
         except ValueError as error:
-            raise _unreadable(file, _WHAT, f"process data {shown(name)}: {error}") from None
+            raise _unreadable(file, f"process data {shown(name)}: {error}") from None
     return found
 
-
-_WHAT = "a project file"
 
 #: x y z [mm], a b c [rad], as in the file.
 Six: TypeAlias = tuple[float, ...]
@@ -175,7 +154,7 @@ def read_project(file: Path) -> Project:
     Raises:
         CommandRejected: the file cannot be read or is not XML, or a number in it is illegal.
     """
-    root = read_xml(file, _WHAT)
+    root = read_xml(file, _WHAT, name="project", hint=_HINT)
     try:
         return Project(
             tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
@@ -183,9 +162,9 @@ def read_project(file: Path) -> Project:
             tuple(one for world in root.iter("world") for one in _redundancies(world, "")),
         )
     except ValueError as error:
-        raise _unreadable(file, _WHAT, str(error)) from None
+        raise _unreadable(file, str(error)) from None
     except RecursionError:
-        raise _unreadable(file, _WHAT, "its frames are nested too deeply") from None
+        raise _unreadable(file, "its frames are nested too deeply") from None
 
 
 def _template(one: ElementTree.Element) -> Template:

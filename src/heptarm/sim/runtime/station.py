@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import parse_qs
 from xml.etree import ElementTree
 
-from heptarm.sim.runtime.project import read_xml
+from heptarm.values.files import read_xml
 from heptarm.values.robot import FLANGES, Flange, RobotModel, robot
 from heptarm.values.simulator_options import SimulatorOptions
 
@@ -60,7 +60,7 @@ def read_station(file: Path) -> Station:
     Raises:
         CommandRejected: the file cannot be read, or is not XML.
     """
-    for item in read_xml(file, "a station setup").iter("TopologyItem"):
+    for item in read_xml(file, "a station setup", name="project").iter("TopologyItem"):
         names = (item.get("itemPath", ""), item.get("name", ""))
         match = next((found for name in names if (found := _LBR.search(name))), None)
         if match is not None:

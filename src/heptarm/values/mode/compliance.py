@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import shown, within
+from heptarm.values.arrays import optional, shown, within
 from heptarm.values.condition.contact import axis_of
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.directions import DIRECTIONS, one
@@ -13,6 +13,8 @@ from heptarm.values.mode.impedance import STIFFEST, STRONGEST, CartesianImpedanc
 
 #: Stiffness of the directions that are held, along [N/m] and about an axis [Nm/rad].
 HOLDING = (4000.0, 300.0)
+#: Highest bounds of guiding by hand, along [m/s] and about axes [rad/s], and the velocity that stops it in proportion.
+FASTEST, STOPPING = (2.0, 4.0), 1.25
 #: Stiffness of a press: across its direction, along it [N/m], and about any axis [Nm/rad].
 PRESSING = (3000.0, 200.0, 300.0)
 
@@ -25,8 +27,14 @@ def compliance(
     turning: float = HOLDING[1],
     damping: float = 1.0,
     nullspace_stiffness: float = 0.0,
+    speed: float | None = None,
+    turning_speed: float | None = None,
 ) -> CartesianImpedance:
     """Cartesian impedance that is compliant along some directions and holds the arm in all others.
+
+    Along the free directions a damper resists the hand, and the speed is bounded: the arm brakes at the bound, and a
+    quarter above it the motion stops. Its axes stay below half of their maxima, or above that in proportion to a
+    higher `speed`. On a robot only the stop is certain: how Sunrise damps a direction without stiffness is unknown.
 
     Args:
         free: the directions, such as "z" (a line), "xy" (a plane), "a" (about z), "xya" (the plane, and turning in it);
@@ -36,6 +44,8 @@ def compliance(
         turning: about the axes that are held [Nm/rad], up to 300.
         damping: damping ratio, 0.1 to 1.
         nullspace_stiffness: of the spring that holds the elbow [Nm/rad]; at 0 the elbow moves freely.
+        speed: bound along the free axes [m/s], up to 2; None: 0.25.
+        turning_speed: bound about the free axes [rad/s], up to 4; None: 1.
 
     Raises:
         ShapeError: no directions, unknown ones, or one twice.
@@ -57,8 +67,18 @@ def compliance(
         [one(stiffness, "stiffness", 0.0, STIFFEST[0], "N/m")] * 3
         + [one(turning, "turning", 0.0, STIFFEST[1], "Nm/rad")] * 3
     )
-    held[[DIRECTIONS[name] for name in free]] = 0.0
-    return CartesianImpedance(held, damping=damping, nullspace_stiffness=nullspace_stiffness, frame=frame)
+    chosen = [DIRECTIONS[name] for name in free]
+    held[chosen] = 0.0
+    stops = np.full(6, np.nan)
+    stops[:3] = STOPPING * optional(speed, "speed", 0.0, FASTEST[0], above=True, unit="m/s")
+    stops[3:] = STOPPING * optional(turning_speed, "turning_speed", 0.0, FASTEST[1], above=True, unit="rad/s")
+    return CartesianImpedance(
+        held,
+        damping=damping,
+        nullspace_stiffness=nullspace_stiffness,
+        max_velocity=np.where(held > 0.0, np.nan, stops),
+        frame=frame,
+    )
 
 
 def pressing(

@@ -84,7 +84,8 @@ class CartesianImpedance(Value):
         max_force: largest force that the control exerts, shape (6,) [N, Nm], 0 to 1e6; NaN or None: unlimited.
         max_force_stops: reaching it also stops the motion.
         max_velocity: of the motion frame, shape (6,) [m/s, rad/s], up to 100; a higher one stops the motion; NaN or
-            None: unlimited.
+            None: unlimited, but 0.3125 m/s and 1.25 rad/s in directions that a hand can guide, of less than 10 N/m or
+            0.5 Nm/rad. There the virtual cabinet brakes the arm at 0.8 of this velocity.
         max_deviation: from the set-point, shape (6,) [m, rad], up to 100; a larger one stops the motion; NaN or None:
             unlimited.
         frame: the frame whose axes the directions are: "tool" (the motion frame), "base", or the name of a frame.

@@ -29,8 +29,8 @@ class HandGuide(Motion):
     Attributes:
         q_min: lowest positions, shape (7,) [rad]; NaN: the joint's own limit.
         q_max: highest positions, likewise.
-        joint_velocity: highest speed of a joint [rad/s]; NaN: the cabinet's limit.
-        cartesian_velocity: highest speed of the motion frame [m/s]; NaN: the cabinet's limit.
+        joint_velocity: highest speed of a joint [rad/s]; NaN: half of the slowest joint's maximum.
+        cartesian_velocity: highest speed of the motion frame [m/s]; NaN: 0.25.
         at_limit: "axis" or "all".
         outside: "free" or "pull".
     """
@@ -60,8 +60,8 @@ def hand_guide(
     Args:
         q_min: lowest joint positions, shape (7,) [rad]; NaN or None: the joint's own limit.
         q_max: highest joint positions, likewise.
-        joint_velocity: highest speed of a joint [rad/s], up to 10; None: the cabinet's limit.
-        cartesian_velocity: highest speed of the motion frame [m/s], up to 10; None: the cabinet's limit.
+        joint_velocity: highest speed of a joint [rad/s], up to 10; None: half of the slowest joint's maximum.
+        cartesian_velocity: highest speed of the motion frame [m/s], up to 10; None: 0.25.
         at_limit: "axis": a joint at its limit stops there, all others stay free; "all": every joint is held until the
             switch is released.
         outside: a joint that is beyond its limit at the start can be moved back freely but no further out ("free"), or

@@ -11,6 +11,7 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.JointImpedanceControlMo
 import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.robot.GuidedSpeed;
 import heptarm.wire.CartesianImpedance;
 import heptarm.wire.JointImpedance;
 import heptarm.wire.Mode;
@@ -85,8 +86,9 @@ final class ControlModes {
             double[] most = six(from.max_force, false);
             spring.setMaxControlForce(most[0], most[1], most[2], most[3], most[4], most[5], from.max_force_stops);
         }
-        if (limits(from.max_velocity)) {
-            double[] most = six(from.max_velocity, true);
+        double[] stops = GuidedSpeed.stops(from);
+        if (limits(stops)) {
+            double[] most = six(stops, true);
             spring.setMaxCartesianVelocity(most[0], most[1], most[2], most[3], most[4], most[5]);
         }
         if (limits(from.max_deviation)) {

@@ -12,7 +12,6 @@ import heptarm.core.Clocks;
 import heptarm.core.Log;
 import heptarm.core.session.CabinetServer;
 import heptarm.core.session.ServerSettings;
-import heptarm.wire.Protocol;
 
 /** The application to select on the smartPAD: serves heptarm until it is deselected. */
 public class HeptarmApplication extends RoboticsAPIApplication {
@@ -26,12 +25,12 @@ public class HeptarmApplication extends RoboticsAPIApplication {
     @Override
     public void initialize() {
         ProcessSettings settings = new ProcessSettings(getApplicationData(), new TaskLog(getLogger(), true));
-        Log log = new TaskLog(getLogger(), settings.number("heptarm.verbosity", 1) < 1);
-        ServerSettings config = new ServerSettings(settings.text("heptarm.bind", "0.0.0.0"),
-                (int) settings.number("heptarm.port", Protocol.PORT), settings.text("heptarm.key", ""),
-                settings.text("heptarm.allow", ""), settings.number("heptarm.heartbeat", 0.5),
-                settings.number("heptarm.max_rate", 200.0), settings.number("heptarm.datagrams", 1) != 0,
-                settings.text("heptarm.reserved_for", ""));
+        Log log = new TaskLog(getLogger(), settings.number("heptarm.verbosity") < 1);
+        ServerSettings config = new ServerSettings(settings.text("heptarm.bind"),
+                (int) settings.number("heptarm.port"), settings.text("heptarm.key"),
+                settings.text("heptarm.allow"), settings.number("heptarm.heartbeat"),
+                settings.number("heptarm.max_rate"), settings.number("heptarm.datagrams") != 0,
+                settings.text("heptarm.reserved_for"));
         keyWeakness = config.keyWeakness();
         SunrisePanel panel = new SunrisePanel(getApplicationData(), getApplicationUI(), log);
         server = new CabinetServer(SunriseRobot.of(lbr, this, panel, settings, log), config, Clocks.find(), log);

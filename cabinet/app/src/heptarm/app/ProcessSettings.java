@@ -5,7 +5,7 @@ import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
 import heptarm.core.Log;
 
-/** Settings of heptarm in the process data of an application; a missing one has its default. */
+/** Settings of heptarm in the process data of an application; a missing one has its default, see {@link ProcessDefaults}. */
 final class ProcessSettings {
     private final IApplicationData data;
     private final Log log;
@@ -15,7 +15,8 @@ final class ProcessSettings {
         this.log = log;
     }
 
-    String text(String name, String fallback) {
+    String text(String name) {
+        String fallback = ProcessDefaults.of(name);
         try {
             Object value = data.getProcessData(name).getValue();
             return value == null ? fallback : value.toString();
@@ -24,13 +25,14 @@ final class ProcessSettings {
         }
     }
 
-    double number(String name, double fallback) {
-        String value = text(name, "");
+    double number(String name) {
+        String value = text(name).trim();
+        String fallback = ProcessDefaults.of(name);
         try {
-            return value.trim().length() == 0 ? fallback : Double.parseDouble(value.trim());
+            return Double.parseDouble(value.length() == 0 ? fallback : value);
         } catch (NumberFormatException e) {
             log.warn("process data " + name + " must be a number, got " + value + "; using the default " + fallback);
-            return fallback;
+            return Double.parseDouble(fallback);
         }
     }
 }

@@ -6,8 +6,11 @@ import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.robot.GuidedSpeed;
+import heptarm.core.robot.RobotModels;
 import heptarm.wire.Code;
 import heptarm.wire.HandGuide;
+import heptarm.wire.RobotInfo;
 
 /** Hand guiding of Sunrise. Only this class refers to the option's classes, so a cabinet without it still works. */
 final class SunriseHandGuiding {
@@ -28,6 +31,7 @@ final class SunriseHandGuiding {
         JointLimits own = robot.getJointLimits();
         double[] lowest = own.getMinJointPosition().get();
         double[] highest = own.getMaxJointPosition().get();
+        RobotInfo info = RobotModels.describe(robot.getName(), lowest.clone(), highest.clone());
         boolean[] enabled = new boolean[JOINTS];
         for (int i = 0; i < JOINTS; i++) {
             enabled[i] = !(Double.isNaN(guide.q_min[i]) && Double.isNaN(guide.q_max[i]));
@@ -46,19 +50,20 @@ final class SunriseHandGuiding {
             motion.setAxisLimitViolationFreezesAll(guide.freezes_all);
         }
         motion.setPermanentPullOnViolationAtStart(guide.pulls_back);
-        limitSpeed(motion, guide);
+        limitSpeed(motion, guide, GuidedSpeed.ofAxes(info));
         return motion;
     }
 
-    private static void limitSpeed(HandGuidingMotion motion, HandGuide guide) throws CommandRejected {
+    private static void limitSpeed(HandGuidingMotion motion, HandGuide guide, double ofAxes) throws CommandRejected {
+        boolean isChosen = !Double.isNaN(guide.joint_velocity) || !Double.isNaN(guide.cartesian_velocity);
+        double along = Double.isNaN(guide.cartesian_velocity) ? GuidedSpeed.ALONG : guide.cartesian_velocity;
         try {
-            if (!Double.isNaN(guide.joint_velocity)) {
-                motion.setJointVelocityLimit(guide.joint_velocity);
-            }
-            if (!Double.isNaN(guide.cartesian_velocity)) {
-                motion.setCartVelocityLimit(Convert.toMillimetres(guide.cartesian_velocity));
-            }
+            motion.setJointVelocityLimit(Double.isNaN(guide.joint_velocity) ? ofAxes : guide.joint_velocity);
+            motion.setCartVelocityLimit(Convert.toMillimetres(along));
         } catch (NoSuchMethodError e) {
+            if (!isChosen) {
+                return; // an older cabinet limits the speed by itself
+            }
             throw new CommandRejected(Code.UNSUPPORTED, "the hand guiding of this cabinet has no speed limit (" + e.getMessage() + "); leave velocity limits out");
         }
     }

@@ -27,9 +27,9 @@ final class SunriseRobot {
         SimulatorProbe probe = probe();
         RobotInfo info = RobotModels.describe(lbr.getName(), lbr.getJointLimits().getMinJointPosition().get(),
                 lbr.getJointLimits().getMaxJointPosition().get());
-        SunriseTools tools = new SunriseTools(lbr, application.getApplicationData(), settings.text("heptarm.tools", ""),
-                settings.text("heptarm.frames", ""), probe, log);
-        SunriseSignals signals = new SunriseSignals(lbr.getController(), settings.text("heptarm.io", SunriseSignals.FLANGE), log);
+        SunriseTools tools = new SunriseTools(lbr, application.getApplicationData(), settings.text("heptarm.tools"),
+                settings.text("heptarm.frames"), probe, log);
+        SunriseSignals signals = new SunriseSignals(lbr.getController(), settings.text("heptarm.io"), log);
         return new Robot(info, lbr.getController().getName(), probe != null, capabilities(log),
                 new SunriseMotions(lbr, tools, signals, execution, application.getApplicationControl(), probe, log),
                 new SunriseSensors(lbr, tools, probe), new SunriseSafety(lbr, execution, application.getRecovery(), probe), tools,

@@ -14,7 +14,7 @@ public final class CartesianImpedance extends Mode {
     /** NaN: off [N, Nm] */
     public final double[] max_force;
     public final boolean max_force_stops;
-    /** exceeding it stops; NaN: off [m/s, rad/s] */
+    /** exceeding it stops; NaN: off, but 0.3125 m/s and 1.25 rad/s in a direction of less than 10 N/m or 0.5 Nm/rad, which a hand can guide [m/s, rad/s] */
     public final double[] max_velocity;
     /** exceeding it stops; NaN: off [m, rad] */
     public final double[] max_deviation;

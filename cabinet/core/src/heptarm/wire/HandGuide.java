@@ -7,9 +7,9 @@ public final class HandGuide extends Motion {
     public final double[] q_min;
     /** [rad] */
     public final double[] q_max;
-    /** limit of every axis; NaN keeps the cabinet's limit, also in the next field [rad/s] */
+    /** limit of every axis; NaN: half of the slowest axis' maximum [rad/s] */
     public final double joint_velocity;
-    /** of the motion frame [m/s] */
+    /** of the motion frame; NaN: 0.25 m/s [m/s] */
     public final double cartesian_velocity;
     /** at a limit every axis stops until the switch is released; otherwise only the axis at its limit, outwards */
     public final boolean freezes_all;

@@ -16,7 +16,7 @@ public final class CartesianImpedance extends ImpedanceMode {
     /** NaN: off [N, Nm] */
     public double[] maxForce = Seam.missing(6);
     public boolean maxForceStops = false;
-    /** exceeding it stops; NaN: off [m/s, rad/s] */
+    /** exceeding it stops; NaN: off, but 0.3125 m/s and 1.25 rad/s in a direction of less than 10 N/m or 0.5 Nm/rad, which a hand can guide [m/s, rad/s] */
     public double[] maxVelocity = Seam.missing(6);
     /** exceeding it stops; NaN: off [m, rad] */
     public double[] maxDeviation = Seam.missing(6);
