@@ -938,7 +938,7 @@ class LineServo(PoseServo):
     def set(self, pose: Pose) -> Pose:
         """Send a target; the newest one wins. After the end of the motion it has no effect.
 
-        The elbow keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the
+        A3 keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the
         arm comes to rest on it, and `stats` has the reason; the cabinet refuses a pose that is out of reach altogether.
 
         Returns:
