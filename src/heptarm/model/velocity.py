@@ -267,7 +267,7 @@ def resolved_pose(robot: RobotModel, pose: Pose, near: Array, *, elbow: ElbowTas
 
 
 def blockage(robot: RobotModel, q: Array, twist: Array) -> Slowdown:
-    """What slows the arm down most if the flange goes on with a twist from here and A3 stays, at the joints' own limits.
+    """What slows the arm down most if the flange goes on with a twist and A3 stays, at the joints' own limits.
 
     Args:
         robot: the robot.
