@@ -76,7 +76,9 @@ def header() -> str:
     lines += _enum("words of a command", command)
     lines += _enum("parts that a command has", _prefixed(layout, "GIVEN_"))
     sizes = {"AXES": joint_guard.AXES} | _named(messages, "MAX_NAME", "MAX_IO", "MAX_TRANSFORMATIONS")
-    sizes |= _named(memory, "PARAM_SLOTS", "MEMORY_SLOTS", "EVENT_WORDS", "EVENT_SLOTS", "EVENT_TEXT", "NOTE_WORDS")
+    sizes |= _named(
+        memory, "PARAM_SLOTS", "MEMORY_SLOTS", "EVENT_WORDS", "EVENT_SLOTS", "EVENT_TEXT", "NOTE_WORDS"
+    )
     sizes |= _named(memory, "NAME_BYTES", "NAME_WORDS")
     lines += _enum("sizes", sizes | _named(version, "MAX_DATAGRAM") | _named(statistics, "BINS"))
     for module, names in (

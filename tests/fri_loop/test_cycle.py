@@ -51,9 +51,7 @@ class Bench:
         **params: Any,
     ) -> None:
         policy = policy or (Policy(Missing.HOLD, patience=1e6) if law is None else Policy())
-        settings = settings or LoopSettings(
-            law=law, policy=policy, params=params or None, history=256
-        )
+        settings = settings or LoopSettings(law=law, policy=policy, params=params or None, history=256)
         block = MemoryBlock(at.Layout.words(**settings.sizes))
         block.unlink()
         self.layout = at.Layout(block, **settings.sizes)

@@ -60,7 +60,7 @@ def check_speed(last: State, now: State) -> None:
 
 
 class Hostile:
-    """Messages of a controller whose check sums are right and whose contents are not: damaged, cut, repeated, from years away.
+    """Messages of a controller with right check sums and wrong contents: damaged, cut, repeated, from years away.
 
     Args:
         wire: version of FRI.
@@ -86,9 +86,15 @@ class Hostile:
         message = codec.decode_monitoring(controller.datagram(), self.wire)
         monitor, ipo = message.monitor, message.ipo
         assert monitor is not None
-        lacking: dict[str, object] = [{}, {}, {}, {"q": None}, {"q_cmd": None}, {"tau_ext": None}, {"pose": None}][
-            variant % 7
-        ]  # type: ignore[assignment]
+        lacking: dict[str, object] = [
+            {},
+            {},
+            {},
+            {"q": None},
+            {"q_cmd": None},
+            {"tau_ext": None},
+            {"pose": None},
+        ][variant % 7]  # type: ignore[assignment]
         if variant == 7:
             monitor = replace(monitor, stamp=m.TimeStamp(2**32 - 1, 2**32 - 1))
         if variant == 8:
@@ -107,9 +113,13 @@ class Hostile:
         """The next one: three of four as they should be."""
         chance = self.chance
         what = chance.random()
-        self.sequence = (self.sequence + (1 if what < 0.97 else chance.choice((2, 5, 40, 900, 2**31)))) % 2**32
+        self.sequence = (
+            self.sequence + (1 if what < 0.97 else chance.choice((2, 5, 40, 900, 2**31)))
+        ) % 2**32
         variant = 0 if what < 0.8 else chance.randrange(12)
-        head = put_varint(1, MONITORING_ID) + put_varint(2, self.sequence) + put_varint(3, chance.randrange(100))
+        head = (
+            put_varint(1, MONITORING_ID) + put_varint(2, self.sequence) + put_varint(3, chance.randrange(100))
+        )
         raw = bytearray(put_bytes(1, head) + self.plain[state, mode][variant])
         what = chance.random()
         if what < 0.15:
@@ -128,7 +138,7 @@ class Hostile:
 
 @pytest.mark.parametrize("wire", Version)
 def test_no_datagram_ends_the_client_nor_passes_a_limit(wire: Version) -> None:
-    """Whatever comes, every answer is finite and within the limits of every axis, and good messages are answered again."""
+    """Whatever comes, every answer is finite and within the limits of all axes, and good messages are answered again."""
     chance = random.Random(wire.value)
     bench, hostile = Bench(wire=wire), Hostile(wire, chance)
     modes = sorted({mode for _, mode in hostile.plain})
@@ -143,7 +153,9 @@ def test_no_datagram_ends_the_client_nor_passes_a_limit(wire: Version) -> None:
             words = np.zeros(at.COMMAND_WORDS)
             words[at.C_Q : at.C_E1 + 1] = [chance.uniform(-4.0, 4.0) for _ in range(at.C_E1 + 1 - at.C_Q)]
             words[at.C_POSE + 3 : at.C_POSE + 7] = 0.5
-            bench.give(words, chance.choice((at.GIVEN_Q, at.GIVEN_Q | at.GIVEN_TAU, at.GIVEN_WRENCH, at.GIVEN_POSE)))
+            bench.give(
+                words, chance.choice((at.GIVEN_Q, at.GIVEN_Q | at.GIVEN_TAU, at.GIVEN_WRENCH, at.GIVEN_POSE))
+            )
         answer = bench.cycle.turn(hostile.datagram(state, mode), bench.now)
         count = bench.layout.states.count
         bench.cycle.finish(bench.now + 30_000)
@@ -152,7 +164,12 @@ def test_no_datagram_ends_the_client_nor_passes_a_limit(wire: Version) -> None:
             words_now = bench.layout.states.newest()
             assert words_now is not None
             now = State(words_now)
-            if last is not None and now.is_commanding and last.is_commanding and not math.isnan(now.q_sent[0]):
+            if (
+                last is not None
+                and now.is_commanding
+                and last.is_commanding
+                and not math.isnan(now.q_sent[0])
+            ):
                 check_speed(last, now)
             last = now
     bench.now += 600 * MS

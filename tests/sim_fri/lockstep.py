@@ -54,9 +54,7 @@ class Lockstep:
         q: tuple[float, ...] = READY,
         period_ms: int = 1,
     ) -> None:
-        settings = LoopSettings(
-            law=law, params=params, policy=Policy(Missing.HOLD, patience=1e6), history=64
-        )
+        settings = LoopSettings(law=law, params=params, policy=Policy(Missing.HOLD, patience=1e6), history=64)
         block = MemoryBlock(at.Layout.words(**settings.sizes))
         block.unlink()
         self.layout = at.Layout(block, **settings.sizes)
@@ -84,7 +82,7 @@ class Lockstep:
             self._tick()
 
     def end(self, way: str) -> None:
-        """End the session: the program leaves its block, the overlay stops, the session closes, the client falls silent."""
+        """End the session: the program leaves its block, the overlay stops, it closes, the client falls silent."""
         if way == "leave":
             self._arm.release()
         elif way == "stop":

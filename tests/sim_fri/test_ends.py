@@ -1,4 +1,4 @@
-"""Whoever brakes last brakes within limits: an FRI session ends at speed towards a joint limit, in every way it can end."""
+"""Whoever brakes last brakes within limits: a session ends at speed towards a joint limit, in every way it can."""
 
 from __future__ import annotations
 

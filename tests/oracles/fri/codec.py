@@ -144,5 +144,3 @@ def decode_monitoring(datagram: bytes, version: Version) -> m.Monitoring:
             for one in _subs(found, 6, "transformations", MAX_TRANSFORMATIONS)
         ),
     )
-
-

@@ -246,7 +246,10 @@ class SignalExchange:
 
     def _publish(self, io: tuple[m.IoValue, ...]) -> None:
         """Publish the names of signals and frames for the user's process when they change."""
-        names = tuple((one.name, one.type, one.direction) for one in io), tuple(one.name for one in self._asked)
+        names = (
+            tuple((one.name, one.type, one.direction) for one in io),
+            tuple(one.name for one in self._asked),
+        )
         if names == self._published:
             return
         self._published = names
@@ -401,8 +404,7 @@ class Cycle:
     # --------------------------------------------------------------------------------------------- one message
 
     def turn(self, datagram: bytes, received: int) -> bytes | None:
-        """Process a datagram and make its answer; call `finish` next.
-        """
+        """Process a datagram and make its answer; call `finish` next."""
         return self._turn(datagram, received)
 
     def forget_controller(self) -> None:
@@ -705,8 +707,8 @@ class Cycle:
             if not self._is_stale:
                 self.record.report(
                     self.session.received,
-                    "commands of a program that has not seen this session are not executed: the arm is held until the program "
-                    "has read a state of it",
+                    "commands of a program that has not seen this session are not executed: the arm is held until the "
+                    "program has read a state of it",
                 )
             self._is_stale = True
             return

@@ -76,7 +76,9 @@ class JointGuard:
         for axis in range(AXES):
             v, a, j = self.v[axis], self.A[axis], self.J[axis]
             here, coast = self.q[axis], self.coast
-            self.low[axis] = min(self.limits.q_min[axis], here - overrun(-v, 0.0, a, j) - coast * max(-v, 0.0))
+            self.low[axis] = min(
+                self.limits.q_min[axis], here - overrun(-v, 0.0, a, j) - coast * max(-v, 0.0)
+            )
             self.high[axis] = max(self.limits.q_max[axis], here + overrun(v, 0.0, a, j) + coast * max(v, 0.0))
         self.is_started, self.was_limited = True, False
 

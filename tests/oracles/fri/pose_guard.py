@@ -212,7 +212,9 @@ class PoseGuard:
         if speed > top:
             self._limited(PoseLimited.VELOCITY, part, speed / period, self._rates[part])
         else:
-            self._limited(PoseLimited.ACCELERATION, part, max(bend, far) / (period * period), self._changes[part])
+            self._limited(
+                PoseLimited.ACCELERATION, part, max(bend, far) / (period * period), self._changes[part]
+            )
         planned, wanted = PLANNED * most, goal_v
         if far > 0.0:  # largest velocity that still stops at the moving goal with the acceleration `planned`
             rate = min(far, planned * (math.sqrt(0.25 + 2.0 * far / planned) - 0.5))

@@ -88,7 +88,9 @@ class Session:
         self._configured = version
         low, high = positions or widest()
         self.low, self.high = [value - OVERRUN for value in low], [value + OVERRUN for value in high]
-        self.fastest = fastest or [max(float(one.dq_max[i]) for one in ROBOTS.values()) for i in range(m.JOINTS)]
+        self.fastest = fastest or [
+            max(float(one.dq_max[i]) for one in ROBOTS.values()) for i in range(m.JOINTS)
+        ]
         self.counters = counters or Counters()
         self.latency = latency or Histogram()
         self.jitter = jitter or Histogram()
@@ -280,8 +282,8 @@ class Session:
         period, multiplier = link.period_ms or 0, max(1, link.multiplier or 1)
         if (period * 1_000_000, multiplier) != (self.period, self.multiplier):
             raise ImplausibleMessage(
-                f"FRI message: the session has {self.period // 1_000_000} ms and {self.multiplier} messages per answer, got "
-                f"{period} ms and {multiplier}: the datagram is damaged"
+                f"FRI message: the session has {self.period // 1_000_000} ms and {self.multiplier} messages per answer, "
+                f"got {period} ms and {multiplier}: the datagram is damaged"
             )
 
     def _check_reach(self, sample: Sample, now: int) -> None:
@@ -299,8 +301,8 @@ class Session:
         for axis, (new, old, fastest) in enumerate(zip(ipo, last.q_ipo, self.fastest, strict=True), 1):
             if abs(new - old) > 1.5 * fastest * time + 0.01:
                 raise ImplausibleMessage(
-                    f"FRI message: the interpolated position of A{axis} moved by {abs(new - old):.4g} rad within {time:.4g} s, "
-                    "which no axis can: the datagram is damaged"
+                    f"FRI message: the interpolated position of A{axis} moved by {abs(new - old):.4g} rad within "
+                    f"{time:.4g} s, which no axis can: the datagram is damaged"
                 )
 
     def _read(self, datagram: bytes, now: int) -> Sample:

@@ -141,9 +141,7 @@ def request(
     )
 
     def make(address: str) -> Client:
-        return _listening(
-            port, address, lambda chosen: Client(chosen, host=address, settings=settings)
-        )
+        return _listening(port, address, lambda chosen: Client(chosen, host=address, settings=settings))
 
     return FriRequest(kind, message, make, law is not None)
 

@@ -102,9 +102,7 @@ class Client(Sealed, Reader):
         super().__init__(at.Layout(block, **self.settings.sizes))
         self._header[at.HISTORY] = self.settings.history
         self._header[at.SIZE], self._header[at.MEMORY_SIZE] = values.size, remembered.size
-        self.params = Params(
-            values, schema, changed=self._send_params, declared=self.settings.declared
-        )
+        self.params = Params(values, schema, changed=self._send_params, declared=self.settings.declared)
         self._send_params()
         self.memory = LiveMemory(
             remembered, kept, newest=self._newest_memory, write=self._layout.memory_set.write

@@ -220,7 +220,10 @@ class Cycle:
         for place, (name, value) in enumerate(written.items()):
             is_analog = isinstance(value, float)
             bits = np.array([value], dtype=np.float64 if is_analog else np.uint64).view(np.int64)
-            seam.written_signal[place], seam.written_value[place] = self._signals.names.index(name), int(bits[0])
+            seam.written_signal[place], seam.written_value[place] = (
+                self._signals.names.index(name),
+                int(bits[0]),
+            )
         seam.written = len(written)
         written.clear()
 

@@ -95,8 +95,8 @@ STRUCTURES: dict[str, Rows] = {
         ("word", MAX_IO, "written_signal written_value"),
         # guard of torques, `struct torque_guard`
         ("pointer", 1, "torque_guard"),
-        # a compiled law: function; parameters, what they follow and how fast; memory, counts of what the user's process has
-        # written to it; a buffer
+        # a compiled law: function; parameters, what they follow and how fast; memory, counts of what the user's process
+        # has written to it; a buffer
         ("pointer", 1, "law params params_target params_rates memory memory_written law_buffer"),
         ("pointer", 1, "params_ring memory_ring memory_set_ring"),
         ("word", 1, "params_size memory_size params_seen memory_seen"),

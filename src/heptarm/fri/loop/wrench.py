@@ -19,9 +19,7 @@ def chain_of(arm: RobotModel) -> list[float]:
     return [*arm.links.origin.reshape(-1).tolist(), *arm.links.flange.tolist()]
 
 
-def external_wrench(
-    arm: RobotModel, q: npt.ArrayLike, tau_ext: npt.ArrayLike
-) -> npt.NDArray[np.float64]:
+def external_wrench(arm: RobotModel, q: npt.ArrayLike, tau_ext: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Estimate the wrench.
 
     Args:

@@ -588,9 +588,7 @@ class Interpolator:
         """
         if self.is_overlaid:
             self.is_overlaid = False
-            run.follower = braking_axes(
-                self._robot, self._command.after, self._command.speed, jerk=FAST_JERK
-            )
+            run.follower = braking_axes(self._robot, self._command.after, self._command.speed, jerk=FAST_JERK)
             run.braking, run.stop = True, None
             return
         if run.guided is not None:
