@@ -307,7 +307,9 @@ def test_a_load_above_the_rated_one_is_warned_of(bare: Arm, caplog: pytest.LogCa
     with bare.tool(GRIPPER):
         assert "rated load" not in caplog.text
         with bare.attached(Workpiece("engine", mass=12.5)):
-            assert "attached load is 14.5 kg, and the rated load of the LBR iiwa 14 R820 is 14 kg" in caplog.text
+            assert (
+                "attached load is 14.5 kg, and the rated load of the LBR iiwa 14 R820 is 14 kg" in caplog.text
+            )
     caplog.clear()
     with bare.tool(Tool("drill", mass=15.0)):
         assert "attached load is 15 kg" in caplog.text

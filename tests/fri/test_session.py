@@ -14,8 +14,9 @@ from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.answers import Setpoint
-from heptarm.fri.session.session import Kind, Session
+from heptarm.fri.session.events import Kind
+from tests.oracles.fri.answers import Setpoint
+from tests.oracles.fri.session import Session
 
 from . import strategies as some
 

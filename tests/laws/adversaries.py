@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.fri.guard.joint_guard import JointGuard, Limits
+from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.planning.seam import Hold
@@ -21,6 +21,7 @@ from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import Body, robot
+from tests.oracles.fri.joint_guard import JointGuard
 
 Floats = npt.NDArray[np.float64]
 #: Torques [Nm] of measured positions [rad], velocities [rad/s] and the time [s]; NaN and infinity are allowed.

@@ -46,7 +46,7 @@ from heptarm.fri.loop.law_interface import LiveMemory
 from heptarm.fri.loop.user_api import Params, Stats
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import Quality, Safety, SessionState
-from heptarm.fri.session.session import Event, Kind
+from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
 from heptarm.record.journal import FRI
 from heptarm.values.arrays import within

@@ -30,6 +30,7 @@ from heptarm.sim.controller.servo import (
     Follower,
     SmartFollower,
     StraightFollower,
+    braking_axes,
     follower,
 )
 from heptarm.sim.controller.setpoints import SetPoints
@@ -453,8 +454,9 @@ class Interpolator:
             self._command.after = self.action.q
             return 0.0, nan
         if self.is_overlaid:
-            self.is_overlaid = False
             self._halt(run)
+            if run.follower is not None:
+                return self._follow_targets(run, run.follower)
         step = TICK if run.braking else self._step(run)
         if run.table is not None and not run.braking and self._follow_ahead(run, run.table, step):
             s = run.place
@@ -579,7 +581,16 @@ class Interpolator:
         self._halt(run)
 
     def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
-        """Brake every axis by itself, in the direction of the present velocity."""
+        """Come to rest off the path: all axes together, in the direction of the present velocity.
+
+        The axes of an overlay have no path in common: each brakes as hard as it may, and as soon, as the guard of the
+        client expects. A jerk as gentle as that of a motion would take several degrees more.
+        """
+        if self.is_overlaid:
+            self.is_overlaid = False
+            run.follower = braking_axes(self._robot, self._command.after, self._command.speed, jerk=FAST_JERK)
+            run.braking, run.stop = True, None
+            return
         if run.guided is not None:
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())

@@ -48,6 +48,8 @@ class RateProfile:
     Args:
         times: samples of the trajectory's time, ascending [s].
         squares: of the rate there.
+        q: joint positions there, shape (n, 7) [rad].
+        slopes: their derivatives by the trajectory's time, likewise.
         is_whole: it ends where the trajectory does, or where an axis could not go on.
 
     Attributes:
@@ -56,9 +58,12 @@ class RateProfile:
         next_look: when the trajectory is to be looked at again, before the arm brakes at the end of this [s].
     """
 
-    __slots__ = ("_clock", "_rates", "_times", "duration", "is_whole", "next_look")
+    __slots__ = ("_clock", "_q", "_rates", "_slopes", "_times", "duration", "is_whole", "next_look")
 
-    def __init__(self, times: list[float], squares: list[float], *, is_whole: bool) -> None:
+    def __init__(
+        self, times: list[float], squares: list[float], *, q: Array, slopes: Array, is_whole: bool
+    ) -> None:
+        self._q, self._slopes = q, slopes
         rates = np.sqrt(squares)
         steps = 2.0 * np.diff(times) / np.maximum(rates[1:] + rates[:-1], _TINY)
         self._times, self._rates = times, rates.tolist()
@@ -84,6 +89,19 @@ class RateProfile:
         """Moments at which set-points show whether the axes can get on to it [s]: more where it is slowed."""
         slowed = any(abs(self.at(moment)[1] - 1.0) > _TINY for moment in (TICK, _CHECKED * TICK))
         return [TICK * (1 + k) for k in range(_CHECKED if slowed else 2)]
+
+    def near(self, time: float) -> Array:
+        """Joint positions near to those at a time of the trajectory [s], as it was sampled, shape (7,) [rad]."""
+        times = self._times
+        k = min(max(1, bisect_right(times, time)), len(times) - 1)
+        gap = times[k] - times[k - 1]
+        s = min(1.0, (time - times[k - 1]) / gap)
+        # Hermite's cubic
+        begin, end = self._q[k - 1], self._q[k]
+        way, u = end - begin, 1.0 - s
+        bent = u * (gap * self._slopes[k - 1] - way) - s * (gap * self._slopes[k] - way)
+        place: Array = begin + s * way + (s * u) * bent
+        return place
 
     def change(self, elapsed: float) -> float:
         """Change of the rate over the ticks beside a moment [1/s]."""
@@ -161,7 +179,11 @@ class AxisLimits:
         first[-1] = slopes[-1] + 0.5 * gaps[-1] * second[-1]
         rests = samples.is_open or samples.is_blocked
         squares = self._greatest(first, second, gaps, rate * rate, 0.0 if rests else 1.0)
-        return None if squares is None else RateProfile(samples.times, squares, is_whole=not samples.is_open)
+        return (
+            None
+            if squares is None
+            else RateProfile(samples.times, squares, q=q, slopes=first, is_whole=not samples.is_open)
+        )
 
     def _greatest(
         self, first: Array, second: Array, gaps: Array, begin: float, end: float

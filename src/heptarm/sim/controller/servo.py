@@ -137,6 +137,8 @@ class OnlineTrajectory:
 _STEP = 1e-5
 #: Angles below it [rad] do not determine their axis.
 _TINY = 1e-9
+#: Below this rate of a trajectory's time the samples are the set-points.
+_SLOW = 0.05
 #: A target that no trajectory leads to yet is tried again after this time [s]; and these are the times of a trajectory
 #: after which the axes try to be at rest [s].
 _AGAIN, _STOPS = 0.01, (0.02, 0.05, 0.1, 0.2)
@@ -221,7 +223,7 @@ class StraightFollower:
         limits = self._limits = StraightServoLimits.of(motion)
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
-        self._inverse = PathInverse(robot, frame)
+        self._inverse, self._a3 = PathInverse(robot, frame), float(here[2])
         self._q = here.copy()
         self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
@@ -261,7 +263,7 @@ class StraightFollower:
         self._elapsed += dt
         otg.time = one.profile.at(self._elapsed)[0]
         self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        before, self._q = self._q, self._joints(otg, one.centre, otg.time, self._q)
+        before, self._q = self._q, self._set_point(one, self._elapsed)
         if dt > 0.0:
             self._speed = (self._q - before) / dt
         if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
@@ -325,7 +327,7 @@ class StraightFollower:
             return False
         ahead = [self._q]
         for elapsed in profile.first_ticks:
-            ahead.append(self._joints(otg, centre, profile.at(elapsed)[0], ahead[-1]))
+            ahead.append(self._set_point(_Trajectory(otg, centre, profile), elapsed))
         if not self._axes.joins(scale * self._speed, *ahead):
             return False
         self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
@@ -354,6 +356,13 @@ class StraightFollower:
     def _new_trajectory(self) -> OnlineTrajectory:
         return OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
 
+    def _set_point(self, one: _Trajectory, elapsed: float) -> Array:
+        """Joint positions of a trajectory when so much time of its profile has passed, shape (7,) [rad]."""
+        time, rate = one.profile.at(elapsed)
+        near = one.profile.near(time)
+        # where the axes are that slow, the samples are dense, and the noise of the inverse kinematics is not
+        return near if rate < _SLOW else self._joints(one.otg, one.centre, time, near)
+
     def _joints(self, otg: OnlineTrajectory, centre: Quat, time: float, near: Array) -> Array:
         """Joint positions at a time of a trajectory, next to others.
 
@@ -365,7 +374,7 @@ class StraightFollower:
             x, y, z = (self._turned_axes @ (x, y, z)).tolist()
             turn = (self._turned_axes @ turn).tolist()
         i, j, k, w = _rotated(centre, turn)
-        return self._inverse.joints((x, y, z), (i, j, k, w), near)
+        return self._inverse.joints((x, y, z), (i, j, k, w), near, a3=self._a3)
 
     def _turned(self, turn: Array) -> Quat:
         """Orientation at a rotation from the centre, quaternion."""
@@ -675,6 +684,16 @@ class DirectFollower:
 Follower = SmartFollower | DirectFollower | StraightFollower
 
 
+def braking_axes(robot: RobotModel, here: Array, speed: Array, *, jerk: float = 1.0) -> SmartFollower:
+    """A follower whose axes brake, each by itself and as hard as it may; arguments as of `AxisStop`."""
+    limits = ServoLimits(
+        robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, _NO_TIMING
+    )
+    braking = SmartFollower(limits, here)
+    braking.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+    return braking
+
+
 class AxisStop:
     """Brakes every axis by itself: how a safety stop acts on a servo motion, which has no path to keep.
 
@@ -686,11 +705,7 @@ class AxisStop:
     """
 
     def __init__(self, robot: RobotModel, here: Array, speed: Array, *, jerk: float) -> None:
-        limits = ServoLimits(
-            robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, _NO_TIMING
-        )
-        self._stop = SmartFollower(limits, here)
-        self._stop.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+        self._stop = braking_axes(robot, here, speed, jerk=jerk)
 
     @property
     def is_over(self) -> bool:
