@@ -23,7 +23,6 @@ from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.mode.sine import SineImpedance
-from heptarm.values.robot import Body
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
@@ -91,7 +90,6 @@ def request(
     connection: Connection,
     kind: str,
     *,
-    load: Body | None = None,
     period_ms: int | None = None,
     multiplier: int = 1,
     mode: Mode | None = None,
@@ -129,7 +127,7 @@ def request(
     if port is not None:
         integer(port, "port", 0, 65535)
     instance(host, str, "host")
-    settings = LoopSettings(model=connection.robot, load=load, **loop)
+    settings = LoopSettings(model=connection.robot, **loop)
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,

@@ -285,7 +285,7 @@ class LawTrial(Sealed):
         CommandRejected: the law cannot be compiled or loaded.
     """
 
-    params: Final[interface.Memory]
+    params: Final[Params]
     memory: Final[interface.Memory]
     t: float
 
