@@ -133,7 +133,7 @@ def test_a_line_across_a_limit_names_the_limit(start: tuple[float, ...], axis: i
     q = deg(*start)
     goal = Pose.from_matrix(model.forward(IIWA, q + np.radians(turn) * np.eye(7)[axis - 1]))
     with pytest.raises(ha.LimitError, match=f"limit A{axis} on the path"):
-        look_ahead(IIWA, q, [ha.lin(goal)], frames, step=0.01)
+        look_ahead(IIWA, q, [item(ha.lin(goal), IIWA)], frames, step=0.01)
 
 
 def test_of_two_obstacles_on_a_line_the_first_is_named() -> None:
@@ -144,7 +144,7 @@ def test_of_two_obstacles_on_a_line_the_first_is_named() -> None:
     turned = Pose.from_matrix(model.forward(IIWA, q + np.radians(60) * np.eye(7)[5]))
     goal = Pose.of(flange[:3, 3] + [0.9, 0, 0.9], turned.quat)
     with pytest.raises(ha.LimitError, match="limit A6 on the path"):
-        look_ahead(IIWA, q, [ha.lin(goal)], frames, step=0.01)
+        look_ahead(IIWA, q, [item(ha.lin(goal), IIWA)], frames, step=0.01)
 
 
 def test_a_line_through_a_singularity_is_refused() -> None:

@@ -266,14 +266,13 @@ def resolved_pose(robot: RobotModel, pose: Pose, near: Array, *, elbow: ElbowTas
     return q
 
 
-def blockage(robot: RobotModel, q: Array, twist: Array, *, elbow: ElbowTask) -> Slowdown:
-    """What slows the arm down most if the flange goes on with a twist from here, at the joints' own limits.
+def blockage(robot: RobotModel, q: Array, twist: Array) -> Slowdown:
+    """What slows the arm down most if the flange goes on with a twist and A3 stays, at the joints' own limits.
 
     Args:
         robot: the robot.
         q: joint positions, shape (7,) [rad].
         twist: of the flange, base axes, shape (6,) [m/s, rad/s].
-        elbow: what the elbow does.
     """
     path = VelocityPath(
         q,
@@ -282,7 +281,11 @@ def blockage(robot: RobotModel, q: Array, twist: Array, *, elbow: ElbowTask) -> 
         q_min=robot.q_min + NEAREST,
         q_max=robot.q_max - NEAREST,
     )
-    dq, singular = resolved_twist(robot, path, twist, elbow=elbow)
+    j = jacobian(robot, q)
+    j[:, 2] = 0.0
+    dq = _damped(j, twist)[0]
+    achieved = float(np.clip((j @ dq) @ twist / max(float(twist @ twist), _TINY**2), 0.0, 1.0))
+    singular = FREE if achieved > 0.995 else Slowdown("singularity", achieved)
     return min((singular, *path.slowdowns(dq)), key=lambda one: one.factor)
 
 

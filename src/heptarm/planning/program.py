@@ -61,8 +61,12 @@ class JointBlend(Sequential):
         self._last, self._first, self._corner = last, first, corner
 
     def at(self, s: float, near: Array) -> Array:
-        """Joint positions, shape (7,) [rad]."""
-        before = self._before.at(1.0 - self._last * blend_weight(s), near)
+        """Joint positions, shape (7,) [rad].
+
+        Both paths are followed next to the corner: `near` is beside both of them, and what a path leaves free, such as
+        A3, would then follow the blend and be counted twice.
+        """
+        before = self._before.at(1.0 - self._last * blend_weight(s), self._corner)
         return before + self._after.at(self._first * blend_weight(1.0 - s), self._corner) - self._corner
 
 

@@ -882,10 +882,9 @@ class PoseServo(Servo):
 
     def _reason(self, pose: Pose) -> str:
         """What keeps the arm from going on to a pose from the last good target; empty: nothing near."""
-        assert self._elbow is not None
         here, there = self._pose @ self._to_flange, pose @ self._to_flange
         twist = here.displacement(there) / self.period
-        return blockage(self._connection.robot, self._q, twist, elbow=self._elbow).reason
+        return blockage(self._connection.robot, self._q, twist).reason
 
     @property
     def stats(self) -> ServoStats:
@@ -938,7 +937,7 @@ class LineServo(PoseServo):
     def set(self, pose: Pose) -> Pose:
         """Send a target; the newest one wins. After the end of the motion it has no effect.
 
-        The elbow keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the
+        A3 keeps its angle. Where the line meets a limit of a joint, a singularity or the end of the reach, the
         arm comes to rest on it, and `stats` has the reason; the cabinet refuses a pose that is out of reach altogether.
 
         Returns:
@@ -980,7 +979,7 @@ class LineServo(PoseServo):
         self._looked = now
         limits, newest = self._message.linear, self._connection.newest()
         joints = None if newest is None else newest.groups.joints
-        if not self._sent or not self._active or joints is None or limits is None or self._elbow is None:
+        if not self._sent or not self._active or joints is None or limits is None:
             return
         robot = self._connection.robot
         left = Pose.from_matrix(forward(robot, joints.q_cmd)).displacement(self._pose @ self._to_flange)
@@ -988,7 +987,7 @@ class LineServo(PoseServo):
         seconds = max(way / limits.velocity, turn / limits.orientation_velocity)
         self._slowdown = FREE
         if seconds > _ARRIVED:
-            why = blockage(robot, joints.q_cmd, left / seconds, elbow=self._elbow)
+            why = blockage(robot, joints.q_cmd, left / seconds)
             self._slowdown = why
             known = self._slowdowns.get(why.reason, FREE)
             if why.factor < known.factor:

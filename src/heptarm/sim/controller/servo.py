@@ -137,6 +137,8 @@ class OnlineTrajectory:
 _STEP = 1e-5
 #: Angles below it [rad] do not determine their axis.
 _TINY = 1e-9
+#: Below this rate of a trajectory's time the samples are the set-points.
+_SLOW = 0.05
 #: A target that no trajectory leads to yet is tried again after this time [s]; and these are the times of a trajectory
 #: after which the axes try to be at rest [s].
 _AGAIN, _STOPS = 0.01, (0.02, 0.05, 0.1, 0.2)
@@ -261,8 +263,7 @@ class StraightFollower:
         self._elapsed += dt
         otg.time = one.profile.at(self._elapsed)[0]
         self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        near = one.profile.near(otg.time)
-        before, self._q = self._q, self._joints(otg, one.centre, otg.time, near)
+        before, self._q = self._q, self._set_point(one, self._elapsed)
         if dt > 0.0:
             self._speed = (self._q - before) / dt
         if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
@@ -326,8 +327,7 @@ class StraightFollower:
             return False
         ahead = [self._q]
         for elapsed in profile.first_ticks:
-            time = profile.at(elapsed)[0]
-            ahead.append(self._joints(otg, centre, time, profile.near(time)))
+            ahead.append(self._set_point(_Trajectory(otg, centre, profile), elapsed))
         if not self._axes.joins(scale * self._speed, *ahead):
             return False
         self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
@@ -355,6 +355,13 @@ class StraightFollower:
 
     def _new_trajectory(self) -> OnlineTrajectory:
         return OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
+
+    def _set_point(self, one: _Trajectory, elapsed: float) -> Array:
+        """Joint positions of a trajectory when so much time of its profile has passed, shape (7,) [rad]."""
+        time, rate = one.profile.at(elapsed)
+        near = one.profile.near(time)
+        # where the axes are that slow, the samples are dense, and the noise of the inverse kinematics is not
+        return near if rate < _SLOW else self._joints(one.otg, one.centre, time, near)
 
     def _joints(self, otg: OnlineTrajectory, centre: Quat, time: float, near: Array) -> Array:
         """Joint positions at a time of a trajectory, next to others.
