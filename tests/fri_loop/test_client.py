@@ -25,7 +25,7 @@ from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop.client import Client
 from heptarm.fri.loop.native import library
 from heptarm.fri.loop.process import importable
-from heptarm.fri.loop.settings import LoopKeywords, LoopSettings
+from heptarm.fri.loop.settings import ClientKeywords, LoopSettings
 from heptarm.fri.loop.shared_memory import PID
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol import messages as m
@@ -450,7 +450,7 @@ def test_without_the_extension_it_says_so_in_one_sentence(monkeypatch: pytest.Mo
 
 def test_a_new_setting_is_written_once() -> None:
     """Settings and their keywords for type checkers are the same."""
-    assert set(LoopKeywords.__annotations__) == {one.name for one in fields(LoopSettings)}
+    assert set(ClientKeywords.__annotations__) == {one.name for one in fields(LoopSettings)}
     with pytest.raises(TypeError, match="busy_pol"):
         LoopSettings(busy_pol=1e-4)  # type: ignore[call-arg]
 

@@ -138,7 +138,7 @@ class Hostile:
 
 @pytest.mark.parametrize("wire", Version)
 def test_no_datagram_ends_the_client_nor_passes_a_limit(wire: Version) -> None:
-    """Whatever comes, every answer is finite and within the limits of all axes, and good messages are answered again."""
+    """Whatever comes, every answer is finite and within all limits, and good messages are answered again."""
     chance = random.Random(wire.value)
     bench, hostile = Bench(wire=wire), Hostile(wire, chance)
     modes = sorted({mode for _, mode in hostile.plain})

@@ -282,8 +282,8 @@ class Session:
         period, multiplier = link.period_ms or 0, max(1, link.multiplier or 1)
         if (period * 1_000_000, multiplier) != (self.period, self.multiplier):
             raise ImplausibleMessage(
-                f"FRI message: the session has {self.period // 1_000_000} ms and {self.multiplier} messages per answer, "
-                f"got {period} ms and {multiplier}: the datagram is damaged"
+                f"FRI message: the session has {self.period // 1_000_000} ms and {self.multiplier} messages per "
+                f"answer, got {period} ms and {multiplier}: the datagram is damaged"
             )
 
     def _check_reach(self, sample: Sample, now: int) -> None:

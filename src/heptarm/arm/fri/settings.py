@@ -127,8 +127,7 @@ def request(
     if port is not None:
         integer(port, "port", 0, 65535)
     instance(host, str, "host")
-    loop["model"] = connection.robot
-    settings = LoopSettings(**loop)
+    settings = LoopSettings(model=connection.robot, **loop)
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,

@@ -19,7 +19,7 @@ from heptarm.fri.loop.compiled import CompiledLaw
 from heptarm.fri.loop.law_interface import LiveMemory
 from heptarm.fri.loop.law_limit import LawWatch
 from heptarm.fri.loop.native import library
-from heptarm.fri.loop.settings import LoopKeywords, LoopSettings
+from heptarm.fri.loop.settings import ClientKeywords, LoopSettings
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.io.shared import MemoryBlock
@@ -82,7 +82,7 @@ class Client(Sealed, Reader):
         remote: str | None = None,
         timeout: float = 30.0,
         settings: LoopSettings | None = None,
-        **keywords: Unpack[LoopKeywords],
+        **keywords: Unpack[ClientKeywords],
     ) -> None:
         refuse_windows("FRI")
         library()

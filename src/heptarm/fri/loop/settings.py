@@ -30,10 +30,9 @@ BUSY_POLL = 0.25e-3
 
 
 class LoopKeywords(TypedDict, total=False):
-    """The fields of `LoopSettings` as keywords, for type checkers."""
+    """The fields of `LoopSettings` as keywords, for type checkers; of an arm the robot is known."""
 
     version: str | None
-    model: str | RobotModel
     load: Body | None
     limits: Limits | None
     pose_limits: PoseLimits | None
@@ -46,6 +45,12 @@ class LoopKeywords(TypedDict, total=False):
     realtime: bool
     cpu: int | None
     busy_poll: float
+
+
+class ClientKeywords(LoopKeywords, total=False):
+    """All fields of `LoopSettings` as keywords."""
+
+    model: str | RobotModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
