@@ -17,7 +17,7 @@ import os
 import sys
 
 from bench.contact import force  # noqa: F401  every import registers its benchmarks
-from bench.fri import codec, faults, guard, hold, loop  # noqa: F401
+from bench.fri import faults, guard, hold, loop  # noqa: F401
 from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark
 from bench.measure.store import Store

@@ -11,7 +11,7 @@
 
 enum { BODIES = 8 };
 
-/* Constants of a robot and of the load on its flange, in the order of `heptarm.model.dynamics.link_constants`. */
+/* Constants of a robot and of the load on its flange, in the order of `heptarm.model.dynamics.rigid_bodies`. */
 struct robot {
     double origin[N][3], mass[N], com[N][3], inertia[N][6], flange[3];
     double load_mass, load_com[3], load_inertia[6];

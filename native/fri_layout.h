@@ -4,19 +4,19 @@
 
 #include <stdint.h>
 
+#include "heptarm_law.h"
+
 typedef int64_t word;
 
 /* what a turn returns instead of a size */
 enum {
-    HANDBACK = -1,
     LAW = -2,
 };
 
 /* what a run returns */
 enum {
-    TIMEOUT = 0,
-    HANDED_BACK = 1,
-    CHECK = 2,
+    TIMEOUT = 1,
+    ENDED = 2,
     SOCKET_ERROR = 3,
     CALL_LAW = 4,
     LAW_FAILED = 5,
@@ -41,6 +41,14 @@ enum {
     COMMANDING_ACTIVE = 4,
 };
 
+/* qualities of a connection */
+enum {
+    POOR = 0,
+    FAIR = 1,
+    GOOD = 2,
+    EXCELLENT = 3,
+};
+
 /* command modes */
 enum {
     NO_COMMAND = 0,
@@ -50,14 +58,7 @@ enum {
     CARTESIAN_POSE = 4,
 };
 
-/* fallbacks for missing commands */
-enum {
-    HOLD = 0,
-    EXTRAPOLATE = 1,
-    RAMP_DOWN = 2,
-};
-
-/* what the guard limits */
+/* what the joint guard limits */
 enum {
     LIMITED_NOT_FINITE = 0,
     LIMITED_POSITION = 1,
@@ -66,6 +67,67 @@ enum {
     LIMITED_JERK = 4,
     LIMITED_TORQUE = 5,
     LIMITED_WRENCH = 6,
+};
+
+/* what the pose guard limits */
+enum {
+    POSE_NOT_FINITE = 0,
+    POSE_REACH = 1,
+    POSE_VELOCITY = 2,
+    POSE_ACCELERATION = 3,
+};
+
+/* types of signals */
+enum {
+    BOOLEAN = 0,
+    DIGITAL = 1,
+    ANALOG = 2,
+};
+
+/* directions of signals */
+enum {
+    INPUT = 0,
+    OUTPUT = 1,
+};
+
+/* fallbacks for missing commands */
+enum {
+    HOLD = 0,
+    EXTRAPOLATE = 1,
+    RAMP_DOWN = 2,
+};
+
+/* versions */
+enum {
+    V1_11 = 0,
+    V1_15 = 1,
+    V2_5 = 2,
+    V2_7 = 3,
+};
+
+/* kinds of events */
+enum {
+    KIND_STATE = 0,
+    KIND_QUALITY = 1,
+    KIND_VERSION = 2,
+    KIND_WRONG_VERSION = 3,
+    KIND_MALFORMED = 4,
+    KIND_LOST = 5,
+    KIND_DUPLICATED = 6,
+    KIND_REORDERED = 7,
+    KIND_RESTARTED = 8,
+    KIND_COMMAND_MODE = 9,
+    KIND_SAFETY = 10,
+    KIND_NO_IPO = 11,
+    KIND_CLIENT = 12,
+};
+
+/* a safety state, a control mode, a redundancy strategy, no value */
+enum {
+    NORMAL_OPERATION = 0,
+    POSITION_CONTROL = 0,
+    E1 = 0,
+    ABSENT = -1,
 };
 
 /* flags of a turn */
@@ -82,6 +144,7 @@ enum {
     H_STATES = 0,
     H_COMMANDS = 1,
     H_PARAMS = 2,
+    H_EVENTS = 3,
     H_STOP = 4,
     H_BEAT = 7,
     H_MEMORY = 13,
@@ -91,6 +154,16 @@ enum {
     H_LIMITED_COUNTS = 32,
     H_LIMITED_WORST = 81,
     H_LIMITED_ALLOWED = 130,
+    H_EPOCH = 181,
+    H_STALE = 182,
+    H_LATENCY = 192,
+    H_JITTER = 16577,
+    H_POSE_COUNTS = 32962,
+    H_POSE_WORST = 32974,
+    H_POSE_ALLOWED = 32986,
+    H_COLLIDED = 32998,
+    H_COLLISION_TORQUE = 32999,
+    H_COLLISION_ALLOWED = 33000,
 };
 
 /* counters from H_COUNTS on */
@@ -156,7 +229,8 @@ enum {
     STATE_WORDS = 123,
 };
 
-#define MONITORED {[1] = S_Q, [2] = S_TAU, [3] = S_Q_CMD, [4] = S_TAU_CMD, [5] = S_TAU_EXT} /* by number of the field in a message */
+/* joint arrays of a message: number of the field, place in a state, what it is */
+#define MONITORED {{1, S_Q, "measured position"}, {2, S_TAU, "measured torque"}, {3, S_Q_CMD, "commanded position"}, {4, S_TAU_CMD, "commanded torque"}, {5, S_TAU_EXT, "external torque"}}
 
 /* words of a command */
 enum {
@@ -167,7 +241,8 @@ enum {
     C_WRENCH = 17,
     C_POSE = 23,
     C_E1 = 30,
-    COMMAND_WORDS = 31,
+    C_EPOCH = 31,
+    COMMAND_WORDS = 32,
     COMMAND_SLOTS = 8,
 };
 
@@ -186,10 +261,16 @@ enum {
     MAX_NAME = 63,
     MAX_IO = 10,
     MAX_TRANSFORMATIONS = 5,
-    BUFFER = 2048,
-    HEAD = 80,
     PARAM_SLOTS = 8,
     MEMORY_SLOTS = 8,
+    EVENT_WORDS = 48,
+    EVENT_SLOTS = 128,
+    EVENT_TEXT = 360,
+    NOTE_WORDS = 1024,
+    NAME_BYTES = 256,
+    NAME_WORDS = 33,
+    MAX_DATAGRAM = 1500,
+    BINS = 16384,
 };
 
 #define MONITORING_ID 2380098LL
@@ -200,68 +281,62 @@ enum {
 #define MIN_GAP 25000000LL
 #define GRACE 50000000LL
 #define REPEATS 50LL
-#define LONGEST 1000000000000000LL
+#define REPEATS_ANALOG 10LL
+#define OVERRUN 0.05
+#define LAW_FRACTION 0.5
 #define LAW_PATIENCE 10LL
 #define LAW_CUT 20000000LL
-#define WARM_UP 50000LL
-#define NEARBY 0.002
+#define COLLIDED "collision, the arm brakes: "
+#define SMALLEST_NORM 0.001
+#define LARGEST_COORDINATE 1000.0
+#define LONGEST 1000000000000000LL
 
-struct loop {
-    word *header, *latency, *jitter, *states, *commands, *outputs;
-    word history, bins, sock, address, port;
-    word busy_poll;
-    word hot, framed, echoes, state, quality, mode, sequence, received, period;
-    word multiplier, waiting, sent, reflected;
-    word overlay, safety, operation, control, drive, receive_multiplier;
-    word robot_size, connection_size;
-    char robot[64], connection[64];
-    word io_count, pending_count;
-    word io_size[10], io_is_analog[10], put_size[10], pending_signal[10], pending_left[10], pending_value[10];
-    uint8_t io_head[800], put_head[800];
-    word request_count, frames_size;
-    word request_size[5];
-    uint8_t request_name[400];
-    uint8_t frames[2048];
-    word is_started, is_ending, has_law, ticks, commands_seen, outputs_seen, started;
-    word ipo_known, ipo_sequence;
-    double ipo[7], slope[7];
-    double q[7], v[7], a[7], r[7], tau[7];
-    double wrench[6];
-    double low[7], high[7], top_v[7], top_a[7], top_j[7], near[7], dq_max[7], ddq_max[7], dddq_max[7], tau_max[7], tau_step[7];
-    double wrench_max[6], wrench_step[6];
-    double reach, step;
-    word *torque_guard;
-    double tau_sent[7];
-    word has_chain, has_map;
-    double chain[24];
-    double posture[7];
-    double map[49];
+struct joint_limits {
+    double q_min[7];
+    double q_max[7];
+    double dq_max[7];
+    double ddq_max[7];
+    double dddq_max[7];
+    double tau_max[7];
+    double dtau_max[7];
+    double wrench_max[6];
+    double dwrench_max[6];
+    double reach;
+};
+
+struct pose_limits {
+    double velocity;
+    double acceleration;
+    double angular_velocity;
+    double angular_acceleration;
+    double elbow_velocity;
+    double elbow_acceleration;
+    double reach;
+};
+
+struct fri_seam {
+    word *header, *states, *commands, *events, *trouble, *offered, *outputs, *reply;
+    word history;
+    word version, sock, remote, parent, busy_poll;
+    struct joint_limits joint_limits;
+    struct pose_limits pose_limits;
+    double lowest[7], highest[7], fastest[7];
+    word missing;
+    double patience, over;
     word has_watch;
     double watch_threshold[7], watch_baseline[7], watch_margin[7];
-    double plausible_low[7], plausible_high[7];
-    word f_at, f_has_q, f_has_slope, f_has_tau, f_has_wrench, f_missing;
-    double f_q[7], f_slope[7], f_tau[7];
-    double f_wrench[6];
-    double patience, over;
-    double out_q[7], out_tau[7];
-    double out_wrench[6];
-    double out_pose[7];
-    double out_e1;
+    word has_chain;
+    double chain[24];
+    struct heptarm_command out;
+    double dq[7];
+    word received, has_law, written;
+    word written_signal[10], written_value[10];
+    word *torque_guard;
     word *law, *params, *params_target, *params_rates, *memory, *memory_written, *law_buffer;
     word *params_ring, *memory_ring, *memory_set_ring;
     word params_size, memory_size, params_seen, memory_seen;
     word law_success, law_status, law_code, law_reported, law_late, law_not_finite;
-    double law_fraction;
-    word q_known;
-    double q_before[7], dq[7];
-    word t_flags, t_received, t_answer, t_size, t_stamp, t_known, t_strategy;
-    double t_tracking;
-    double t_arrays[42];
-    double t_wrench[6];
-    double t_pose[7];
-    double t_e1;
-    word t_io[10];
-    uint8_t t_datagram[2048], t_reply[2048];
+    word error;
 };
 
 #endif

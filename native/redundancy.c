@@ -16,10 +16,11 @@
 static const double TOLERANCE = 5e-10;
 /* Squares of distances this far outside the reach are rounding errors [m2]. */
 static const double ON_REACH = 1e-9;
-/* Joints this far beyond a limit are on it; if nothing else reaches the pose, also at this distance: the noise of a measured pose. */
+/* Joints this far beyond a limit are on it; where the postures inside are far away, also at this distance: the noise of a measured
+   pose. */
 static const double ON_LIMIT = 1e-9, NEAR_LIMIT = 2e-5;
-/* Joints this far from 0, and the wrist this far from the plane of A1 [m], have both signs for Status: next to a posture, where a
-   measured pose has noise, and alone. */
+/* Joints this far from 0, and the wrist this far from the plane of A1 [m], have both signs for Status, and A3 so far from E1 is E1 if
+   that spares a long way: next to a posture, where a measured pose has noise, and alone. */
 static const double BOTH_SIGNS = 1e-4, NO_SIGN = 1e-9;
 /* Where a posture is looked for when none is known: elbow down in front, wrist bent. */
 static const double USUAL[N] = {0.0, 0.3, 0.0, -M_PI / 2, 0.0, M_PI / 3, 0.0};
@@ -311,7 +312,7 @@ struct search {
 static void offer(struct search *s, const double *q) {
     const struct request *request = s->request;
     int in_status = is_in(s->arm, q, s->status, s->border), keeps_a3 = fabs(q[2] - s->a3) <= SAME;
-    if ((request->status >= 0 && !in_status) || (request->is_fixed && !keeps_a3)) return;
+    if ((request->status >= 0 && !in_status) || (request->is_fixed && fabs(q[2] - s->a3) > s->border)) return;
     double away = distance(q, s->near), outside = request->is_unlimited ? 0.0 : excess(s->arm, q);
     if (outside > ON_LIMIT) {
         if (outside <= NEAR_LIMIT && away < s->beyond_distance) {
@@ -521,14 +522,14 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
     int is_given = request->is_fixed && request->status >= 0;
     double first[N], loose[N];
     /* the usual case: the posture with A3 and Status is clear, and moves no joint farther than it must */
-    if (with_a3(arm, &target, s.a3, s.status, near, 0, first) > (is_given ? 2.0 * s.border : VAGUE) && (request->is_unlimited || excess(arm, first) <= ON_LIMIT)) {
+    if (with_a3(arm, &target, s.a3, s.status, near, 0, first) > (is_given && !request->near ? NO_SIGN : VAGUE) && (request->is_unlimited || excess(arm, first) <= ON_LIMIT)) {
         double most = largest_move(first, near);
         if (is_given || most <= SAME || (most <= LONG_WAY && distance(first, near) <= PREFERENCE * estimate(arm, &target, near))) return take(&s, first, q);
     }
     memcpy(first, near, sizeof first);
     first[2] = s.a3;
     if (estimate(arm, &target, near) < FAR_AWAY) {
-        if (!request->is_fixed) offer_settled(&s, near, 0);
+        offer_settled(&s, request->is_fixed ? first : near, 0);
         offer_settled(&s, first, 1);
     }
     for (int status = 0; status < ALL; status++) {
@@ -539,11 +540,11 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
         with_a3(arm, &target, s.a3, status, near, 1, loose);
         if (distance(loose, near) >= s.least) continue;
         offer_settled(&s, loose, 1);
-        if (!request->is_fixed) offer_settled(&s, loose, 0);
+        offer_settled(&s, loose, 0);
     }
     if (!request->is_fixed && (!(s.least < INFINITY) || largest_move(s.q[choose(&s)], near) > LONG_WAY)) offer_sweep(&s);
-    if (s.least < INFINITY) return take(&s, s.q[choose(&s)], q);
-    return s.beyond_distance < INFINITY ? take(&s, s.beyond, q) : NO_POSTURE;
+    if (!(fmin(s.least, s.beyond_distance) < INFINITY)) return NO_POSTURE;
+    return take(&s, s.least <= PREFERENCE * s.beyond_distance + SAME ? s.q[choose(&s)] : s.beyond, q);
 }
 
 /* ---------------------------------------------------------------------------------------------------------- for Python */

@@ -39,7 +39,7 @@ def project(data: list[dict[str, Any]]) -> str:
         if one.get("hidden"):
             continue
         title = one.get("title", one["id"].replace(".", " "))
-        parts = {
+        parts: dict[str, str] = {
             "dataType": f"java.lang.{one['type']}",
             "id": one["id"],
             "displayName": title,

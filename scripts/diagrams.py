@@ -44,7 +44,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
     "motion": (
         ("Your program", "Cabinet application (Java 6)", "Doubles (Java 17)", "Simulator (Python)"),
         (
-            Step(0, "Arm.move, Arm.start", f"{PY}/arm/arm.py", "motions, mode, until"),
+            Step(0, "Arm.move, Arm.start", f"{PY}/arm/verbs.py", "ProgramTerms"),
             Step(0, "check and time-limit the program", f"{PY}/arm/motion/program.py", "values"),
             Step(0, "values to messages", f"{PY}/arm/translate/motions.py", "wire.Run"),
             Step(0, "frame, send, await the answer", f"{PY}/arm/link/link.py", "TCP"),
@@ -52,8 +52,8 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
             Step(1, "check and accept", f"{CORE}/session/CommandHandler.java", "Program"),
             Step(1, "run items in order", f"{CORE}/motion/MotionExecutor.java", "Item"),
             Step(1, "build Sunrise motions", f"{APP}/MotionBuilder.java", "moveAsync"),
-            Step(2, "motion to order", f"{DOUBLES}/motion/MotionTranslator.java", "MotionOrder"),
-            Step(3, "Java to Python", f"{PY}/sim/runtime/java_plant.py", "Order"),
+            Step(2, "describe the motion", f"{DOUBLES}/motion/MotionTranslator.java", "MotionOrder"),
+            Step(3, "Java to Python", f"{PY}/sim/runtime/java_plant.py", "MotionCommand"),
             Step(3, "plan behind the motion before", f"{PY}/planning/planner.py", "Plan"),
             Step(3, "set-point each millisecond", f"{PY}/sim/controller/interpolator.py", "set-points"),
             Step(3, "torque", f"{PY}/sim/control/controller.py", "torque"),
@@ -73,7 +73,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
             Step(3, "read, keep the body", f"{PY}/arm/link/link.py", "bytes"),
             Step(3, "newest sample, queues", f"{PY}/arm/link/state_stream.py", "StateSample"),
             Step(3, "decode when it is used", f"{PY}/arm/translate/state.py", "State"),
-            Step(3, "arm.state, arm.states()", f"{PY}/arm/arm.py"),
+            Step(3, "arm.state, arm.states()", f"{PY}/arm/verbs.py"),
         ),
     ),
     "servo": (

@@ -216,6 +216,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "lin_rel": ("~/move_pose", "~/run_program"),
         "live": (WORDS + "rviz shows the arm; `heptarm live` runs beside the node",),
         "load": (WORDS + "it reads a file",),
+        "param": (WORDS + "a law is Python code",),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),
         "ptp_transport": ("~/move_joints", "~/run_program"),

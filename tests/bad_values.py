@@ -142,13 +142,24 @@ RECORDING = heptarm.Recording(
     Path("run.mcap"), {"robot": "iiwa14"}, {"t": np.arange(3.0), "q": np.zeros((3, 7))}, (), (), True
 )
 #: Functions that only heptarm itself calls.
-INTERNAL = ("LiveMemory", "Memory", "Output.on", "Params", "Params.replace", "RedundancyBatch", "Stats.of")
+INTERNAL = ("LiveMemory", "Memory", "Output.on", "Params", "RedundancyBatch", "Stats.of")
 _OPEN = "NaN keeps the default"
 _FREE = "infinite: no limit"
 #: Values with a documented meaning that their type does not show: function or parameter, the bad value, the meaning.
 ACCEPTED: dict[tuple[str, str], str] = {
     **{("Dynamics", bad): _OPEN for bad in ("nan", "nan array")},
     ("PoseLimits", "inf"): _FREE,
+    **{
+        (f"{one}.{parameter}", bad): meaning
+        for one in ("param", "Param")
+        for parameter, bads, meaning in (
+            ("value", ("empty list", "matrix", "too long"), "a parameter has any shape"),
+            ("low", ("-inf",), _FREE),
+            ("high", ("inf",), _FREE),
+            ("rate", ("inf", "inf array"), "at once"),
+        )
+        for bad in bads
+    },
     ("Redundancy.e1", "nan"): _OPEN,
     ("ptp.target", "nan array"): "NaN keeps this joint",
     ("hand_guide.q_min", "nan array"): _OPEN,
@@ -244,7 +255,7 @@ def bad_values(annotation: str, parameter: str) -> Iterator[tuple[str, object]]:
     yield "masked array", np.ma.masked_array(np.full(size, 0.1), mask=[True] + [False] * (size - 1))
     if any(
         "ArrayLike" in part
-        or part in ("Array", "Floats", "Directional", "Given")
+        or part in ("Array", "Floats", "Directional", "Given", "Initial")
         or part.startswith("tuple[float")
         for part in parts
     ):
@@ -264,7 +275,7 @@ def bad_values(annotation: str, parameter: str) -> Iterator[tuple[str, object]]:
 
 def is_array(part: str) -> bool:
     """Whether an annotation is that of an array of numbers."""
-    return part in ("npt.ArrayLike", "Array", "Floats", "Directional", "Given") or part.startswith(
+    return part in ("npt.ArrayLike", "Array", "Floats", "Directional", "Given", "Initial") or part.startswith(
         ("tuple[float", "Sequence[float")
     )
 
@@ -298,7 +309,7 @@ def has_meaning(annotation: str, bad: str) -> bool:
             or (part == "int" and bad == "negative")
             or (head in ("Sequence", "Mapping", "Iterable", "tuple") and bad == "empty list")
             or (head == "Iterable" and bad == "generator")
-            or (head in ("npt.ArrayLike", "Directional", "Given") and bad in _REAL)
+            or (head in ("npt.ArrayLike", "Directional", "Given", "Initial") and bad in _REAL)
         ):
             return True
     return False

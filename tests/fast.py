@@ -38,7 +38,10 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
                 pytest.skip(f"starts {one}", allow_module_level=True)
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     """Watch imports and processes from now on."""
+    # who is skipped in the middle of starting something leaves its folder to the garbage collector
+    unclosed = "ignore:Exception ignored in. <finalize object:pytest.PytestUnraisableExceptionWarning"
+    config.addinivalue_line("filterwarnings", unclosed)
     sys.meta_path.insert(0, _Finder())
     sys.addaudithook(_audit)

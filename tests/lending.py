@@ -54,8 +54,8 @@ def borrow(address: str) -> None:
 class Borrowed(PrivateCabinet):
     """A cabinet of another process: what its operator does goes through there."""
 
-    def __init__(self, line: socket.socket, lines: Any, port: int, pid: int) -> None:
-        self.scene, self.positions, self.port, self.pid = "", None, port, pid
+    def __init__(self, line: socket.socket, lines: Any, attributes: dict[str, Any]) -> None:
+        vars(self).update(attributes)  # what a PrivateCabinet shows: port, pid, model and others
         self._line, self._lines, self._asking = line, lines, threading.Lock()
 
     @classmethod
@@ -64,7 +64,7 @@ class Borrowed(PrivateCabinet):
         lines = line.makefile("rw", encoding="utf-8")
         given = _ask(lines, {"model": model, "speed": speed})
         if given:
-            return cls(line, lines, given["port"], given["pid"])
+            return cls(line, lines, given)
         lines.close()
         line.close()
         return None
@@ -152,7 +152,7 @@ class Lender:
                 if lent is None:
                     answer(None)
                     return
-                answer({"port": lent.cabinet.port, "pid": lent.cabinet.pid})
+                answer({name: value for name, value in vars(lent.cabinet).items() if name[0] != "_"})
                 try:
                     for question in lines:
                         answer(lent.cabinet.operate(json.loads(question)["operate"]))

@@ -8,9 +8,11 @@ import numpy as np
 
 from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order
+from heptarm.planning.seam import Batch, Spl, Spline
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose
+from tests.sim import motions
 
 READY = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)
 SPEED, ZONE = 0.25, 0.02
@@ -28,30 +30,27 @@ def _at(start: Pose, x: float, y: float, z: float) -> tuple[float, ...]:
     return tuple([*(start.xyz + [x, y, z]).tolist(), *start.quat.tolist()])
 
 
-def _orders(start: Pose) -> dict[str, Order]:
+def _orders(start: Pose) -> dict[str, MotionCommand]:
     """One order of every kind of path."""
-    corners = ((0, 0.15, 0), (0.1, 0.15, 0), (0.1, 0, 0), (0, 0, 0))
     knots = ((0.05, 0.05, 0.0), (0.0, 0.12, 0.03), (0.06, 0.2, 0.0), (0.0, 0.25, -0.03))
     joints = ((0.4, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2), (0.8, 0.5, 0.0, -1.2, 0.2, 0.9, 0.4), READY)
-
-    def sides(*, zone: float) -> tuple[Order, ...]:
-        return tuple(
-            Order(1, "lin", pose=_at(start, *c), cart_velocity=SPEED, blending=(0.0, zone, 0.0))
-            for c in corners
-        )
-
-    curved = tuple(Order(1, "spl", pose=_at(start, *knot), cart_velocity=SPEED) for knot in knots)
-    points = tuple(Order(1, "ptp", joints=q) for q in joints)
-    return {
-        "ptp": points[0],
-        "lin": Order(1, "lin", pose=_at(start, 0.05, 0.25, 0.05), cart_velocity=SPEED),
-        "circ": Order(
-            1, "circ", via=_at(start, 0.06, 0.06, 0), pose=_at(start, 0, 0.12, 0), cart_velocity=SPEED
-        ),
-        "batch": Order(1, "batch", parts=sides(zone=ZONE)),
-        "spline": Order(1, "spline", parts=curved),
-        "spline_joints": Order(1, "spline_joints", parts=points),
+    made = {
+        "ptp": motions.ptp(joints[0]),
+        "lin": motions.lin(_at(start, 0.05, 0.25, 0.05), velocity=SPEED),
+        "circ": motions.circ(_at(start, 0.06, 0.06, 0), _at(start, 0, 0.12, 0), velocity=SPEED),
+        "batch": _square(start, ZONE),
+        "spline": motions.spline(*(motions.spl(_at(start, *knot), velocity=SPEED) for knot in knots)),
+        "spline_joints": motions.spline_joints(*map(motions.ptp, joints)),
     }
+    return {kind: MotionCommand(1, motion) for kind, motion in made.items()}
+
+
+def _square(start: Pose, zone: float) -> Batch:
+    """A square whose corners are blended within a distance [m]."""
+    corners = ((0, 0.15, 0), (0.1, 0.15, 0), (0.1, 0, 0), (0, 0, 0))
+    return motions.batch(
+        *(motions.lin(_at(start, *c), velocity=SPEED, blending=(0.0, zone, 0.0)) for c in corners)
+    )
 
 
 def _track(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
@@ -74,11 +73,7 @@ def blending() -> Iterator[Figure]:
     """Slowest speed between the first and the last straight of a square with blended corners."""
     for zone in (ZONE, 2 * ZONE):
         plant, start = _ready()
-        order = _orders(start)["batch"]
-        parts = tuple(
-            Order(1, "lin", pose=p.pose, cart_velocity=SPEED, blending=(0.0, zone, 0.0)) for p in order.parts
-        )
-        plant.submit(Order(1, "batch", parts=parts))
+        plant.submit(MotionCommand(1, _square(start, zone)))
         measured, _ = _track(plant)
         speed = np.linalg.norm(np.diff(_places(plant, measured), axis=0), axis=1) * 1e3
         fast = np.flatnonzero(speed > 0.9 * SPEED)
@@ -97,7 +92,9 @@ def spline_points() -> Iterator[Figure]:
     plant.submit(order)
     measured, _ = _track(plant)
     places = _places(plant, measured)
-    off = max(float(np.linalg.norm(places - np.array(part.pose[:3]), axis=1).min()) for part in order.parts)  # type: ignore[index]
+    assert isinstance(order.motion, Spline)
+    knots = [np.array(part.target.xyz) for part in order.motion.segments if isinstance(part, Spl)]
+    off = max(float(np.linalg.norm(places - knot, axis=1).min()) for knot in knots)
     speed = np.linalg.norm(np.diff(places, axis=0), axis=1) * 1e3
     inside = speed[len(speed) // 10 : -len(speed) // 3]
     yield Figure("spline_distance", off * 1e3, "mm", limit=0.5)

@@ -8,13 +8,13 @@ import numpy as np
 
 from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import TICK, Order
-from heptarm.planning.seam import StraightLimits
-from heptarm.planning.targets import CARTESIAN_DEFAULT
+from heptarm.planning.motion import CARTESIAN_DEFAULT, TICK, ServoMotion
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.pose import Pose
+from tests.sim import motions
 from tests.sim.driving import READY
 from tests.sim.ideal import KINDS, braking, stopping_time
 
@@ -25,7 +25,7 @@ SETTLING = 0.1
 REACH = 0.4
 #: Kinds of motion that follow a target or a hand; limits on lines, distance [m], force of the hand [N].
 GUIDED = ("straight", "guiding")
-QUICK = StraightLimits(velocity=(0.5,) * 3 + (1.0,) * 3, acceleration=(2.0,) * 3 + (4.0,) * 3)
+QUICK = motions.straight(velocity=(0.5,) * 3 + (1.0,) * 3, acceleration=(2.0,) * 3 + (4.0,) * 3)
 DISTANCE = 0.06
 PUSH = 60.0
 #: An axis below this speed is at rest [rad/s].
@@ -56,7 +56,7 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
     plant, order = Plant("iiwa14", q=READY), KINDS[kind]
     plant.submit(order)
     plant.tick()
-    if order.is_servo:
+    if isinstance(order.motion, ServoMotion):
         plant.shared.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
     plant.step(int(random.integers(1, 700)))
     allowed = stopping_time(plant, how) + SETTLING
@@ -67,7 +67,7 @@ def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[floa
     """The same while the arm follows a Cartesian target, or a person who keeps pushing."""
     plant = Plant("iiwa14", q=READY)
     if kind == "guiding":
-        plant.submit(Order(1, "guide", guide=hand_guide()))
+        plant.submit(MotionCommand(1, motions.guide(hand_guide())))
         plant.safety.guide()
         plant.step(50)
         plant.apply_wrench(tuple(random.uniform(-PUSH, PUSH, 3)))
@@ -76,7 +76,7 @@ def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[floa
         fastest = float(np.abs(plant.snapshot.dq).max())
         allowed = braking(fastest, 0.0, float(robot.ddq_max.min()), float(robot.dddq_max.min())) + SETTLING
         return _rest(plant, how), allowed
-    plant.submit(Order(1, "straight", straight_limits=QUICK))
+    plant.submit(MotionCommand(1, QUICK))
     plant.tick()
     here = _tip(plant)
     plant.shared.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)

@@ -12,10 +12,11 @@ from collections.abc import Callable
 
 import mujoco
 
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
+from tests.sim import motions
 
 HERE, THERE = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0), (0.6, 0.7, 0.2, -1.0, 0.3, 0.7, 0.4)
 
@@ -31,7 +32,7 @@ class Moving:
         """Order the next motion; a plan costs more than a tick and is not part of it."""
         if self._plant.idle:
             self._number += 1
-            self._plant.submit(Order(self._number, "ptp", joints=THERE if self._number % 2 else HERE))
+            self._plant.submit(MotionCommand(self._number, motions.ptp(THERE if self._number % 2 else HERE)))
 
     def step(self) -> None:
         """One tick."""

@@ -14,9 +14,11 @@ from bench.measure.blocks import BLOCKS
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
-from heptarm.planning.command import TICK, Order
+from heptarm.planning.motion import TICK
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.realtime_loop import AT_ONCE
+from tests.sim import motions
 
 #: Joint positions between which the arm moves [rad]; a motion takes 1.5 s.
 HERE, THERE = ha.deg(-50, 30, -20, -75, 10, 52, -60), ha.deg(50, 45, 20, -40, -30, 20, 60)
@@ -67,7 +69,7 @@ def _plant(plant: Plant) -> float:
     """Simulated time per time of the plant's ticks, so many at once as in a cabinet."""
     ticks, begin = 0, time.perf_counter()
     for number in range(ALONE):
-        plant.submit(Order(number + 1, "ptp", joints=HERE if number % 2 else THERE))
+        plant.submit(MotionCommand(number + 1, motions.ptp(HERE if number % 2 else THERE)))
         while not plant.idle:
             ticks += plant.tick(AT_ONCE)
     return ticks * TICK / (time.perf_counter() - begin)

@@ -61,6 +61,7 @@ class Peer:
         self.motion = 0
         self.pushed = 0
         self.progress = 0.5
+        self.safety = wire.SafetyBits.READY_TO_MOVE
         self.override = 1.0
         self.clock_rate = 1.0  # of the clock that answers pings, in seconds per second of ours
         self.q = (0.1,) * 7
@@ -185,9 +186,7 @@ class Peer:
                 remaining=1.0,
                 override=self.override,
             ),
-            safety=wire.SafetyState(
-                stamp=now, bits=wire.SafetyBits.READY_TO_MOVE, mode=wire.OperationMode.AUT
-            ),
+            safety=wire.SafetyState(stamp=now, bits=self.safety, mode=wire.OperationMode.AUT),
         )
 
     def _answer(self, client: Served, event: Received) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.arm.translate.errors import error_of
-from heptarm.arm.translate.motions import items
+from heptarm.arm.translate.motions import item
 from heptarm.errors import (
     CommandRejected,
     ConnectFailed,
@@ -30,7 +30,7 @@ IIWA14 = robot("iiwa14")
 
 def refused(motion: object) -> str:
     with pytest.raises(LimitError) as error:
-        items((motion,), IIWA14, 1.0)  # type: ignore[arg-type]
+        item(motion, IIWA14)  # type: ignore[arg-type]
     return str(error.value)
 
 

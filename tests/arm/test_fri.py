@@ -376,6 +376,18 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
 
 
 @patient
+def test_a_block_that_ends_in_a_safety_stop_raises_it() -> None:
+    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
+        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
+        with (
+            pytest.raises((ha.SafetyStop, ha.MotionAborted), match="emergency stop|safety stop|safeguard"),
+            arm.fri("position", period_ms=LONG) as rt,
+        ):
+            assert rt.next() is not None
+            arm.operator.fault("emergency_stop")  # and the block ends before the cabinet has reported that
+
+
+@patient
 def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works() -> None:
     with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)

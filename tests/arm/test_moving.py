@@ -218,6 +218,18 @@ def test_cancelling_is_a_result(peer: Peer) -> None:
         peer.motion = 0
 
 
+def test_cancelling_what_has_just_ended_is_no_error(peer: Peer) -> None:
+    ended = wire.Rejected(
+        code=int(Code.UNKNOWN_MOTION), parameter="id", value="3", allowed="", text="it has ended"
+    )
+    peer.runs(3, wire.MotionStarted(id=3, item=0))
+    peer.expect(wire.Cancel, ended, later(0.05, peer.finished(3)))  # its end is still under way
+    with peer.arm() as arm:
+        handle = arm.start(HOME)
+        handle.cancel()
+        assert handle.wait(timeout=20.0).arrived
+
+
 def test_a_move_that_takes_too_long_is_cancelled(peer: Peer) -> None:
     peer.runs(3)
     peer.expect(wire.Cancel, wire.Accepted(id=0), peer.finished(3, wire.Cause.CANCELLED))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from math import isnan
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import heptarm as ha
-from heptarm.arm.motion.program import is_endless, listed, longest
-from heptarm.arm.translate.motions import items
+from heptarm.arm.motion.program import ProgramTerms, is_endless, listed, longest
+from heptarm.arm.translate.motions import item as item_of
+from heptarm.errors import inside
 from heptarm.model.inverse_kinematics import redundancy
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import Motion, hold
@@ -24,8 +27,8 @@ ROBOT = robot("iiwa14")
 POSE = Pose.xyz_abc(0.5, 0.1, 0.4, *deg(180, 0, 180))
 
 
-def one(motion: Motion, ceiling: float = 1.0) -> wire.Item:
-    (item,) = items([motion], ROBOT, ceiling)
+def one(motion: Motion, speed: float = 1.0) -> wire.Item:
+    item = item_of(motion, ROBOT, speed=speed)
     item._check("")
     return item
 
@@ -126,8 +129,8 @@ motions = st.one_of(
 
 
 @given(st.lists(motions, min_size=1, max_size=4), fraction)
-def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], ceiling: float) -> None:
-    run = wire.Run(items=items(program, ROBOT, ceiling))
+def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], speed: float) -> None:
+    run = wire.Run(items=tuple(item_of(motion, ROBOT, speed=speed) for motion in program))
     run.validate()
     assert len(run.items) == len(wire.Run.decode(run.encode()).items) == len(program)
     for item in run.items:
@@ -135,8 +138,8 @@ def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], c
             item.motion, "dynamics" if isinstance(item.motion, wire.Ptp | wire.PtpPose) else "joints", None
         )
         if limits is not None:
-            assert all(v <= ceiling or (ceiling == 1.0 and isnan(v)) for v in limits.velocity)
-    assert longest(program, ROBOT, ceiling) > 0
+            assert all(v <= speed or (speed == 1.0 and isnan(v)) for v in limits.velocity)
+    assert longest(program, ROBOT, speed) > 0
 
 
 def test_arcs_and_how_the_orientation_is_led() -> None:
@@ -184,16 +187,44 @@ def test_arcs_and_splines_reach_the_wire_whole() -> None:
     assert 15 < longest([ha.spline_joints([np.zeros(7)] * 3)], ROBOT, 1.0) < 200
 
 
+@pytest.mark.parametrize(
+    ("terms", "error", "text"),
+    [
+        ({"speed": 0.0}, ha.LimitError, r"speed must be in \(0, 1\], got 0"),
+        ({"speed": 1.5}, ha.LimitError, r"speed must be in \(0, 1\], got 1.5"),
+        ({"mode": "position"}, ha.ShapeError, "mode must be"),
+        ({"until": 3.0}, ha.ShapeError, "until must be"),
+        ({"then": "jump"}, ha.HeptarmError, "then must be"),
+        ({"when": "now"}, ha.ShapeError, "when must be one of 'queue', 'replace', 'reject', got 'now'"),
+    ],
+)
+def test_terms_are_checked_where_they_are_made(
+    terms: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error, match=text):
+        ProgramTerms(**terms)
+
+
+def test_terms_are_one_value() -> None:
+    terms = ProgramTerms(speed=0.3, when="replace")
+    assert (terms.mode, terms.until, terms.then, terms.breaks) == (None, None, "stay", ())
+    with pytest.raises(FrozenInstanceError):
+        terms.speed = 1.0  # type: ignore[misc]
+
+
 def test_a_refused_element_is_named_in_text_and_parameter() -> None:
     far = Pose.at(9.0, 0.0, 0.5)
     line = ha.spline([ha.spl(POSE)] * 30 + [ha.spl(far)] + [ha.spl(POSE)])
     with pytest.raises(ha.LimitError, match=r"^segments\[30\]: target\.x must") as error:
         one(line)
     assert error.value.parameter == "segments[30].target.x"
-    with pytest.raises(ha.LimitError, match=r"^motions\[1\]\.segments\[30\]: target\.x must") as error:
-        items([hold(1.0), line], ROBOT, 1.0)
+    with (
+        pytest.raises(ha.LimitError, match=r"^motions\[1\]\.segments\[30\]: target\.x must") as error,
+        inside("motions[1]"),
+    ):
+        one(line)
     assert error.value.parameter == "motions[1].segments[30].target.x"
     joints = ha.spline_joints([np.zeros(7)] * 3 + [deg(0, 0, 0, 121, 0, 0, 0)])
-    with pytest.raises(ha.LimitError, match=r"^motions\[1\]\.points\[3\]: .*A4") as error:
-        items([hold(1.0), joints], ROBOT, 1.0)
-    assert error.value.parameter.startswith("motions[1].points[3].q")
+    with pytest.raises(ha.LimitError, match=r"^points\[3\]: .*A4") as error:
+        one(joints)
+    assert error.value.parameter.startswith("points[3].q")

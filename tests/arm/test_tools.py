@@ -301,3 +301,15 @@ def test_what_hangs_there_outlives_its_client(cabinet: RunningCabinet, bare: Arm
         assert state.tool == "gripper"
         assert other.tools["gripper"].frame_names == ("tcp", "pad")
         assert other.pose("pad").distance_to(other.pose("flange") @ GRIPPER.frame("pad")) < 1e-6
+
+
+def test_a_load_above_the_rated_one_is_warned_of(bare: Arm, caplog: pytest.LogCaptureFixture) -> None:
+    with bare.tool(GRIPPER):
+        assert "rated load" not in caplog.text
+        with bare.attached(Workpiece("engine", mass=12.5)):
+            assert (
+                "attached load is 14.5 kg, and the rated load of the LBR iiwa 14 R820 is 14 kg" in caplog.text
+            )
+    caplog.clear()
+    with bare.tool(Tool("drill", mass=15.0)):
+        assert "attached load is 15 kg" in caplog.text

@@ -5,6 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import subprocess
+import sys
+import textwrap
 import threading
 import time
 from pathlib import Path
@@ -111,6 +114,20 @@ def test_motions_can_be_awaited_together(arm: Arm) -> None:
         return list(await asyncio.gather(*(_await(arm.start(m)) for m in (near, ptp(HOME)))))
 
     assert all(result.arrived for result in asyncio.run(program()))
+
+
+def test_a_stop_names_its_author(arm: Arm, cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target, control=False, name="bystander") as other:
+        handle = arm.start(FAR)
+        under_way(arm)
+        other.stop()
+        with pytest.raises(ha.MotionAborted, match=r"was stopped by bystander at 127\.0\.0\.1"):
+            handle.wait(timeout=30.0)
+    handle = arm.start(FAR)
+    under_way(arm)
+    arm.stop()
+    with pytest.raises(ha.MotionAborted, match=r"was stopped by .+ at 127\.0\.0\.1"):
+        handle.wait(timeout=30.0)
 
 
 def test_an_await_that_times_out_brakes_the_arm(arm: Arm) -> None:
@@ -267,6 +284,40 @@ def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> No
         assert state.motion is not None and not state.motion.active
         assert not np.abs(state.dq[np.isfinite(state.dq)]).max() > 0.01
         assert observer.controller == ""
+
+
+MOVES = """
+    import sys, heptarm as ha
+    from heptarm.modes import compliance
+    from heptarm.when import force
+    with ha.connect(sys.argv[1], watchdog=10.0, timeout=30.0) as arm:
+        before = set(sys.modules)
+        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))
+        arm.move([ha.lin_rel(z=-0.01), ha.lin_rel(z=0.01)], mode=compliance("z"), until=force > 50)
+        for kind, target in (("joint", None), ("pose", None), ("twist", (0.0,) * 6), ("velocity", (0.0,) * 7)):
+            with arm.servo(kind, rate=50) as servo:
+                own = servo.start.q if kind == "joint" else servo.start.pose
+                for _ in range(3):
+                    servo.tick()
+                    servo.set(own if target is None else target)
+        handle = arm.start(ha.ptp(ha.deg(9, 30, 0, -90, 0, 60, 0), speed=0.05))
+        arm.wait_until(lambda state: state.motion.active)
+        arm.stop()
+        try:
+            handle.wait()
+        except ha.MotionAborted as error:
+            str(error), error.history, str(arm.state)
+        print("loaded", sorted(set(sys.modules) - before))
+"""
+
+
+def test_nothing_is_loaded_while_the_arm_moves(cabinet: RunningCabinet, tmp_path: Path) -> None:
+    """A module that is loaded late needs an open file, and time, in the middle of a motion."""
+    file = tmp_path / "program.py"
+    file.write_text(textwrap.dedent(MOVES))
+    command = [sys.executable, str(file), cabinet.target]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
+    assert run.stdout.strip() == "loaded []", run.stderr
 
 
 def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:

@@ -49,6 +49,7 @@ class FakeCabinet:
         heartbeat: of the server [s]; a client may be silent for five of them.
         getter: what each reading of the robot costs [s].
         datagrams: open the UDP port.
+        files: most open files; 0: as many as here.
         log: file for its log.
     """
 
@@ -62,13 +63,15 @@ class FakeCabinet:
         heartbeat: float = 2.0,
         getter: float = 0.0,
         datagrams: bool = True,
+        files: int = 0,
     ) -> None:
         self.log = log
         options = ["-Xmx64m", "-Xss512k", "-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1", "-cp", classes()]
         values = [str(rate), key, allow, str(heartbeat), str(getter), "udp" if datagrams else "tcp"]
+        within = ["sh", "-c", f'ulimit -n {files}; exec "$@"', "sh"] if files else []
         with log.open("w") as file:
             self.process = subprocess.Popen(
-                [toolchain.find_jdk().java, *options, "heptarm.fake.FakeCabinet", *values],
+                [*within, toolchain.find_jdk().java, *options, "heptarm.fake.FakeCabinet", *values],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=file,

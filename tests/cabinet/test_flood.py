@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -103,6 +104,22 @@ def test_the_oldest_guest_goes_first(make: Make) -> None:
         controller.read_for(2.5)
         assert isinstance(controller.ask(wire.SetOverride(value=0.5)), wire.Accepted)
     assert cabinet.errors() == []
+
+
+def test_connections_leave_room_for_other_files(make: Make) -> None:
+    cabinet = make(heartbeat=20.0, files=200)
+    with ExitStack() as stack:
+        controller = stack.enter_context(Peer(cabinet.port, name="controller"))
+        controller.take_control()
+        for number in range(300):  # more than the operating system allows
+            stack.enter_context(Peer(cabinet.port, name=f"o{number}"))
+        open_files = len(os.listdir(f"/proc/{cabinet.process.pid}/fd"))
+        assert open_files < 200 - 32
+        motion = controller.ask(run(ptp(0.02)))
+        assert controller.wait_for(wire.MotionFinished, lambda event: event.id == motion.id)
+        stop(cabinet)
+    assert cabinet.errors() == []
+    assert "not accepted" not in cabinet.log.read_text()
 
 
 @pytest.mark.parametrize(("key", "greets"), [("", True), ("k" * 32, False)], ids=["open", "with a key"])

@@ -12,6 +12,7 @@ import pytest
 
 from heptarm.errors import CommandRejected
 from heptarm.sim.runtime.application import background, compile_application, find
+from tests.sim.station_setup import setup
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "cabinet" / "samples"
@@ -82,6 +83,17 @@ def test_a_foreign_application_runs_with_its_own_process_data(lab: Path) -> None
     assert done.returncode == 0, done.stdout + done.stderr
     assert "lab.Nod runs" in done.stdout
     assert "nodded 2 times" in done.stderr
+
+
+@needs_javac
+def test_the_robot_of_its_station_setup_is_simulated_or_contradicted_aloud(lab: Path) -> None:
+    (lab / "StationSetup.cat").write_text(setup())
+    done = sim(lab / "src", "--project", str(lab / "RoboticsAPI.data.xml"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "lab.Nod runs on a virtual iiwa7+touch" in done.stdout
+    other = sim(lab, "--model", "iiwa14")
+    assert "lab.Nod runs on a virtual iiwa14+touch" in other.stdout
+    assert "the project is for an iiwa7" in other.stderr and "simulated is an iiwa14+touch" in other.stderr
 
 
 @needs_javac

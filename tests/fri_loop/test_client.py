@@ -13,16 +13,19 @@ import textwrap
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from heptarm._library import SWITCH
+from heptarm._library import SWITCH, Unavailable
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, NotReady, ShapeError, Timeout
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.native import library
 from heptarm.fri.loop.process import importable
+from heptarm.fri.loop.settings import LoopKeywords, LoopSettings
 from heptarm.fri.loop.shared_memory import PID
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol import messages as m
@@ -437,8 +440,39 @@ def test_what_the_system_refuses_is_said_plainly() -> None:
         assert policy == os.SCHED_FIFO or "no real-time priority" in client.refused[0]
 
 
-def test_without_the_native_part_polling_is_refused_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extension_it_says_so_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SWITCH, "1")
-    with Client(0, realtime=False, busy_poll=1e-4) as client:
-        (line,) = client.refused
-    assert line.startswith("no busy polling: ") and SWITCH in line
+    library.cache_clear()
+    with pytest.raises(Unavailable, match=SWITCH):
+        Client(0, realtime=False)
+    library.cache_clear()
+
+
+def test_a_new_setting_is_written_once() -> None:
+    """Settings and their keywords for type checkers are the same."""
+    assert set(LoopKeywords.__annotations__) == {one.name for one in fields(LoopSettings)}
+    with pytest.raises(TypeError, match="busy_pol"):
+        LoopSettings(busy_pol=1e-4)  # type: ignore[call-arg]
+
+
+def test_a_client_that_streams_on_does_not_command_a_session_that_it_has_not_seen() -> None:
+    with Client(0, realtime=False, policy=Policy(Missing.HOLD)) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            client.wait("COMMANDING_ACTIVE")
+            client.command(q=np.add(IPO, 0.1))
+            _until(client, np.add(IPO, 0.1))
+            controller.state, controller.sequence = SessionState.MONITORING_WAIT, 0
+            controller.ipo = tuple(value - 0.3 for value in IPO)
+            controller.active()
+            controller.settle()
+            deadline = time.monotonic() + 30.0
+            while not client.stats.stale:
+                client.command(q=np.add(IPO, 0.1))
+                assert time.monotonic() < deadline
+            controller.settle()
+            assert controller.answers[-1].q == controller.ipo
+            client.next()
+            client.command(q=np.add(IPO, 0.1))
+            _until(client, np.add(IPO, 0.1))

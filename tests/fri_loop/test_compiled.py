@@ -1,4 +1,4 @@
-"""Laws that the native loop calls: compiled by Numba, or from a shared library; parameters, memory and failures."""
+"""Laws that the loop calls without Python: by Numba, or from a shared library; parameters, memory, failures."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri import Client, include_dir
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.compiled import CompiledLaw, LibraryLaw
+from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.fri.loop.law_interface import Memory, dtype, flat
-from heptarm.fri.loop.native import Native, library
+from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.values.pose import Pose
@@ -26,12 +25,6 @@ from . import laws as python_laws
 from .controller import IPO, Controller
 from .laws import filtered, filtered_slowly, looking, raising
 from .test_cycle import Bench
-from .test_native import Twins
-
-try:
-    library()
-except Unavailable as reason:
-    pytest.skip(f"no native part: {reason}", allow_module_level=True)
 
 SOURCE = Path(__file__).with_name("compiled_laws.c")
 OFFSET = {"offset": [0.02] * 7}
@@ -66,7 +59,7 @@ def form(kind: str, laws: Path) -> object:
 @pytest.mark.parametrize("kind", ["library", "numba", "python"])
 def test_parameters_and_memory_are_live_and_the_law_keeps_what_it_knows(kind: str, laws: Path) -> None:
     with Client(0, law=form(kind, laws), params=OFFSET, memory=FILTER, realtime=False) as client:  # type: ignore[arg-type]
-        assert client.is_native and client.memory.calls == 0.0, "before the first call: as given"
+        assert client.memory.calls == 0.0, "before the first call: as given"
         controller = Controller(client.port)
         with controller.running():
             controller.active()
@@ -93,45 +86,21 @@ def test_parameters_and_memory_are_live_and_the_law_keeps_what_it_knows(kind: st
 def test_the_three_forms_agree(laws: Path) -> None:
     """The same messages: Python, Numba and C answer the same, and see the same velocities and times."""
     sent, seen = [], []
-    for law in (looking.python, looking, ha.law_from(laws, "looking", memory=looking.memory)):
-        bench = _bench(law, {}, looking.memory)
+    for law in (looking.__wrapped__, looking, ha.law_from(laws, "looking", memory=looking.memory)):
+        settings = LoopSettings(law=law, memory=looking.memory, history=256)
+        bench = Bench(settings=settings)
         bench.activate()
         for k in range(200):
-            bench.step(ipo=tuple(value + 1e-5 * k * k for value in IPO))
-        bench.check()
-        sent.append(bench.pure.cycle.guard.q)
-        memory = Memory(np.array(bench.other.layout.memory.newest()[1:]), flat(looking.memory, "memory")[1])  # type: ignore[index]
+            bench.controller.ipo = tuple(value + 1e-5 * k * k for value in IPO)
+            bench.run(1)
+        sent.append(bench.states[-1].q_sent)
+        words = bench.layout.memory.newest()
+        assert words is not None
+        memory = Memory(np.array(words[1:]), settings.law_memory[1])
         seen.append([*memory.dq, memory.t, memory.dt])
         assert memory.dt == 1e-3 and memory.t > 0.1 and np.abs(memory.dq).max() > 1e-4
     assert np.ptp(np.array(seen), axis=0).max() < 1e-12
     assert np.ptp(np.array(sent), axis=0).max() < 1e-12
-
-
-def _bench(law: object, params: dict[str, object], memory: dict[str, object]) -> Twins:
-    """Two loops with a law: one in Python alone, one with the native part; the controller follows the pure one."""
-    twins = Twins()
-    words, schema = flat(memory, "memory")  # type: ignore[arg-type]
-    benches = []
-    for _ in range(2):
-        bench = Bench(law=lambda *_: None, memory=words, **params)
-        bench.cycle.law = None
-        benches.append(bench)
-    twins.pure, twins.other = benches
-    twins.native = Native(twins.other.cycle)
-    for bench in benches:
-        if not isinstance(law, CompiledLaw):
-            bench.cycle.law = law  # type: ignore[assignment]
-            bench.cycle._memory = Memory(bench.cycle.memory_values, schema)
-    if isinstance(law, CompiledLaw):
-        native = Native(twins.pure.cycle)
-        address, kept = law.load({}, schema)
-        for one in (native, twins.native):
-            one.set_law(address, kept, success=law.success, rates=np.inf)
-    else:
-        twins.native = Native(twins.other.cycle)
-        memory_of = twins.native.memory
-        twins.out = Output.on(memory_of.out_q, memory_of.out_tau, memory_of.out_wrench)
-    return twins
 
 
 # ------------------------------------------------------------------------------------------------------ what goes wrong
@@ -219,7 +188,7 @@ def test_the_guard_limits_a_compiled_law(laws: Path) -> None:
 def test_what_numba_cannot_compile_is_named_with_line_and_remedy(name: str, words: str, hint: str) -> None:
     with pytest.raises(CommandRejected, match=words) as error:
         Client(0, law=getattr(python_laws, name), realtime=False)
-    line = getattr(python_laws, name).python.__code__.co_firstlineno
+    line = getattr(python_laws, name).__wrapped__.__code__.co_firstlineno
     assert f"laws.py, line {line + 2}: " in str(error.value) and hint in error.value.hint
     assert error.value.parameter == "law"
 
@@ -305,7 +274,6 @@ def test_the_structures_are_those_of_the_dictionaries() -> None:
 
 
 def test_a_session_in_torque_mode_handles_lost_messages_by_the_same_law(laws: Path) -> None:
-    """Messages that the native part hands back to Python reach the compiled law too."""
     law = ha.law_from(laws, "filtered", params=OFFSET, memory=FILTER)
     with Client(0, law=law, realtime=False) as client:
         controller = Controller(client.port, mode=CommandMode.TORQUE)

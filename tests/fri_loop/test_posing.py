@@ -12,16 +12,17 @@ import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.fri.guard.fallback import Missing, Policy
-from heptarm.fri.guard.pose_guard import PoseLimits, between
+from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.client import Client
-from heptarm.fri.loop.cycle import from_wire
 from heptarm.fri.loop.user_api import Output, Params, State
-from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, SessionState
 from heptarm.fri.protocol.version import Version
 from heptarm.values.pose import Pose
+from tests.oracles.fri import codec
+from tests.oracles.fri.cycle import from_wire
+from tests.oracles.fri.pose_guard import between
 
 from .controller import Controller
 from .laws import fails_later, lift
@@ -42,8 +43,7 @@ def posing(*, wire: Version = Version.V2_5, **settings: object) -> Bench:
 def command(bench: Bench, pose: tuple[float, ...]) -> None:
     words = np.zeros(at.COMMAND_WORDS)
     words[at.C_POSE : at.C_POSE + 7] = pose
-    words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = bench.now, at.GIVEN_POSE
-    bench.layout.commands.write(words[1:])
+    bench.give(words, at.GIVEN_POSE)
 
 
 def sent(bench: Bench, count: int) -> np.ndarray:
@@ -77,8 +77,8 @@ def test_a_commanded_pose_is_reached_without_a_jump_and_reported_in_metres() -> 
     assert name == "ipo" and values == pytest.approx(
         (150.0, 200.0, 300.0, math.cos(0.1), 0.0, 0.0, math.sin(0.1))
     )
-    assert bench.cycle.session.counters.limited > 100
-    assert any("flange: velocity limited" in line for line in bench.cycle.pose_commander.guard.report.lines)
+    assert bench.counters.limited > 100
+    assert any("flange: velocity limited" in line for line in bench.limited)
 
 
 def test_a_law_begins_at_the_interpolators_pose() -> None:
@@ -99,13 +99,13 @@ def test_a_law_may_assign_a_pose_and_numbers_that_are_none_keep_the_last_target(
     bench = posing(law=law)
     bench.run(900)
     assert sent(bench, 1)[0] == pytest.approx((0.1, 0.2, 0.31, 0.0, 0.0, 0.0, 1.0))
-    assert any("target not finite" in line for line in bench.cycle.pose_commander.guard.report.lines)
+    assert any("target not finite" in line for line in bench.limited)
 
 
 def test_a_law_that_fails_brakes_the_flange() -> None:
     bench = posing(law=fails_later)
     bench.run(200)
-    assert bench.cycle.is_ending and bench.cycle.may_end
+    assert bench.cycle.may_end
     assert sent(bench, 1)[0] == pytest.approx(HOME)
 
 
@@ -143,12 +143,12 @@ def test_an_interpolator_in_motion_is_taken_over_and_lost_messages_are_caught_up
     bench.run(3, SessionState.MONITORING_READY)
     bench.run(20, SessionState.COMMANDING_WAIT)
     bench.run(50, SessionState.COMMANDING_ACTIVE)
-    assert bench.cycle.session.counters.limited == 0
+    assert bench.counters.limited == 0
     bench.controller.sequence += 3  # three messages are lost
     bench.now += 3_000_000
     x[0] += 0.3
     bench.run(1)
-    assert bench.cycle.session.counters.limited == 0
+    assert bench.counters.limited == 0
     assert sent(bench, 1)[0, 0] * 1e3 == pytest.approx(x[0] - 0.1)
 
 
@@ -163,14 +163,13 @@ def test_the_elbow_is_commanded_with_a_pose() -> None:
     )
     words = np.zeros(at.COMMAND_WORDS)
     words[at.C_E1] = 0.4
-    words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = bench.now, at.GIVEN_E1
-    bench.layout.commands.write(words[1:])
+    bench.give(words, at.GIVEN_E1)
     bench.run(1500)
     redundancy = bench.sent[-1].redundancy
     assert redundancy is not None and redundancy.value == 0.4 and sent(bench, 1)[0] == pytest.approx(HOME)
     last = bench.states[-1]
     assert last.e1_sent == 0.4 and last.e1_ipo == 0.1
-    assert any("elbow: velocity limited" in line for line in bench.cycle.pose_commander.guard.report.lines)
+    assert any("elbow: velocity limited" in line for line in bench.limited)
     steps = np.diff([one.redundancy.value for one in bench.sent[-1500:] if one.redundancy is not None])
     assert steps.max() <= 0.5e-3 * 1.000001
 

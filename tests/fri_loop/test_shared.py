@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
 import pytest
 
+from heptarm.errors import HeptarmError
 from heptarm.io.shared import MemoryBlock, Note, Ring
 
 WIDTH, SLOTS = 16, 4
@@ -64,3 +66,26 @@ def test_a_note_stands_until_the_next_one() -> None:
     assert note.read() == "" and note.tick != before
     with pytest.raises(ValueError, match="at most 48 bytes, got 49"):
         note.write("x" * 49)
+
+
+@pytest.mark.skipif(not os.path.isdir("/dev/shm"), reason="this system has no file system in memory")
+def test_memory_that_does_not_exist_is_refused_before_it_is_written() -> None:
+    about = os.statvfs("/dev/shm")
+    before = set(os.listdir("/dev/shm"))
+    with pytest.raises(
+        HeptarmError, match=r"shared memory cannot be reserved in /dev/shm: no space .*--shm-size"
+    ):
+        MemoryBlock(about.f_frsize * about.f_blocks // 8 + 1024)
+    made = set(os.listdir("/dev/shm")) - before
+    assert not [
+        name for name in made if os.stat(f"/dev/shm/{name}").st_size > about.f_frsize * about.f_blocks
+    ]
+
+
+@pytest.mark.skipif(not os.path.isdir("/dev/shm"), reason="this system has no file system in memory")
+def test_all_of_the_memory_is_reserved() -> None:
+    block = MemoryBlock(1 << 17)
+    try:
+        assert os.stat(block.path).st_blocks * 512 >= 1 << 20
+    finally:
+        block.unlink()

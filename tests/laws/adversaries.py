@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import nan
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.fri.guard.joint_guard import JointGuard, Limits
+from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.planning.command import Order
+from heptarm.planning.seam import Hold
 from heptarm.sim.control.laws import Superposition
+from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import Body, robot
+from tests.oracles.fri.joint_guard import JointGuard
 
 Floats = npt.NDArray[np.float64]
 #: Torques [Nm] of measured positions [rad], velocities [rad/s] and the time [s]; NaN and infinity are allowed.
@@ -63,12 +67,15 @@ class Trial:
     Attributes:
         seed: of the law, the posture, the stiffness, the period and the load.
         is_guarded: whether the guard of torques is in force.
+        is_ending: whether the session lets the arm brake in the second half.
     """
 
     seed: int
     is_guarded: bool = True
+    is_ending: bool = False
     speed: Floats = field(default_factory=lambda: np.zeros(7))  # largest fractions of the robot's speeds
     nearest: float = np.inf  # to a position limit [rad]
+    final_speed: Floats = field(default_factory=lambda: np.zeros(7))
     error: str = ""
     name: str = ""
 
@@ -93,7 +100,7 @@ class Trial:
         dt = period * 1e-3
         joints.start(start.tolist(), [0.0] * 7, period=dt)
         guard.start()
-        plant.submit(Order(1, "hold", mode=JointImpedance(stiffness)))
+        plant.submit(MotionCommand(1, Hold(duration=nan), mode=JointImpedance(stiffness)))
         plant.step(50)
         set_point, tau, waiting = plant.snapshot.q_cmd, np.zeros(7), np.zeros(7)
         before = plant.snapshot.q
@@ -105,15 +112,17 @@ class Trial:
                 dq, before = (q - before) / dt, q
                 with np.errstate(all="ignore"):
                     target = joints.torque(law(q, dq, k * 1e-3).tolist())
+                braking = self.is_ending and k > 500 * seconds
                 if self.is_guarded:
-                    target = guard.limit(target, q=q, dq=dq, period=dt)
+                    target = guard.limit(target, q=q, dq=dq, period=dt, is_braking=braking)
                 waiting = np.array(target)
             plant.overlay(Superposition(set_point, tau=tau))
             plant.tick()
             self.speed = np.maximum(self.speed, np.abs(plant.data.qvel[:7]) / arm.dq_max)
             here = plant.data.qpos[:7]
             self.nearest = min(self.nearest, float(np.minimum(here - low, high - here).min()))
-            if plant._tripped:
+            if StopRequest.DRIVE_ERROR in plant.safety.stop_requests:
                 self.error = "drive error"
                 break
+        self.final_speed = plant.data.qvel[:7].copy()
         return self

@@ -294,16 +294,6 @@ def test_limits_that_are_lowered_on_the_way_are_reached_within_the_jerk(when: in
     assert steps.max(axis=0) - HOME == pytest.approx(np.full(7, 1.0), abs=1e-12), "there, and no overshoot"
 
 
-@pytest.mark.parametrize("jerk", [0.0, -1.0, math.nan])
-def test_without_a_jerk_on_the_way_the_law_ends(jerk: float) -> None:
-    trial = LawTrial(laws.jerk_limited(HOME + 0.5))
-    for _ in range(200):
-        trial(HOME, q_ipo=HOME)
-    trial.params.jerk = np.full(7, jerk)
-    with pytest.raises(HeptarmError, match="the law has failed: it returned 1"):
-        trial(HOME, q_ipo=HOME)
-
-
 @pytest.mark.parametrize("order", [1, 2])
 def test_readings_pass_the_filter_and_the_arm_keeps_to_its_motion(order: int) -> None:
     trial = LawTrial(laws.low_pass_readings(frequency=5.0, order=order))

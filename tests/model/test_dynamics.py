@@ -18,6 +18,7 @@ from heptarm.model.dynamics import (
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.values.robot import ROBOTS, Body, Friction, RobotModel
 from tests.model.arms import random_q
+from tests.oracles import dynamics as oracle
 
 ALL = list(ROBOTS.values())
 LOAD = Body(3.0, (0.02, -0.01, 0.08), (0.02, 0.03, 0.025, 0.001, -0.002, 0.003))
@@ -164,3 +165,18 @@ def test_refuses() -> None:
         Body(1.0, (0, 0))
     with pytest.raises(ShapeError, match="dq must have shape"):
         coriolis(ROBOTS["iiwa7"], np.zeros(7), np.zeros(6))
+
+
+@pytest.mark.parametrize("robot", ALL, ids=by_name)
+@pytest.mark.parametrize("load", [None, LOAD], ids=["bare", "loaded"])
+def test_that_of_the_oracle_in_python(robot: RobotModel, load: Body | None) -> None:
+    rng = np.random.default_rng(32)
+    for _ in range(30):
+        q, dq = random_q(robot, rng), rng.normal(size=7)
+        pairs = (
+            (mass_matrix(robot, q, load=load), oracle.mass_matrix(robot, q, load=load)),
+            (coriolis_matrix(robot, q, dq, load=load), oracle.coriolis_matrix(robot, q, dq, load=load)),
+            (coriolis(robot, q, dq, load=load), oracle.coriolis(robot, q, dq, load=load)),
+            (gravity(robot, q, load=load), oracle.gravity(robot, q, load=load)),
+        )
+        assert max(np.abs(ours - known).max() for ours, known in pairs) < 1e-12

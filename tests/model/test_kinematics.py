@@ -10,6 +10,7 @@ from heptarm.model.kinematics import flange, forward, jacobian, jacobian_derivat
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import RobotModel
 from tests.model.arms import MODELS, denavit_hartenberg, random_q
+from tests.oracles import kinematics as oracle
 
 pytestmark = pytest.mark.parametrize("robot", MODELS, ids=lambda m: m.name)
 
@@ -161,3 +162,18 @@ def test_refuses(robot: RobotModel) -> None:
         jacobian(robot, np.zeros(7), link=4)
     with pytest.raises(LimitError, match=r"link must be in \[1, 7\]"):
         forward(robot, np.zeros(7), link=8)
+
+
+def test_that_of_the_oracle_in_python(robot: RobotModel) -> None:
+    rng = np.random.default_rng(31)
+    for _ in range(200):
+        q = random_q(robot, rng)
+        assert np.abs(forward(robot, q) - oracle.forward(robot, q)).max() < 1e-14
+        point = rng.normal(size=3)
+        for link, at in ((7, None), (7, point), (4, point)):
+            assert (
+                np.abs(jacobian(robot, q, at, link=link) - oracle.jacobian(robot, q, at, link=link)).max()
+                < 1e-14
+            )
+        for link in range(1, 8):
+            assert np.abs(forward(robot, q, link=link) - oracle.forward(robot, q, link=link)).max() < 1e-14

@@ -204,6 +204,13 @@ def main() -> int:
 
         with ThreadPoolExecutor(options.jobs) as pool:
             verdicts = list(pool.map(lambda one: attempt(*one), work))
+        for package in packages:  # else nothing that was caught counts: something else has failed meanwhile
+            copy = copies.get()
+            plain = copy.run(package.tests)
+            copies.put(copy)
+            if plain.caught:
+                print(f"the tests of {package.name} fail without any change, after the mutants: {plain.by}")
+                return 2
     return report(packages, work, verdicts, options.least)
 
 

@@ -1,4 +1,4 @@
-"""Rigid-body dynamics of an LBR: M(q) ddq + C(q, dq) dq + g(q) = tau.
+"""Rigid-body dynamics of an LBR in Python, with which `native/dynamics.h` is compared.
 
 Newton's and Euler's laws of every link, projected on the joints by the Jacobians Jv, Jw of its centre of mass
 (Siciliano, Sciavicco, Villani, Oriolo, "Robotics", 2009, section 7.1):
@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.values.arrays import Array, array, instance
-from heptarm.values.robot import Body, Friction, RobotModel, symmetric
+from heptarm.values.robot import Body, RobotModel, symmetric
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
 GRAVITY = (0.0, 0.0, -9.81)
@@ -174,67 +174,3 @@ def gravity(
         Shape (7,) [Nm].
     """
     return _gravity(_posture(robot, q, load), acceleration)
-
-
-def inverse_dynamics(
-    robot: RobotModel,
-    q: npt.ArrayLike,
-    dq: npt.ArrayLike,
-    ddq: npt.ArrayLike,
-    *,
-    load: Body | None = None,
-    acceleration: npt.ArrayLike = GRAVITY,
-    friction: Friction | None = None,
-) -> Array:
-    """Inverse dynamics: joint torques M ddq + C dq + g, and the friction.
-
-    Args:
-        robot: the robot.
-        q: joint positions, shape (7,) [rad].
-        dq: joint velocities, shape (7,) [rad/s].
-        ddq: joint accelerations, shape (7,) [rad/s²].
-        load: on the flange.
-        acceleration: of gravity in the base frame, shape (3,) [m/s²].
-        friction: of the joints; None: without.
-
-    Returns:
-        Shape (7,) [Nm].
-    """
-    posture, rates = _posture(robot, q, load), array(dq, 7, "dq")
-    inertial = _mass_matrix(posture) @ array(ddq, 7, "ddq")
-    rigid = inertial + _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
-    return rigid + _friction(friction, rates)
-
-
-def _friction(friction: Friction | None, rates: Array) -> Array:
-    return np.zeros(7) if friction is None else instance(friction, Friction, "friction").torque(rates)
-
-
-def forward_dynamics(
-    robot: RobotModel,
-    q: npt.ArrayLike,
-    dq: npt.ArrayLike,
-    tau: npt.ArrayLike,
-    *,
-    load: Body | None = None,
-    acceleration: npt.ArrayLike = GRAVITY,
-    friction: Friction | None = None,
-) -> Array:
-    """Forward dynamics: joint accelerations M^-1 (tau - C dq - g - friction).
-
-    Args:
-        robot: the robot.
-        q: joint positions, shape (7,) [rad].
-        dq: joint velocities, shape (7,) [rad/s].
-        tau: joint torques, shape (7,) [Nm].
-        load: on the flange.
-        acceleration: of gravity in the base frame, shape (3,) [m/s²].
-        friction: of the joints; None: without.
-
-    Returns:
-        Shape (7,) [rad/s²].
-    """
-    posture, rates = _posture(robot, q, load), array(dq, 7, "dq")
-    bias = _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
-    bias = bias + _friction(friction, rates)
-    return np.asarray(np.linalg.solve(_mass_matrix(posture), array(tau, 7, "tau") - bias), dtype=np.float64)

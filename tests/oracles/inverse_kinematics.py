@@ -1,4 +1,4 @@
-"""Analytic inverse kinematics of an LBR with KUKA's redundancy: arm angle E1, Status and Turn.
+"""Inverse kinematics of an LBR by the arm angle in Python: what `native/redundancy.c` is compared with.
 
 Geometry after Shimizu, Kakuya, Yoon, Kitagaki, Kosuge, "Analytical Inverse Kinematic Computation for 7-DOF
 Redundant Manipulators With Joint Limits and Its Application to Redundancy Resolution", IEEE T-RO 24(5),
@@ -10,17 +10,17 @@ bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, isnan, nan, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
-from heptarm.model.null_space import events
 
 from heptarm.errors import ShapeError, Unreachable
-from heptarm.model.kinematics import Columns, Vec, flange
-from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
-from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.arrays import Array, finite_entries, instance, integer, numbers
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
+from tests.oracles.kinematics import Columns, Vec, flange
+from tests.oracles.null_space import events
 
 #: Rows of a rotation matrix.
 Rows: TypeAlias = tuple[Vec, Vec, Vec]
@@ -241,15 +241,6 @@ def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
     return atan2(axial / length, turned[0][0] + turned[1][1] + turned[2][2] - 1.0)
 
 
-def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
-    """E1, Status and Turn of a joint position, shape (7,) [rad]."""
-    instance(robot, RobotModel, "robot")
-    values = array(q, 7, "q").tolist()
-    status = status_of(robot, values)
-    turn = sum((value < 0) << index for index, value in enumerate(values))
-    return Redundancy(arm_angle(robot, values, bool(status & 1)), status, turn)
-
-
 def intervals(robot: RobotModel, pose: Pose | Array, status: int) -> list[tuple[float, float]]:
     """Arm angles at which a flange pose can be held in a Status within the joint limits.
 
@@ -299,109 +290,3 @@ def _intervals(robot: RobotModel, r: Rows, p: Vec, status: int) -> list[tuple[fl
         first = found.pop(0)
         found[-1] = (found[-1][0], first[1] + 2 * pi)
     return found
-
-
-def solve(
-    robot: RobotModel,
-    pose: Pose | Array,
-    *,
-    e1: float | None = None,
-    status: int | None = None,
-    near: Sequence[float] | None = None,
-) -> Array:
-    """Solve the inverse kinematics: joint positions within the limits for a flange pose.
-
-    E1 and Status are kept if given; otherwise they are taken from `near` if that gives a solution within the limits. If
-    not, the result is the solution closest to `near` (by default a bent arm), in the same Status if possible, then in
-    any. If there is a solution within the limits, one is found.
-
-    Args:
-        robot: the robot.
-        pose: of the flange in the base frame.
-        e1: arm angle [rad]; None or NaN: not given.
-        status: bits 0-2; None or -1: not given.
-        near: joint positions, shape (7,) [rad].
-
-    Returns:
-        Shape (7,) [rad].
-
-    Raises:
-        LimitError: a value is outside its range, such as Status 8.
-        Unreachable: no solution within the joint limits; the text names the cause.
-    """
-    instance(robot, RobotModel, "robot")
-    r, p = rows(pose)
-    hint = None if near is None else array(near, 7, "near").tolist()
-    given = Redundancy(nan if e1 is None else e1, -1 if status is None else status)
-    e1 = None if isnan(given.e1) else given.e1
-    wanted = status = None if given.status < 0 else given.status
-    if hint is not None:
-        own = redundancy(robot, hint)
-        wanted = own.status if status is None else status
-        candidate = raw(robot, r, p, own.e1 if e1 is None else e1, wanted, hint)
-        if inside(robot, candidate):
-            return np.array(candidate)
-    elif wanted is None:
-        wanted = _USUAL_STATUS
-    best = _nearest(robot, r, p, e1, [wanted], hint)
-    if best is None and status is None:
-        best = _nearest(robot, r, p, e1, [s for s in range(8) if s != wanted], hint)
-    if best is None:
-        fixed = " with that E1 or Status" if e1 is not None or status is not None else ""
-        raise Unreachable(
-            f"the pose is within reach, but every arm position that reaches it{fixed} violates a joint limit",
-            code=51,
-            hint="change the orientation" + (", or leave E1 and Status free" if fixed else ""),
-        )
-    return np.array(best)
-
-
-def _nearest(
-    robot: RobotModel, r: Rows, p: Vec, e1: float | None, states: Sequence[int], hint: Sequence[float] | None
-) -> tuple[float, ...] | None:
-    """The solution next to `hint`, each joint's distance counted in its range; None if there is none."""
-    goal = _USUAL if hint is None else hint
-    weights = (1.0 / (robot.q_max - robot.q_min) ** 2).tolist()
-
-    def distance(q: Sequence[float]) -> float:
-        return float(sum(w * (x - y) * (x - y) for w, x, y in zip(weights, q, goal, strict=True)))
-
-    found: list[tuple[float, ...]] = []
-    for status in states:
-        angles = [e1] if e1 is not None else _samples(_intervals(robot, r, p, status))
-        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status, hint)))
-    return min(found, key=distance, default=None)
-
-
-def _samples(spans: Sequence[tuple[float, float]]) -> list[float]:
-    """Arm angles from the insides of intervals: their ends lie on joint limits."""
-    result = []
-    for low, high in spans:
-        count = 1 + int((high - low) / _STEP)
-        result += [low + (high - low) * (i + 0.5) / count for i in range(count)]
-    return result
-
-
-def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None) -> list[Array]:
-    """Find solutions within the joint limits.
-
-    Args:
-        robot: the robot.
-        pose: of the flange in the base frame.
-        e1: arm angle [rad]; None: the middle of each interval of arm angles.
-
-    Returns:
-        For an arm angle: one for each Status that has one, up to 8. Without: one for each interval of each
-        Status. Each has shape (7,) [rad].
-
-    Raises:
-        Unreachable: out of reach.
-    """
-    instance(robot, RobotModel, "robot")
-    r, p = rows(pose)
-    e1 = None if e1 is None else finite(e1, "e1", unit="rad")
-    found: list[tuple[float, ...]] = []
-    for status in range(8):
-        angles = [(a + b) / 2 for a, b in _intervals(robot, r, p, status)] if e1 is None else [e1]
-        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status)))
-    return [np.array(q) for q in found]

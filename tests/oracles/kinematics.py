@@ -1,4 +1,4 @@
-"""Forward kinematics and Jacobian of an LBR.
+"""Forward kinematics and Jacobian of an LBR in Python: what `native/kinematics.h` is compared with.
 
 The chain is Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7) with all offsets along z: base to shoulder, to
 elbow, to wrist, to flange. A rotation about z or y mixes two columns of the rotation matrix, so the product
@@ -145,34 +145,3 @@ def jacobian(
     result = np.vstack([np.cross(z, target - np.array(points)).T, z.T])
     result[:, link:] = 0.0
     return result
-
-
-def jacobian_derivative(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike) -> Array:
-    """Time derivative of the flange's Jacobian along dq [rad/s], shape (6, 7), base axes.
-
-    dz_i = w_i x z_i with w_i the velocity of the link that carries axis i; the lever's derivative is the
-    difference of the tip's and the point's velocities.
-    """
-    instance(robot, RobotModel, "robot")
-    axes, points, tip = joints(robot, array(q, 7, "q").tolist())
-    z, p, rates = np.array(axes), np.array(points), array(dq, 7, "dq")
-    lever = np.asarray(tip) - p
-    spin = np.vstack([np.zeros(3), np.cumsum(z * rates[:, None], axis=0)[:-1]])
-    dz = np.cross(spin, z)
-    tip_velocity = np.cross(z, lever).T @ rates
-    point_velocity = np.array(
-        [sum((rates[j] * np.cross(z[j], p[i] - p[j]) for j in range(i)), np.zeros(3)) for i in range(7)]
-    )
-    return np.vstack([(np.cross(dz, lever) + np.cross(z, tip_velocity - point_velocity)).T, dz.T])
-
-
-def nullspace(robot: RobotModel, q: npt.ArrayLike) -> Array:
-    """Projector on the joint motions that do not move the flange, N = 1 - J^+ J, shape (7, 7)."""
-    j = jacobian(robot, q)
-    return np.eye(7) - np.linalg.pinv(j) @ j
-
-
-def manipulability(robot: RobotModel, q: npt.ArrayLike) -> float:
-    """Yoshikawa's measure sqrt(det(J Jᵀ)); 0 at a singularity."""
-    j = jacobian(robot, q)
-    return float(np.sqrt(max(0.0, np.linalg.det(j @ j.T))))

@@ -76,7 +76,7 @@ def test_a_folder_that_others_may_enter_is_not_used(folder: Path) -> None:
     PlanBox(["iiwa14"]).take()
     place = folder / str(os.getpid())
     assert place.stat().st_mode & 0o077 == 0
-    place.chmod(0o755)
+    place.chmod(0o757)
     assert not hand_over(outline())
     box = PlanBox(["iiwa14"])
     assert box.take() is None and not hand_over(outline())

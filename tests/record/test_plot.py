@@ -10,7 +10,7 @@ import pytest
 from heptarm import Recording
 from heptarm.errors import CommandRejected, MissingExtra
 from heptarm.record import plot
-from heptarm.record.recording import RecordedEvent, RecordedMotion
+from heptarm.record.recorded import RecordedEvent, RecordedMotion
 from heptarm.values.robot import ROBOTS
 
 ROBOT = ROBOTS["iiwa14"]

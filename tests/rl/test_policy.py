@@ -77,16 +77,16 @@ def test_a_policy_runs_without_torch(tmp_path: Path) -> None:
 
 
 def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(HeptarmError, match=r"policy file .*gone\.npz"):
+    with pytest.raises(HeptarmError, match=r"gone\.npz cannot be read: no such file"):
         Policy.load(tmp_path / "gone.npz")
     (tmp_path / "text.npz").write_text("hello")
-    with pytest.raises(HeptarmError, match="must be a policy file"):
+    with pytest.raises(HeptarmError, match="is not a policy"):
         Policy.load(tmp_path / "text.npz")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
-    with pytest.raises(HeptarmError, match="must be a policy file"):
+    with pytest.raises(HeptarmError, match="is not a policy"):
         Policy.load(tmp_path / "other.npz")
     np.savez(tmp_path / "pickle.npz", about=np.array([{"format": 1}], dtype=object))
-    with pytest.raises(HeptarmError, match="must be a policy file"):
+    with pytest.raises(HeptarmError, match="is not a policy"):
         Policy.load(tmp_path / "pickle.npz")
     np.savez(tmp_path / "later.npz", about=np.array(json.dumps({"format": 99})))
     with pytest.raises(HeptarmError, match="format 99"):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from math import isnan, nan
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import plant
 from heptarm.planning import seam
-from heptarm.sim.runtime.java_plant import mode_of, order_of
+from heptarm.sim.runtime.java_plant import command_of, mode_of
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire.codec import DecodeError
 
@@ -42,26 +43,62 @@ CONDITIONS = (
         )
     ),
 )
-PART = seam.MotionOrder(id=3, kind=seam.MotionKind.CIRC, tcp=SEVEN, pose=SEVEN, via=SEVEN)
-ORDER = seam.MotionOrder(
-    id=2**60,
-    kind=seam.MotionKind.BATCH,
-    tcp=SEVEN,
-    joints=SEVEN,
-    orientation_type=seam.OrientationType.JOINT,
-    reference=(0.0, 0.0, 0.0, 1.0),
-    mode=SINE,
-    straight_limits=seam.StraightLimits(velocity=SIX),
-    hand_guiding=seam.HandGuiding(q_min=SEVEN, at_limit=seam.AtLimit.ALL),
-    fri_overlay=seam.FriOverlay(session=2, command=3),
-    breaks=CONDITIONS,
-    triggers=CONDITIONS[:1],
-    parts=(PART, PART),
+PLACE = seam.Pose(xyz=SEVEN[:3], quat=(0.0, 0.0, 0.0, 1.0))
+ARC = seam.Circ(
+    via=PLACE,
+    end=PLACE,
+    redundancy=seam.Redundancy(e1=0.5, status=2),
+    dynamics=seam.CartesianDynamics(velocity=0.2),
+    orientation=seam.Orientation(type=seam.OrientationType.JOINT),
+)
+MOTIONS = (
+    seam.Ptp(q=SEVEN, blending=seam.Blending(relative=0.5)),
+    seam.PtpPose(target=PLACE, redundancy=seam.Redundancy()),
+    seam.Lin(target=PLACE, redundancy=seam.Redundancy(), joints=seam.JointDynamics(velocity=SEVEN)),
+    seam.LinRel(offset=PLACE, axes=(0.0, 0.0, 0.0, 1.0)),
+    ARC,
+    seam.Spline(segments=(seam.Spl(target=PLACE), ARC)),
+    seam.JointSpline(points=(seam.Ptp(q=SEVEN), seam.Ptp(q=SEVEN))),
+    seam.Batch(motions=(seam.Ptp(q=SEVEN), ARC), blending=seam.Blending(distance=0.02)),
+    seam.Hold(duration=nan),
+    seam.HandGuide(q_min=SEVEN, freezes_all=True),
+    seam.ServoSmart(timing=seam.ServoTiming(), dynamics=seam.JointDynamics()),
+    seam.ServoDirect(timing=seam.ServoTiming(goal_timeout=2.0), dynamics=seam.JointDynamics()),
+    seam.ServoStraight(timing=seam.ServoTiming(), velocity=SIX),
 )
 
 
-def test_an_order_comes_back_as_it_was() -> None:
-    assert repr(seam.MotionOrder.decode(ORDER.encode())) == repr(ORDER)
+def order(motion: seam.PlantMotion) -> seam.MotionOrder:
+    return seam.MotionOrder(
+        id=2**60,
+        motion=motion,
+        tcp=SEVEN,
+        mode=SINE,
+        fri_overlay=seam.FriOverlay(session=2, command=3),
+        conditions=(
+            seam.MotionCondition(condition=CONDITIONS[0], breaks=False, part=1, index=0),
+            seam.MotionCondition(condition=CONDITIONS[2], breaks=True, index=3),
+        ),
+    )
+
+
+ORDER = order(MOTIONS[7])
+
+
+@pytest.mark.parametrize("motion", MOTIONS, ids=lambda one: type(one).__name__)
+def test_an_order_comes_back_as_it_was(motion: seam.PlantMotion) -> None:
+    sent = order(motion)
+    assert repr(seam.MotionOrder.decode(sent.encode())) == repr(sent)
+
+
+def test_every_member_of_the_union_has_come_back() -> None:
+    assert {type(one) for one in (*MOTIONS, *MOTIONS[5].segments)} == set(get_args(seam.PlantMotion))  # type: ignore[union-attr]
+
+
+def test_an_unknown_motion_is_refused() -> None:
+    data = ORDER.encode()
+    with pytest.raises(DecodeError, match="PlantMotion has tag 99"):
+        seam.MotionOrder.decode(data[:8] + bytes((99,)) + data[9:])
 
 
 @pytest.mark.parametrize("cut", [0, 1, 9, 60, -1])
@@ -79,13 +116,18 @@ def test_an_unknown_condition_is_refused() -> None:
         seam.decode_condition(bytes((77,)) + data[1:])
 
 
-def test_an_order_becomes_the_plants() -> None:
-    order = order_of(ORDER)
-    assert (order.kind, order.orientation.type, order.orientation.reference) == ("batch", "joint", "base")
-    assert order.guide is not None and order.guide.at_limit == "all" and order.guide.outside == "free"
-    assert order.guide.q_min.tolist() == list(SEVEN) and isnan(order.guide.joint_velocity)
-    assert order.joint_velocity == (1.0,) * 7 and order.blending == (0.0, 0.0, 0.0)
-    assert [part.kind for part in order.parts] == ["circ", "circ"]
+def test_an_order_becomes_the_controllers_command() -> None:
+    class Listener:
+        def fired(self, part: int, breaks: bool, index: int) -> None:
+            heard.append((part, breaks, index))
+
+    heard: list[tuple[int, bool, int]] = []
+    command = command_of(ORDER, Listener())
+    assert command.motion is ORDER.motion and command.tcp == SEVEN and command.axes == CARTESIAN.axes
+    assert [(one.part, one.breaks) for one in command.watches] == [(1, False), (-1, True)]
+    for one in command.watches:
+        one.fired()
+    assert heard == [(1, False, 0), (-1, True, 3)]
 
 
 def test_every_parameter_of_a_mode_arrives_under_its_name() -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -48,7 +48,7 @@ def ready(model: str = "iiwa14") -> Plant:
     return Plant(model, q=READY)
 
 
-def run(plant: Plant, *orders: Order, most: int = 30_000) -> Track:
+def run(plant: Plant, *orders: MotionCommand, most: int = 30_000) -> Track:
     """Submit orders and tick until the plant is idle."""
     for order in orders:
         plant.submit(order)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import TICK, Order
+from heptarm.planning.motion import TICK, ServoMotion
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.interpolator import FAST_JERK
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
+from tests.sim import motions
 from tests.sim.driving import READY
 
 LINE = (0.05, 0.25, 0.05, 0.0, 0.0, 0.0, 1.0)
@@ -25,28 +27,27 @@ def _at(x: float, y: float, z: float) -> tuple[float, ...]:
 
 #: Every kind of motion, each about a second long at full speed.
 KINDS = {
-    "ptp": Order(1, "ptp", joints=(1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8)),
-    "lin": Order(1, "lin_rel", offset=LINE, reference=BASE),
-    "circ": Order(1, "circ", via=_at(0.08, 0.12, 0.0), pose=_at(0.0, 0.24, 0.05)),
-    "batch": Order(
+    "ptp": MotionCommand(1, motions.ptp((1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8))),
+    "lin": MotionCommand(1, motions.lin_rel(LINE, BASE)),
+    "circ": MotionCommand(1, motions.circ(_at(0.08, 0.12, 0.0), _at(0.0, 0.24, 0.05))),
+    "batch": MotionCommand(
         1,
-        "batch",
-        parts=tuple(
-            Order(1, "lin", pose=_at(*corner), blending=(0.0, 0.03, 0.0))
-            for corner in ((0.0, 0.15, 0.0), (0.1, 0.15, 0.0), (0.1, 0.0, 0.05))
+        motions.batch(
+            *(
+                motions.lin(_at(*corner), blending=(0.0, 0.03, 0.0))
+                for corner in ((0.0, 0.15, 0.0), (0.1, 0.15, 0.0), (0.1, 0.0, 0.05))
+            )
         ),
     ),
-    "spline": Order(
+    "spline": MotionCommand(
         1,
-        "spline",
-        parts=tuple(
-            Order(1, "spl", pose=_at(*knot))
-            for knot in ((0.05, 0.08, 0.0), (0.0, 0.16, 0.05), (0.08, 0.25, 0.0))
+        motions.spline(
+            *(motions.spl(_at(*knot)) for knot in ((0.05, 0.08, 0.0), (0.0, 0.16, 0.05), (0.08, 0.25, 0.0)))
         ),
     ),
-    "hold": Order(1, "hold"),
-    "servo": Order(1, "servo"),
-    "direct": Order(1, "direct"),
+    "hold": MotionCommand(1, motions.hold()),
+    "servo": MotionCommand(1, motions.servo()),
+    "direct": MotionCommand(1, motions.direct()),
 }
 
 
@@ -120,7 +121,7 @@ def begin(kind: str, *, seed: int = 0) -> Ideal:
     order = KINDS[kind]
     plant.submit(order)
     plant.tick()
-    if order.is_servo:
+    if isinstance(order.motion, ServoMotion):
         away = np.random.default_rng(seed).uniform(-0.8, 0.8, 7)
         plant.shared.post(order.id, np.array(READY) + away)
     return plant

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning.motion import PlanError
 from heptarm.planning.planner import plan
+from heptarm.planning.seam import PlantMotion
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, Track, numbers, ready, run
 
 SPEED = 0.25
@@ -42,10 +45,8 @@ def at(start: Pose, offset: tuple[float, float, float]) -> tuple[float, ...]:
     return numbers(Pose(start.xyz + offset, start.quat))
 
 
-def square(start: Pose, blending: tuple[float, float, float]) -> tuple[Order, ...]:
-    return tuple(
-        Order(1, "lin", pose=at(start, corner), cart_velocity=SPEED, blending=blending) for corner in SIDES
-    )
+def square(start: Pose, blending: tuple[float, float, float]) -> tuple[PlantMotion, ...]:
+    return tuple(motions.lin(at(start, corner), velocity=SPEED, blending=blending) for corner in SIDES)
 
 
 def speeds(track: Track, plant: Plant) -> Array:
@@ -63,7 +64,7 @@ def check_limits(track: Track, plant: Plant) -> None:
 def test_the_speed_at_a_blended_corner_is_at_least_30_percent(zone: float) -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)
-    order = Order(1, "batch", parts=square(start, (0, zone, 0)), listener=ear, part_listener=ear)
+    order = MotionCommand(1, motions.batch(*square(start, (0, zone, 0))), listener=ear, part_listener=ear)
     track = run(plant, order)
     assert ear.causes == ["started", "done"] and ear.parts == [1, 2, 3]
     speed, seen = speeds(track, plant), points(plant, track.q_cmd)
@@ -79,14 +80,14 @@ def test_the_speed_at_a_blended_corner_is_at_least_30_percent(zone: float) -> No
     turned = [Pose.from_matrix(forward(plant.robot, q)).angle_to(start) for q in track.q_cmd[::20]]
     assert max(turned) < 1e-6
     check_limits(track, plant)
-    exact = run(ready(), Order(1, "batch", parts=square(start, (0, 0, 0))))
+    exact = run(ready(), MotionCommand(1, motions.batch(*square(start, (0, 0, 0)))))
     assert len(track.q) < len(exact.q)
 
 
 def test_outside_the_zones_the_lines_are_straight() -> None:
     plant = ready()
     start = start_of(plant)
-    track = run(plant, Order(1, "batch", parts=square(start, (0, 0.02, 0))))
+    track = run(plant, MotionCommand(1, motions.batch(*square(start, (0, 0.02, 0)))))
     seen = points(plant, track.q_cmd) - start.xyz
     corners = np.array([(0, 0, 0), *SIDES])
     far = (np.linalg.norm(seen[:, None] - corners[None, 1:4], axis=2) > 0.02).all(axis=1)
@@ -98,10 +99,10 @@ def test_a_blend_goes_from_one_speed_to_the_other() -> None:
     plant = ready()
     start = start_of(plant)
     parts = (
-        Order(1, "lin", pose=at(start, (0, 0.15, 0)), cart_velocity=SPEED, blending=(0, 0.05, 0)),
-        Order(1, "lin", pose=at(start, (0, 0.3, 0)), cart_velocity=0.1),
+        motions.lin(at(start, (0, 0.15, 0)), velocity=SPEED, blending=(0, 0.05, 0)),
+        motions.lin(at(start, (0, 0.3, 0)), velocity=0.1),
     )
-    track = run(plant, Order(1, "batch", parts=parts))
+    track = run(plant, MotionCommand(1, motions.batch(*parts)))
     speed = speeds(track, plant)
     assert speed.max() == pytest.approx(SPEED, rel=0.01)
     travel = points(plant, track.q_cmd)[1:, 1] - start.xyz[1]
@@ -112,15 +113,17 @@ def test_a_blend_goes_from_one_speed_to_the_other() -> None:
 def test_joints_blend_with_lines_and_arcs() -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)
-    arc = Order(1, "circ", via=at(start, (0.05, 0.05, 0)), pose=at(start, (0, 0.1, 0)), cart_velocity=SPEED)
-    parts = (
-        Order(1, "ptp", joints=(0.3, *READY[1:]), blending=(0, 0.05, 0)),
-        Order(1, "lin", pose=numbers(start), cart_velocity=SPEED, blending=(0.3, 0, 0)),
-        replace(arc, blending=(0, 0.03, 0)),
-        Order(1, "ptp", joints=AWAY, blending=(0.2, 0, 0)),
-        Order(1, "ptp", joints=READY),
+    arc = motions.circ(
+        at(start, (0.05, 0.05, 0)), at(start, (0, 0.1, 0)), velocity=SPEED, blending=(0, 0.03, 0)
     )
-    track = run(plant, Order(1, "batch", parts=parts, listener=ear, part_listener=ear))
+    parts = (
+        motions.ptp((0.3, *READY[1:]), blending=(0, 0.05, 0)),
+        motions.lin(numbers(start), velocity=SPEED, blending=(0.3, 0, 0)),
+        arc,
+        motions.ptp(AWAY, blending=(0.2, 0, 0)),
+        motions.ptp(READY),
+    )
+    track = run(plant, MotionCommand(1, motions.batch(*parts), listener=ear, part_listener=ear))
     assert ear.causes == ["started", "done"] and ear.parts == [1, 2, 3, 4]
     check_limits(track, plant)
     fastest = np.abs(track.dq).max(axis=1)
@@ -130,7 +133,7 @@ def test_joints_blend_with_lines_and_arcs() -> None:
 
 def test_progress_is_that_of_the_motion_under_way() -> None:
     plant, ear = ready(), PartEar()
-    plant.submit(Order(1, "batch", parts=square(start_of(plant), (0, 0.02, 0)), part_listener=ear))
+    plant.submit(MotionCommand(1, motions.batch(*square(start_of(plant), (0, 0.02, 0))), part_listener=ear))
     seen: list[tuple[int, float]] = []
     while not plant.idle:
         plant.tick()
@@ -144,7 +147,7 @@ def test_progress_is_that_of_the_motion_under_way() -> None:
 def test_without_blending_every_motion_ends_where_it_should() -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)
-    order = Order(1, "batch", parts=square(start, (0, 0, 0)), listener=ear, part_listener=ear)
+    order = MotionCommand(1, motions.batch(*square(start, (0, 0, 0))), listener=ear, part_listener=ear)
     track = run(plant, order)
     seen = points(plant, track.q_cmd)
     for corner in SIDES:
@@ -156,33 +159,33 @@ def test_without_blending_every_motion_ends_where_it_should() -> None:
 def test_a_motion_of_a_batch_that_cannot_be_planned_is_named() -> None:
     plant = ready()
     start = start_of(plant)
-    parts = (*square(start, (0, 0, 0)), Order(1, "ptp", joints=(0, 3, 0, 0, 0, 0, 0)))
+    parts = (*square(start, (0, 0, 0)), motions.ptp((0, 3, 0, 0, 0, 0, 0)))
     with pytest.raises(PlanError, match=r"violates limit A2.*motion 5 of the batch"):
-        plant.submit(Order(1, "batch", parts=parts))
-    with pytest.raises(PlanError, match="batch cannot have a motion of kind 'hold'"):
-        plant.submit(Order(1, "batch", parts=(Order(1, "hold"),)))
+        plant.submit(MotionCommand(1, motions.batch(*parts)))
+    with pytest.raises(PlanError, match="batch cannot have a motion of kind Hold"):
+        plant.submit(MotionCommand(1, motions.batch(motions.hold())))
     assert plant.idle
 
 
 def test_motions_that_guide_nowhere_are_passed_over() -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)
-    here = Order(1, "lin", pose=numbers(start), blending=(0, 0.02, 0))
-    there = Order(1, "lin", pose=at(start, (0, 0.05, 0)), blending=(0, 0.02, 0))
+    here = motions.lin(numbers(start), blending=(0, 0.02, 0))
+    there = motions.lin(at(start, (0, 0.05, 0)), blending=(0, 0.02, 0))
     run(
         plant,
-        Order(1, "batch", parts=(here, there, replace(there, id=2), here), listener=ear, part_listener=ear),
+        MotionCommand(1, motions.batch(here, there, there, here), listener=ear, part_listener=ear),
     )
     assert ear.causes == ["started", "done"] and np.abs(plant.snapshot.q - READY).max() < 2e-4
-    run(plant, Order(2, "batch", parts=(here, here), listener=(still := PartEar())))
+    run(plant, MotionCommand(2, motions.batch(here, here), listener=(still := PartEar())))
     assert still.causes == ["started", "done"]
 
 
 def test_the_override_slows_a_batch_down() -> None:
     plant = ready()
     start = start_of(plant)
-    order = Order(1, "batch", parts=square(start, (0, 0.02, 0)))
-    full = plan(plant.robot, order, plant.snapshot.q_cmd).duration
+    order = MotionCommand(1, motions.batch(*square(start, (0, 0.02, 0))))
+    full = plan(plant.robot, order.motion, plant.snapshot.q_cmd).duration
     plant.override = 0.5
     plant.step(400)
     assert len(run(plant, order).q) * 1e-3 == pytest.approx(2 * full, rel=0.1)
@@ -191,7 +194,7 @@ def test_the_override_slows_a_batch_down() -> None:
 def test_a_stop_in_a_batch_comes_to_rest_on_the_path_within_the_limits() -> None:
     random = np.random.default_rng(3)
     start = start_of(ready())
-    order = Order(1, "batch", parts=square(start, (0, 0.02, 0)))
+    order = MotionCommand(1, motions.batch(*square(start, (0, 0.02, 0))))
     path = points(plant := ready(), run(plant, order).q_cmd)
     for instant in random.integers(1, 2400, 7).tolist():
         plant, ear = ready(), Ear()

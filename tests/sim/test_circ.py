@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typing_extensions import Unpack
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning.motion import PlanError
+from heptarm.planning.seam import Circ
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.motion.circle import arc
-from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose
+from tests.sim import motions
 from tests.sim.driving import Ear, numbers, ready, run
 
 TCP = Pose.xyz_abc(0.05, 0.0, 0.15, 0.3, 0.2, 0.0)
@@ -24,14 +27,19 @@ def poses(plant: Plant, joints: Array, tcp: Pose = TCP) -> list[Pose]:
 
 
 def round_trip(
-    plant: Plant, angle: float, tcp: Pose = TCP, radius: float = 0.08, plane: str = "xy"
-) -> tuple[Order, Array]:
+    plant: Plant,
+    angle: float,
+    tcp: Pose = TCP,
+    radius: float = 0.08,
+    plane: str = "xy",
+    **limits: Unpack[motions.Limits],
+) -> tuple[MotionCommand, Array]:
     """An order for an arc from the current position of the plant, and its centre."""
     start = poses(plant, plant.snapshot.q_cmd[None], tcp)[0]
     centre = start.xyz + {"xy": (0, radius, 0), "xz": (0, 0, -radius), "yz": (0, radius, 0)}[plane]
     motion = arc(start, angle, centre=centre, plane=plane)
-    order = Order(1, "circ", via=numbers(motion.via), pose=numbers(motion.end), tcp=numbers(tcp))
-    return order, centre
+    made = motions.circ(numbers(motion.via), numbers(motion.end), **limits)
+    return MotionCommand(1, made, tcp=numbers(tcp)), centre
 
 
 @pytest.mark.parametrize("plane", ["xy", "xz", "yz"])
@@ -39,7 +47,6 @@ def round_trip(
 def test_an_arc_is_round_on_the_measured_pose(plane: str, angle: float) -> None:
     plant, ear = ready(), Ear()
     order, centre = round_trip(plant, angle, plane=plane)
-    assert order.pose is not None
     track = run(plant, replace(order, listener=ear))
     assert ear.causes == ["started", "done"]
     seen = poses(plant, track.q[::10])
@@ -47,7 +54,8 @@ def test_an_arc_is_round_on_the_measured_pose(plane: str, angle: float) -> None:
     assert np.abs(np.linalg.norm(spokes, axis=1) - 0.08).max() <= 0.5e-3
     normal = {"xy": 2, "xz": 1, "yz": 0}[plane]
     assert np.abs(spokes[:, normal]).max() <= 0.5e-3
-    assert seen[-1].xyz == pytest.approx(order.pose[:3], abs=2e-4)
+    assert isinstance(order.motion, Circ)
+    assert seen[-1].xyz == pytest.approx(order.motion.end.xyz, abs=2e-4)
     # it moves along the whole circle: the angles between the samples add up
     turned = np.cross(spokes[:-1], spokes[1:])[:, normal] / 0.08**2 * (-1 if plane == "xz" else 1)
     assert np.arcsin(turned).sum() == pytest.approx(angle, abs=0.01)
@@ -60,10 +68,12 @@ def test_the_orientation_is_led_as_the_order_reports(type_: str, reference: str)
         pytest.skip("the joints know no path")
     plant = ready()
     order, _ = round_trip(plant, 2.0)
-    assert order.pose is not None
-    end = Pose.of(order.pose[:3], order.pose[3:]) @ Pose.xyz_abc(a=0.6)
+    assert isinstance(order.motion, Circ)
+    via, last = order.motion.via, order.motion.end
+    end = Pose.of(last.xyz, last.quat) @ Pose.xyz_abc(a=0.6)
     start = poses(plant, plant.snapshot.q_cmd[None])[0]
-    track = run(plant, replace(order, pose=numbers(end), orientation=Orientation(type_, reference)))
+    turned = motions.circ((*via.xyz, *via.quat), numbers(end), orientation=(type_, reference))
+    track = run(plant, replace(order, motion=turned))
     seen = poses(plant, track.q_cmd)
     if type_ == "variable":
         assert seen[-1].angle_to(end) < 1e-6
@@ -84,7 +94,7 @@ def test_a_joint_orientation_on_a_line_ends_at_its_target() -> None:
     plant = ready()
     start = poses(plant, plant.snapshot.q_cmd[None])[0]
     end = Pose(start.xyz + [0.05, 0.1, -0.1], (start @ Pose.xyz_abc(a=0.5, b=0.3)).quat)
-    order = Order(1, "lin", pose=numbers(end), tcp=numbers(TCP), orientation=Orientation("joint"))
+    order = MotionCommand(1, motions.lin(numbers(end), orientation=("joint", "base")), tcp=numbers(TCP))
     track = run(plant, order)
     seen = poses(plant, track.q_cmd)
     travel = end.xyz - start.xyz
@@ -92,14 +102,14 @@ def test_a_joint_orientation_on_a_line_ends_at_its_target() -> None:
         s = (pose.xyz - start.xyz) @ travel / (travel @ travel)
         assert np.linalg.norm(start.xyz + s * travel - pose.xyz) < 1e-6
     assert seen[-1].angle_to(end) < 1e-6
-    run(plant, replace(order, id=2, pose=numbers(start), orientation=Orientation("constant")))
+    run(plant, replace(order, id=2, motion=motions.lin(numbers(start), orientation=("constant", "base"))))
     assert poses(plant, plant.snapshot.q_cmd[None])[0].angle_to(end) < 1e-6
 
 
 def test_speed_and_the_acceleration_towards_the_centre_are_kept() -> None:
     plant = ready()
-    order, _ = round_trip(plant, 3.0, Pose.at())
-    track = run(plant, replace(order, cart_velocity=2.0, cart_acceleration=0.3, cart_jerk=100.0))
+    order, _ = round_trip(plant, 3.0, Pose.at(), velocity=2.0, acceleration=0.3, jerk=100.0)
+    track = run(plant, order)
     points = np.array([pose.xyz for pose in poses(plant, track.q_cmd, Pose.at())])
     speed = np.linalg.norm(np.diff(points, axis=0), axis=1) * 1e3
     assert speed.max() ** 2 / 0.08 == pytest.approx(0.3, rel=0.02)
@@ -113,9 +123,9 @@ def test_three_points_on_a_line_make_no_arc() -> None:
     start = poses(plant, plant.snapshot.q_cmd[None])[0]
     via, end = (Pose(start.xyz + [0, y, 0], start.quat) for y in (0.05, 0.1))
     with pytest.raises(PlanError, match="lie on a line"):
-        plant.submit(Order(1, "circ", via=numbers(via), pose=numbers(end), tcp=numbers(TCP)))
+        plant.submit(MotionCommand(1, motions.circ(numbers(via), numbers(end)), tcp=numbers(TCP)))
     with pytest.raises(PlanError, match="may ignore its orientation"):
-        plant.submit(Order(1, "lin", pose=numbers(end), orientation=Orientation("ignore")))
+        plant.submit(MotionCommand(1, motions.lin(numbers(end), orientation=("ignore", "base"))))
 
 
 def test_a_stop_comes_to_rest_on_the_arc_at_any_instant() -> None:

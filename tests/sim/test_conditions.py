@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import ConditionWatch, Order
 from heptarm.planning.seam import (
     AllOf,
     AnyOf,
@@ -16,14 +15,17 @@ from heptarm.planning.seam import (
     MeasuringFrame,
     PathReached,
     PathReference,
+    PlantMotion,
     SignalIs,
     SignalOutside,
     WrenchAbove,
     WrenchComponents,
     WrenchOutside,
 )
+from heptarm.sim.controller.command import ConditionWatch, MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.world import Box
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
 
 #: Points and axes of the flange, and the base's axes at the flange.
@@ -31,18 +33,13 @@ OWN = MeasuringFrame(point_moves=True, point=(0.0, 0.0, 0.0), axes_move=True, ax
 BASE = MeasuringFrame(point_moves=True, point=(0.0, 0.0, 0.0), axes_move=False, axes=(0.0, 0.0, 0.0, 1.0))
 X, Y, Z, *_ = WrenchComponents
 ALL = X | Y | Z
-DOWN = {
-    "kind": "lin_rel",
-    "offset": (0, 0, -0.2, 0, 0, 0, 1),
-    "reference": (0, 0, 0, 1),
-    "cart_velocity": 0.1,
-}
+DOWN = motions.lin_rel((0, 0, -0.2, 0, 0, 0, 1), (0, 0, 0, 1), velocity=0.1)
 
 
-def broken(order: dict[str, object], condition: Condition) -> tuple[Order, list[str]]:
+def broken(motion: PlantMotion, condition: Condition) -> tuple[MotionCommand, list[str]]:
     heard: list[str] = []
     watch = ConditionWatch(condition, lambda: heard.append("fired"), breaks=True)
-    return Order(1, **order, watches=(watch,), listener=Reported(heard)), heard  # type: ignore[arg-type]
+    return MotionCommand(1, motion, watches=(watch,), listener=Reported(heard)), heard
 
 
 class Reported:
@@ -104,7 +101,7 @@ FIRES: list[tuple[str, Condition, bool]] = [
 def test_each_kind_of_condition(condition: Condition, fires: bool) -> None:
     plant = ready()
     pushed(plant, FORCE, (1.0, 0.0, 0.0))
-    order, heard = broken({"kind": "hold", "duration": 0.05}, condition)
+    order, heard = broken(motions.hold(0.05), condition)
     run(plant, order)
     assert heard == (["started", "fired", "condition"] if fires else ["started", "done"])
 
@@ -119,7 +116,7 @@ def test_a_torque_is_seen_from_where_it_is_measured() -> None:
     seen = -lever * 10.0  # about x
     for band, fires in (((seen - 0.2, seen + 0.2), False), ((-100.0, seen - 0.2), True)):
         order, heard = broken(
-            {"kind": "hold", "duration": 0.02},
+            motions.hold(0.02),
             WrenchOutside(frame=away, component=3, low=band[0], high=band[1]),
         )
         run(plant, order)
@@ -138,7 +135,7 @@ def test_a_line_down_onto_a_push_brakes_on_its_path() -> None:
     travel = forward(plant.robot, track.q_cmd[-1])[:3, 3] - start
     assert -0.15 < travel[2] < -0.04 and np.abs(travel[:2]).max() < 1e-3
     assert np.abs(track.acceleration).max() < 1.2 * plant.robot.ddq_max.max()
-    plant.submit(Order(2, "ptp", joints=READY))  # and the next motion starts where it came to rest
+    plant.submit(MotionCommand(2, motions.ptp(READY)))  # and the next motion starts where it came to rest
     run(plant)
     assert np.abs(plant.snapshot.q_cmd - READY).max() < 1e-9
 
@@ -147,7 +144,7 @@ def test_what_is_queued_behind_it_goes_on_from_there() -> None:
     plant, ear = ready(), Ear()
     order, heard = broken(DOWN, PathReached(distance=0.05, delay=0.0))
     plant.submit(order)
-    plant.submit(Order(2, "ptp", joints=READY, listener=ear))
+    plant.submit(MotionCommand(2, motions.ptp(READY), listener=ear))
     run(plant)
     assert heard == ["started", "fired", "condition"] and ear.causes == ["started", "done"]
 
@@ -173,7 +170,7 @@ def test_a_trigger_goes_off_at_a_point_of_the_path(
         seen.append(float(np.linalg.norm(forward(plant.robot, plant.snapshot.q_cmd)[:3, 3] - start)))
 
     point = PathReached(reference=PathReference(reference), distance=distance, delay=delay)
-    plant.submit(Order(1, **DOWN, watches=(ConditionWatch(point, fired),)))  # type: ignore[arg-type]
+    plant.submit(MotionCommand(1, DOWN, watches=(ConditionWatch(point, fired),)))
     track = run(plant)
     assert len(seen) == 1
     assert seen[0] == pytest.approx(travel, abs=0.012 if reference and delay else 2e-3)
@@ -192,7 +189,7 @@ def test_on_a_joint_motion_the_motion_frame_counts() -> None:
     plant = ready()
     joints = (0.5, *READY[1:])
     order, heard = broken(
-        {"kind": "ptp", "joints": joints, "joint_velocity": (0.2,) * 7}, PathReached(distance=0.1, delay=0.0)
+        motions.ptp(joints, joint_velocity=(0.2,) * 7), PathReached(distance=0.1, delay=0.0)
     )
     start = forward(plant.robot, plant.snapshot.q)[:3, 3]
     run(plant, order)
@@ -202,7 +199,7 @@ def test_on_a_joint_motion_the_motion_frame_counts() -> None:
 
 def test_a_servo_motion_breaks_too() -> None:
     plant = ready()
-    order, heard = broken({"kind": "servo"}, WrenchAbove(frame=OWN, components=ALL, threshold=5.0))
+    order, heard = broken(motions.servo(), WrenchAbove(frame=OWN, components=ALL, threshold=5.0))
     plant.submit(order)
     plant.step(5)
     plant.shared.post(1, np.array(READY) + 0.2)
@@ -240,7 +237,7 @@ def test_an_observer_hears_edges_whatever_moves() -> None:
 def test_signals_are_conditions() -> None:
     plant = ready()
     order, heard = broken(
-        {"kind": "hold", "duration": 1.0},
+        motions.hold(1.0),
         AllOf(parts=(SignalIs(place=3, value=True), SignalOutside(place=4, low=-1.0, high=1.0))),
     )
     plant.submit(order)
@@ -257,7 +254,7 @@ def test_a_line_down_stops_on_a_table() -> None:
     table = Box((0.6, 0.0, 0.15), (0.4, 0.6, 0.3))
     plant = Plant(q=READY, boxes=[table])
     height = float(forward(plant.robot, plant.snapshot.q)[2, 3])
-    down = {**DOWN, "offset": (0, 0, -height, 0, 0, 0, 1), "cart_velocity": 0.02}
+    down = motions.lin_rel((0, 0, -height, 0, 0, 0, 1), (0, 0, 0, 1), velocity=0.02)
     order, heard = broken(down, WrenchOutside(frame=BASE, component=2, low=-1000.0, high=10.0))
     run(plant, order)
     assert heard == ["started", "fired", "condition"]

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.planning.command import ConditionWatch, Order
 from heptarm.planning.seam import MeasuringFrame, WrenchAbove, WrenchComponents
 from heptarm.sim.control.laws import STIFFNESS
+from heptarm.sim.controller.command import ConditionWatch, MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.world import Box
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
+from tests.sim import motions
 from tests.sim.driving import READY, ready, run
 
 #: The flange points down.
@@ -42,9 +43,7 @@ def touched(speed: float, *, until: float) -> tuple[Plant, Array]:
         WrenchAbove(frame=FLANGE, components=ALL, threshold=until), lambda: None, breaks=True
     )
     down = (0.0, 0.0, -0.1, 0.0, 0.0, 0.0, 1.0)
-    plant.submit(
-        Order(1, "lin_rel", offset=down, reference=(0, 0, 0, 1), cart_velocity=speed, watches=(watch,))
-    )
+    plant.submit(MotionCommand(1, motions.lin_rel(down, (0, 0, 0, 1), velocity=speed), watches=(watch,)))
     forces = []
     while not plant.idle:
         plant.tick()
@@ -116,7 +115,7 @@ def test_a_contact_ends_its_motion_soon() -> None:
 
 def test_a_compliant_hold_relaxes_a_contact_for_good() -> None:
     plant, forces = touched(0.05, until=20.0)
-    run(plant, Order(2, "hold", duration=0.2, mode=JointImpedance(1000.0, damping=1.0)))
+    run(plant, MotionCommand(2, motions.hold(0.2), mode=JointImpedance(1000.0, damping=1.0)))
     plant.step(500)
     assert float(np.linalg.norm(plant.snapshot.wrench[:3])) < 0.3 * forces[-1]
 

@@ -9,21 +9,23 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
 
 HERE = np.array(READY)
 NAN = math.nan
+KINDS = {"hold": motions.hold(), "servo": motions.servo(), "direct": motions.direct()}
 COMPLIANT = CartesianImpedance((500.0, 500.0, 500.0, 100.0, 100.0, 100.0), frame="base")
 
 
 def holding(mode: Any, *, duration: float = NAN, **terms: Any) -> tuple[Plant, Ear]:
     plant, ear = ready(), Ear()
-    plant.submit(Order(7, "hold", duration=duration, mode=mode, listener=ear, **terms))
+    plant.submit(MotionCommand(7, motions.hold(duration), mode=mode, listener=ear, **terms))
     plant.step(2)
     return plant, ear
 
@@ -49,7 +51,7 @@ def deviated(plant: Plant) -> Any:
 @pytest.mark.parametrize("kind", ["hold", "servo", "direct"])
 def test_a_push_moves_the_hand_by_force_over_stiffness(kind: str) -> None:
     plant = ready()
-    plant.submit(Order(7, kind, mode=COMPLIANT))
+    plant.submit(MotionCommand(7, KINDS[kind], mode=COMPLIANT))
     plant.apply_wrench((10.0, -15.0, 20.0))
     plant.step(1500)
     assert deviated(plant) == pytest.approx(np.array([10.0, -15.0, 20.0]) / 500.0, rel=0.02)
@@ -90,7 +92,9 @@ def test_an_exceeded_limit_stops_the_arm_and_the_order_reports_which(
     kind: str, limits: dict[str, Any], text: str
 ) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(7, kind, mode=CartesianImpedance(COMPLIANT.stiffness, **limits), listener=ear))
+    plant.submit(
+        MotionCommand(7, KINDS[kind], mode=CartesianImpedance(COMPLIANT.stiffness, **limits), listener=ear)
+    )
     plant.apply_wrench((0.0, 5.0, 0.0))
     plant.step(800)
     assert ear.causes == ["started"], "a smaller push does not"
@@ -104,7 +108,7 @@ def test_an_exceeded_limit_stops_the_arm_and_the_order_reports_which(
     assert np.abs(tip(plant).xyz - caught).max() < 1e-3, "it is stiff now, though it is still pushed"
     assert np.abs(plant.snapshot.dq).max() < 1e-3
     assert ticks < 600
-    plant.submit(Order(8, "ptp", joints=READY, listener=ear))
+    plant.submit(MotionCommand(8, motions.ptp(READY), listener=ear))
     to_rest(plant)
     assert ear.causes[-1] == "done"
 
@@ -142,7 +146,7 @@ def test_an_overlaid_force_swings_the_hand_as_far_as_the_dynamics_let_it() -> No
 
 def test_parameters_change_while_a_servo_motion_runs_and_the_kind_does_not() -> None:
     plant = ready()
-    plant.submit(Order(7, "servo", mode=COMPLIANT))
+    plant.submit(MotionCommand(7, motions.servo(), mode=COMPLIANT))
     plant.apply_wrench((0.0, 10.0, 0.0))
     plant.step(1200)
     assert deviated(plant)[1] == pytest.approx(0.02, rel=0.02)
@@ -168,9 +172,11 @@ def test_parameters_change_while_a_servo_motion_runs_and_the_kind_does_not() -> 
 def test_modes_follow_each_other_without_a_blow(then: Any) -> None:
     plant, ear = ready(), Ear()
     plant.apply_wrench((0.0, 10.0, 0.0))
-    plant.submit(Order(1, "hold", duration=1.0, mode=COMPLIANT))
+    plant.submit(MotionCommand(1, motions.hold(1.0), mode=COMPLIANT))
     slowly = (0.2,) * 7
-    plant.submit(Order(2, "ptp", joints=tuple(HERE + 0.1), joint_velocity=slowly, mode=then, listener=ear))
+    plant.submit(
+        MotionCommand(2, motions.ptp(tuple(HERE + 0.1), joint_velocity=slowly), mode=then, listener=ear)
+    )
     fastest = 0.0
     while not plant.idle:
         plant.tick()

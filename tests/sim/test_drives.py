@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.drive_monitor import BEYOND, LAG, SPEED, TORQUE, TORQUE_TICKS, DriveMonitor
 from heptarm.sim.plant.plant import Plant
@@ -15,6 +15,7 @@ from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import Mode
 from heptarm.values.pose import deg
 from heptarm.values.robot import ROBOTS, RobotModel
+from tests.sim import motions
 from tests.sim.driving import Ear
 
 NOTHING = np.zeros(7)
@@ -95,7 +96,9 @@ def test_a_drive_trips_and_recovers(
 ) -> None:
     plant, ear = Plant("iiwa14", q=tuple(deg(0, 30, 0, -90, 0, a6, 0).tolist())), Ear()
     plant.submit(
-        Order(1, "hold", listener=ear) if mode is None else Order(1, "hold", mode=mode, listener=ear)
+        MotionCommand(1, motions.hold(), listener=ear)
+        if mode is None
+        else MotionCommand(1, motions.hold(), mode=mode, listener=ear)
     )
     for tick in range(3000):
         push(plant, tick)
@@ -114,14 +117,14 @@ def test_a_drive_trips_and_recovers(
     plant.step(300)
     assert not plant.safety.stop_requests and np.abs(plant.snapshot.q - stood).max() < 0.01
     again, home = Ear(), deg(0, 20, 0, -80, 0, 50, 0)
-    plant.submit(Order(2, "ptp", joints=tuple(home.tolist()), listener=again))
+    plant.submit(MotionCommand(2, motions.ptp(tuple(home.tolist())), listener=again))
     plant.step(3000)
     assert again.causes == ["started", "done"] and plant.snapshot.q == pytest.approx(home, abs=1e-3)
 
 
 def test_drives_trip_unless_that_is_switched_off() -> None:
     plant = Plant("iiwa14", monitored=False)
-    plant.submit(Order(1, "hold", mode=JointImpedance(0.0)))
+    plant.submit(MotionCommand(1, motions.hold(), mode=JointImpedance(0.0)))
     plant.step(5)
     plant.apply_wrench((400.0, 0.0, 0.0))
     plant.step(100)

@@ -11,14 +11,16 @@ import pytest
 
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import jacobian
-from heptarm.planning.command import Order, PlanError
 from heptarm.planning.jerk_profile import ProfileLimits, brake, change
+from heptarm.planning.motion import PlanError
 from heptarm.planning.path import CartesianPath
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.sim.controller import queue as queue_module
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
 
 THERE = (0.8, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2)
@@ -29,10 +31,10 @@ REST = (0.0, 0.0, 0.0)
 
 def test_an_order_right_after_a_stop_is_not_stopped() -> None:
     plant, first, second = ready(), Ear(), Ear()
-    plant.submit(Order(1, "ptp", joints=THERE, listener=first))
+    plant.submit(MotionCommand(1, motions.ptp(THERE), listener=first))
     plant.step(200)
     plant.stop()
-    plant.submit(Order(2, "ptp", joints=READY, listener=second))
+    plant.submit(MotionCommand(2, motions.ptp(READY), listener=second))
     run(plant)
     assert first.causes == ["started", "cancelled"] and second.causes == ["started", "done"]
 
@@ -56,26 +58,26 @@ def test_a_motion_of_next_to_no_length_can_be_braked_at_any_time(travel: float) 
 @pytest.mark.parametrize("travel", [1e-9, 1e-6, 1e-3, 0.2])
 def test_a_ptp_of_any_length_ends(travel: float) -> None:
     plant, ear = ready(), Ear()
-    run(plant, Order(1, "ptp", joints=(travel, *READY[1:]), listener=ear))
+    run(plant, MotionCommand(1, motions.ptp((travel, *READY[1:])), listener=ear))
     assert ear.causes == ["started", "done"]
 
 
 @pytest.mark.parametrize(
     "order",
     [
-        Order(1, "ptp", joints=THERE, joint_velocity=(0.0,) * 7),
-        Order(1, "ptp", joints=THERE, joint_jerk=(nan,) * 7),
-        Order(1, "ptp", joints=THERE, joint_acceleration=(1.5,) * 7),
-        Order(1, "ptp", joints=(nan,) * 7),
-        Order(1, "ptp", pose=(0.4, 0.0, 0.4, 0.0, 0.0, 0.0, 2.0)),
-        Order(1, "ptp", pose=(nan, 0.0, 0.4, 0.0, 1.0, 0.0, 0.0)),
-        Order(1, "ptp", pose=(0.4, 0.0, 0.4, 0.0, 1.0, 0.0, 0.0), redundancy=(0.0, 9, -1)),
-        Order(1, "lin_rel", offset=LINE, reference=BASE, cart_velocity=0.0),
-        Order(1, "lin_rel", offset=LINE, reference=BASE, ori_jerk=inf),
-        Order(1, "lin_rel", offset=(0.0, nan, 0.0, 0.0, 0.0, 0.0, 1.0), reference=BASE),
+        MotionCommand(1, motions.ptp(THERE, joint_velocity=(0.0,) * 7)),
+        MotionCommand(1, motions.ptp(THERE, joint_jerk=(inf,) * 7)),
+        MotionCommand(1, motions.ptp(THERE, joint_acceleration=(1.5,) * 7)),
+        MotionCommand(1, motions.ptp((nan,) * 7)),
+        MotionCommand(1, motions.ptp_pose((0.4, 0.0, 0.4, 0.0, 0.0, 0.0, 2.0))),
+        MotionCommand(1, motions.ptp_pose((nan, 0.0, 0.4, 0.0, 1.0, 0.0, 0.0))),
+        MotionCommand(1, motions.ptp_pose((0.4, 0.0, 0.4, 0.0, 1.0, 0.0, 0.0), redundancy=(0.0, 9, -1))),
+        MotionCommand(1, motions.lin_rel(LINE, BASE, velocity=0.0)),
+        MotionCommand(1, motions.lin_rel(LINE, BASE, orientation_jerk=inf)),
+        MotionCommand(1, motions.lin_rel((0.0, nan, 0.0, 0.0, 0.0, 0.0, 1.0), BASE)),
     ],
 )
-def test_values_that_make_no_sense_are_refused_as_plans(order: Order) -> None:
+def test_values_that_make_no_sense_are_refused_as_plans(order: MotionCommand) -> None:
     plant = ready()
     with pytest.raises(PlanError):
         plant.submit(order)
@@ -85,7 +87,7 @@ def test_values_that_make_no_sense_are_refused_as_plans(order: Order) -> None:
 
 def test_pausing_and_resuming_keep_the_axes_limits() -> None:
     plant = ready()
-    plant.submit(Order(1, "ptp", joints=(1.4, *READY[1:])))
+    plant.submit(MotionCommand(1, motions.ptp((1.4, *READY[1:]))))
     seen = []
     for tick in range(2000):
         if tick in (300, 450, 900):
@@ -101,7 +103,7 @@ def test_pausing_and_resuming_keep_the_axes_limits() -> None:
 
 def test_cancelling_while_the_override_changes_does_not_jump() -> None:
     plant = ready()
-    plant.submit(Order(1, "ptp", joints=(1.4, *READY[1:])))
+    plant.submit(MotionCommand(1, motions.ptp((1.4, *READY[1:]))))
     seen = []
     for tick in range(1200):
         if tick == 300:
@@ -117,7 +119,7 @@ def test_cancelling_while_the_override_changes_does_not_jump() -> None:
 @pytest.mark.parametrize("override", [-1.0, 7.0, nan])
 def test_an_override_out_of_range_does_no_harm(override: float) -> None:
     plant = ready()
-    plant.submit(Order(1, "ptp", joints=THERE))
+    plant.submit(MotionCommand(1, motions.ptp(THERE)))
     plant.step(100)
     plant.override = override
     before = plant.snapshot.q_cmd
@@ -131,7 +133,7 @@ def test_a_path_that_fails_under_way_brakes_the_axes_and_reports_why(
     how: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "lin_rel", offset=LINE, reference=BASE, listener=ear))
+    plant.submit(MotionCommand(1, motions.lin_rel(LINE, BASE), listener=ear))
     sound = CartesianPath.at
 
     def broken(self: CartesianPath, s: float, near: Array) -> Array:
@@ -145,22 +147,22 @@ def test_a_path_that_fails_under_way_brakes_the_axes_and_reports_why(
     assert ("too far" if how == "lost" else "violates limit") in ear.heard[-1][1]
     assert (np.abs(np.diff(track.q_cmd, axis=0)) * 1e3 <= plant.robot.dq_max).all()
     assert np.abs(plant.snapshot.dq).max() < 2e-3
-    run(plant, Order(2, "ptp", joints=READY, listener=(after := Ear())))
+    run(plant, MotionCommand(2, motions.ptp(READY), listener=(after := Ear())))
     assert after.causes == ["started", "done"]
 
 
 def test_the_tick_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "ptp", joints=(0.05, *READY[1:]), listener=ear))
+    plant.submit(MotionCommand(1, motions.ptp((0.05, *READY[1:])), listener=ear))
     planning, go_on = threading.Event(), threading.Event()
 
-    def slow(*arguments: object) -> Plan:
+    def slow(*arguments: object, **tcp: object) -> Plan:
         planning.set()
         assert go_on.wait(60)
-        return plan(*arguments)  # type: ignore[arg-type]
+        return plan(*arguments, **tcp)  # type: ignore[arg-type]
 
     monkeypatch.setattr(queue_module, "plan", slow)
-    other = threading.Thread(target=plant.submit, args=(Order(2, "ptp", joints=READY),))
+    other = threading.Thread(target=plant.submit, args=(MotionCommand(2, motions.ptp(READY)),))
     other.start()
     assert planning.wait(60)
     began = time.monotonic()

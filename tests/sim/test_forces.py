@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
+from tests.sim import motions
 from tests.sim.driving import ready
 
 
@@ -51,7 +52,7 @@ def test_the_floor_pushes_back() -> None:
     assert np.abs(plant.snapshot.wrench).max() < 1e-9
     height = float(forward(plant.robot, plant.snapshot.q)[2, 3])
     down = (0.0, 0.0, -height - 0.01, 0.0, 0.0, 0.0, 1.0)
-    plant.submit(Order(1, "lin_rel", offset=down, reference=(0, 0, 0, 1), cart_velocity=0.2))
+    plant.submit(MotionCommand(1, motions.lin_rel(down, (0, 0, 0, 1), velocity=0.2)))
     for _ in range(6000):
         plant.tick()
         if plant.snapshot.wrench[2] > 20.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm._library import Unavailable
-from heptarm.planning.command import Order
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
+from tests.sim import motions
 from tests.sim.driving import READY
 
 try:
@@ -24,14 +26,14 @@ except Unavailable as reason:
     pytest.skip(f"no compiled part: {reason}", allow_module_level=True)
 
 FAR, NEAR = (0.8, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8), (0.1, 0.5, 0.0, -1.3, 0.0, 0.9, 0.001)
-BATCH = Order(1, "batch", parts=tuple(Order(1, "ptp", joints=one) for one in (FAR, NEAR)))
+BATCH = MotionCommand(1, motions.batch(*(motions.ptp(one) for one in (FAR, NEAR))))
 #: What can happen during a motion.
 EVENTS: dict[str, Callable[[Plant], object]] = {
     "pause": Plant.pause,
     "resume": Plant.resume,
     "stop": Plant.stop,
     "stop fast": Plant.stop_fast,
-    "another motion": lambda plant: plant.submit(Order(2, "ptp", joints=NEAR)),
+    "another motion": lambda plant: plant.submit(MotionCommand(2, motions.ptp(NEAR))),
     "slower": lambda plant: setattr(plant, "override", 0.4),
     "faster": lambda plant: setattr(plant, "override", 1.0),
     "slower by hand": lambda plant: setattr(plant.safety, "manual", 0.6),
@@ -54,11 +56,11 @@ class Parts:
         self.ticks.append(self._plant.tick_count)
 
 
-def moving(order: Order) -> tuple[Plant, Parts]:
+def moving(order: MotionCommand) -> tuple[Plant, Parts]:
     """A plant with a motion, and what it reports."""
     plant = Plant("iiwa14", q=READY)
     parts = Parts(plant)
-    plant.submit(Order(order.id, order.kind, parts=order.parts, joints=order.joints, part_listener=parts))
+    plant.submit(replace(order, part_listener=parts))
     return plant, parts
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import jacobian
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.motion.hand_guiding import HandGuide, hand_guide
+from tests.sim import motions
 from tests.sim.driving import Ear, ready, run
 
 NAN = np.nan
@@ -24,7 +25,7 @@ QUICK: dict[str, Any] = {"joint_velocity": 2.0, "cartesian_velocity": 2.0}
 def begun(guide: HandGuide | None = None, *, model: str = "iiwa14") -> tuple[Plant, Ear]:
     """An arm that is guided by hand."""
     plant, ear = ready(model), Ear()
-    plant.submit(Order(1, "guide", guide=guide or hand_guide(), listener=ear))
+    plant.submit(MotionCommand(1, motions.guide(guide or hand_guide()), listener=ear))
     plant.safety.guide()
     plant.step(50)
     return plant, ear
@@ -59,7 +60,7 @@ def one(axis: int, value: float) -> list[float]:
 def test_it_waits_until_the_switch_is_held_and_does_not_sink() -> None:
     plant, ear = ready(), Ear()
     start = plant.snapshot.q
-    plant.submit(Order(1, "guide", guide=hand_guide(), listener=ear))
+    plant.submit(MotionCommand(1, motions.guide(hand_guide()), listener=ear))
     plant.step(100)
     plant.apply_wrench(SIDEWAYS)
     plant.step(300)
@@ -164,7 +165,7 @@ def test_without_limits_of_its_own_it_is_bounded(force: tuple[float, ...]) -> No
 @pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 60.0)])
 def test_floating_joints_are_damped_and_bounded(force: tuple[float, ...]) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "hold", duration=10.0, mode=JointImpedance(0.0, damping=0.0), listener=ear))
+    plant.submit(MotionCommand(1, motions.hold(10.0), mode=JointImpedance(0.0, damping=0.0), listener=ear))
     plant.step(50)
     _, dq = push_along(plant, force, 2.0)
     fastest = np.abs(dq)
@@ -179,7 +180,7 @@ def test_reduced_speed_in_t1() -> None:
     plant.safety.choose(plant.safety.mode.T1)
     plant.safety.guide()
     plant.resume()
-    plant.submit(Order(1, "guide", guide=hand_guide(), listener=ear))
+    plant.submit(MotionCommand(1, motions.guide(hand_guide()), listener=ear))
     plant.step(50)
     q, dq = push_along(plant, (0.0, 0.0, 40.0), 1.0)
     speeds = [
@@ -229,7 +230,7 @@ def test_errors_end_it_at_rest() -> None:
 def test_what_comes_behind_it_begins_where_it_was_led_to() -> None:
     plant, ear = begun()
     after = Ear()
-    plant.submit(Order(2, "ptp", joints=(0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0), listener=after))
+    plant.submit(MotionCommand(2, motions.ptp((0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)), listener=after))
     push_along(plant, SIDEWAYS, 0.5)
     plant.safety.let_go()
     track = run(plant)

@@ -10,6 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model
+from heptarm.arm.translate.motions import item
 from heptarm.planning.lookahead import FramesOfArm, PlannedProgram, look_ahead
 from heptarm.values.arrays import Array
 from heptarm.values.motion.motion import Motion
@@ -26,7 +27,7 @@ FRAMES = FramesOfArm(
 
 
 def ahead(*motions: Motion, step: float = 0.01) -> PlannedProgram:
-    return look_ahead(IIWA, HOME, motions, FRAMES, step=step)
+    return look_ahead(IIWA, HOME, [item(motion, IIWA) for motion in motions], FRAMES, step=step)
 
 
 def places(program: PlannedProgram) -> Array:
@@ -132,7 +133,7 @@ def test_a_line_across_a_limit_names_the_limit(start: tuple[float, ...], axis: i
     q = deg(*start)
     goal = Pose.from_matrix(model.forward(IIWA, q + np.radians(turn) * np.eye(7)[axis - 1]))
     with pytest.raises(ha.LimitError, match=f"limit A{axis} on the path"):
-        look_ahead(IIWA, q, [ha.lin(goal)], frames, step=0.01)
+        look_ahead(IIWA, q, [item(ha.lin(goal), IIWA)], frames, step=0.01)
 
 
 def test_of_two_obstacles_on_a_line_the_first_is_named() -> None:
@@ -143,7 +144,7 @@ def test_of_two_obstacles_on_a_line_the_first_is_named() -> None:
     turned = Pose.from_matrix(model.forward(IIWA, q + np.radians(60) * np.eye(7)[5]))
     goal = Pose.of(flange[:3, 3] + [0.9, 0, 0.9], turned.quat)
     with pytest.raises(ha.LimitError, match="limit A6 on the path"):
-        look_ahead(IIWA, q, [ha.lin(goal)], frames, step=0.01)
+        look_ahead(IIWA, q, [item(ha.lin(goal), IIWA)], frames, step=0.01)
 
 
 def test_a_line_through_a_singularity_is_refused() -> None:
@@ -152,7 +153,7 @@ def test_a_line_through_a_singularity_is_refused() -> None:
     )  # the line passes over the base, where A1 and A3 would have to jump
     frames = FramesOfArm(lambda name: Pose.at(), lambda name: None)
     with pytest.raises(ha.CommandRejected, match="singularity|not reachable|would have to jump"):
-        look_ahead(IIWA, stretched, [ha.lin_rel(x=-0.5)], frames, step=0.01)
+        look_ahead(IIWA, stretched, [item(ha.lin_rel(x=-0.5), IIWA)], frames, step=0.01)
 
 
 def test_it_needs_neither_java_nor_mujoco() -> None:

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from heptarm._library import SWITCH, Unavailable
-from heptarm.planning.command import Order
-from heptarm.planning.native_inverse import inverse_library
 from heptarm.planning.seam import StateWords
 from heptarm.planning.table import ahead_library
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant import native
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
+from tests.sim import motions
 from tests.sim.driving import READY
 from tests.sim.plant_scripts import PLANT_SCRIPTS
 
@@ -49,12 +49,10 @@ def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         with monkeypatch.context() as patched:
             patched.setenv(SWITCH, "1")
             tick_library.cache_clear()
-            inverse_library.cache_clear()
             ahead_library.cache_clear()
             yield
     finally:
         tick_library.cache_clear()
-        inverse_library.cache_clear()
         ahead_library.cache_clear()
 
 
@@ -97,7 +95,7 @@ def test_a_mujoco_that_does_not_show_its_functions_is_called_from_python(
 
 def test_a_motion_in_position_control_is_computed_in_c_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     plant = Plant("iiwa14", q=READY)
-    plant.submit(Order(1, "ptp", joints=tuple(q + 0.1 for q in READY)))
+    plant.submit(MotionCommand(1, motions.ptp(tuple(q + 0.1 for q in READY))))
     with monkeypatch.context() as patched:
         for name in ("mj_step1", "mj_step2", "mj_step"):
             patched.setattr(mujoco, name, _refuse)

@@ -10,10 +10,11 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning.motion import FARTHEST, SLOWEST, PlanError
 from heptarm.planning.planner import plan
-from heptarm.planning.targets import FARTHEST, SLOWEST
+from heptarm.planning.seam import PlantMotion
 from heptarm.values.robot import robot
+from tests.sim import motions
 from tests.sim.driving import READY as HOME
 
 ROBOT = robot("iiwa14")
@@ -26,32 +27,30 @@ places = st.tuples(numbers, numbers, numbers).map(lambda xyz: (*xyz, 0.0, 0.0, 0
 
 
 @st.composite
-def orders(draw: st.DrawFn) -> Order:
-    kind = draw(st.sampled_from(["lin_rel", "circ", "ptp"]))
+def moves(draw: st.DrawFn) -> PlantMotion:
+    kind = draw(st.sampled_from(["lin_rel", "circ", "ptp_pose"]))
     given: dict[str, Any] = {
         name: (draw(fractions),) * 7 for name in ("joint_velocity", "joint_acceleration", "joint_jerk")
     }
-    given |= {
-        name: draw(speeds) for name in ("cart_velocity", "cart_acceleration", "cart_jerk", "ori_velocity")
-    }
+    given |= {name: draw(speeds) for name in ("velocity", "acceleration", "jerk", "orientation_velocity")}
     given["blending"] = (draw(st.sampled_from([0.0, 1e-300, 1.0])), 0.0, 0.0)
     if kind == "lin_rel":
-        given |= {"offset": draw(places), "reference": (0.0, 0.0, 0.0, 1.0)}
-    else:
-        given |= {"pose": draw(places), "via": draw(places)}
-    return Order(1, kind, **given)
+        return motions.lin_rel(draw(places), (0.0, 0.0, 0.0, 1.0), **given)
+    if kind == "circ":
+        return motions.circ(draw(places), draw(places), **given)
+    return motions.ptp_pose(draw(places), **given)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(st.lists(orders(), min_size=1, max_size=2))
-@example([Order(1, "lin_rel", offset=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0), cart_velocity=5e-324)])
-@example([Order(1, "ptp", joints=(0.1,) * 7, joint_velocity=(5e-324,) * 7)])
-@example([Order(1, "lin_rel", offset=(1e300, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))])
-def test_every_plan_is_finite(parts: list[Order]) -> None:
+@given(st.lists(moves(), min_size=1, max_size=2))
+@example([motions.lin_rel((0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0), velocity=5e-324)])
+@example([motions.ptp((0.1,) * 7, joint_velocity=(5e-324,) * 7)])
+@example([motions.lin_rel((1e300, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))])
+def test_every_plan_is_finite(parts: list[PlantMotion]) -> None:
     """A refusal, or a plan without NaN; NumPy's warnings are errors in tests."""
-    order = parts[0] if len(parts) == 1 else Order(1, "batch", parts=tuple(parts))
+    motion = parts[0] if len(parts) == 1 else motions.batch(*parts)
     try:
-        made = plan(ROBOT, order, READY)
+        made = plan(ROBOT, motion, READY)
     except PlanError:
         return
     assert isfinite(made.duration)
@@ -63,13 +62,8 @@ def test_every_plan_is_finite(parts: list[Order]) -> None:
 def test_a_tiny_jerk_needs_no_large_memory() -> None:
     """The acceleration then takes minutes to come and go; that must not be sampled every millisecond."""
     turn = np.array([0.3, 0.0, 0.0, 0.2, 0.0, 0.4, 0.0])
-    line = Order(
-        1,
-        "lin_rel",
-        offset=(0.0, 0.2, -0.1, 0.0, 0.0, 0.0, 1.0),
-        reference=(0.0, 0.0, 0.0, 1.0),
-        cart_acceleration=100.0,
-        joint_jerk=(1e-4,) * 7,
+    line = motions.lin_rel(
+        (0.0, 0.2, -0.1, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), acceleration=100.0, joint_jerk=(1e-4,) * 7
     )
     tracemalloc.start()
     try:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from heptarm.planning import seam
-from heptarm.planning.command import Order
 from heptarm.planning.seam import OperationMode, SafetyFlags, StateWords
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.operator import WORDS, SimulatedOperator, timed, understood
@@ -107,7 +107,7 @@ def test_errors_end_what_runs_off_its_path(words: str, text: str) -> None:
     plant.resume()
     while not plant.idle:
         plant.tick()
-    plant.submit(Order(2, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    plant.submit(MotionCommand(2, KINDS["ptp"].motion, listener=ear))
     for _ in range(400):
         plant.tick()
     fast = np.abs(plant.speed).max()

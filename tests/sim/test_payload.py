@@ -8,11 +8,12 @@ import pytest
 
 from heptarm.model import dynamics
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import Body, symmetric
+from tests.sim import motions
 from tests.sim.driving import READY, Ear
 
 G = 9.81
@@ -92,7 +93,9 @@ def test_a_spring_sags_by_the_weight_it_does_not_know() -> None:
     sag = []
     for load in (NOTHING, LOAD):
         plant = held(hanging=load)
-        plant.submit(Order(1, "hold", mode=JointImpedance(stiffness, damping=0.7), listener=Ear()))
+        plant.submit(
+            MotionCommand(1, motions.hold(), mode=JointImpedance(stiffness, damping=0.7), listener=Ear())
+        )
         plant.step(2000)
         sag.append(plant.snapshot.q - np.array(READY))
     expected = dynamics.gravity(plant.robot, plant.snapshot.q) - dynamics.gravity(
@@ -105,7 +108,7 @@ def test_a_spring_sags_by_the_weight_it_does_not_know() -> None:
 @pytest.mark.parametrize("which", [LOAD, NOTHING])
 def test_the_simulated_dynamics_are_those_of_the_model_with_the_load(which: Body) -> None:
     plant = held(declared=which)
-    plant.submit(Order(1, "ptp", joints=(0.3, 0.7, 0.1, -1.1, 0.2, 0.8, 0.3), listener=Ear()))
+    plant.submit(MotionCommand(1, motions.ptp((0.3, 0.7, 0.1, -1.1, 0.2, 0.8, 0.3)), listener=Ear()))
     plant.step(150)
     mass = np.zeros((plant.model.nv, plant.model.nv))
     mujoco.mj_fullM(plant.model, plant.data, mass)

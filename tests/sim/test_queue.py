@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
 
 THERE = (0.8, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2)
@@ -20,7 +21,7 @@ def test_three_orders_run_one_after_the_other() -> None:
     plant, ears = ready(), [Ear(), Ear(), Ear()]
     goals = [THERE, READY, (0.2, *READY[1:])]
     for index, (goal, ear) in enumerate(zip(goals, ears, strict=True)):
-        plant.submit(Order(index + 1, "ptp", joints=goal, listener=ear))
+        plant.submit(MotionCommand(index + 1, motions.ptp(goal), listener=ear))
     order = []
     while not plant.idle:
         plant.tick()
@@ -33,15 +34,15 @@ def test_three_orders_run_one_after_the_other() -> None:
 
 def test_an_order_is_planned_from_the_end_of_the_one_before_it() -> None:
     plant = ready()
-    plant.submit(Order(1, "ptp", joints=THERE))
-    track = run(plant, Order(2, "lin_rel", offset=(0, 0, 0.05, 0, 0, 0, 1)))
+    plant.submit(MotionCommand(1, motions.ptp(THERE)))
+    track = run(plant, MotionCommand(2, motions.lin_rel((0, 0, 0.05, 0, 0, 0, 1))))
     assert np.abs(np.diff(track.q_cmd, axis=0)).max() * 1e3 <= plant.robot.dq_max.max()
 
 
 @pytest.mark.parametrize("ticks", [1, 60, 200, 420])
 def test_cancelling_brakes_on_the_path_within_the_limits(ticks: int) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "ptp", joints=THERE, listener=ear))
+    plant.submit(MotionCommand(1, motions.ptp(THERE), listener=ear))
     plant.step(ticks)
     plant.cancel(1)
     track = run(plant)
@@ -56,7 +57,7 @@ def test_cancelling_brakes_on_the_path_within_the_limits(ticks: int) -> None:
 def test_cancelling_everything_drops_what_waits() -> None:
     plant, ears = ready(), [Ear(), Ear()]
     for index, ear in enumerate(ears):
-        plant.submit(Order(index + 1, "ptp", joints=(THERE, READY)[index], listener=ear))
+        plant.submit(MotionCommand(index + 1, motions.ptp((THERE, READY)[index]), listener=ear))
     plant.step(100)
     plant.stop()
     run(plant)
@@ -66,7 +67,7 @@ def test_cancelling_everything_drops_what_waits() -> None:
 def test_a_waiting_order_that_is_cancelled_leaves_its_followers_sound() -> None:
     plant, ears = ready(), [Ear(), Ear(), Ear()]
     for index, goal in enumerate((THERE, (-0.5, *READY[1:]), READY)):
-        plant.submit(Order(index + 1, "ptp", joints=goal, listener=ears[index]))
+        plant.submit(MotionCommand(index + 1, motions.ptp(goal), listener=ears[index]))
     plant.step(50)
     plant.cancel(2)
     track = run(plant)
@@ -77,11 +78,11 @@ def test_a_waiting_order_that_is_cancelled_leaves_its_followers_sound() -> None:
 
 def test_an_order_given_while_the_arm_brakes_is_planned_when_it_rests() -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "ptp", joints=THERE))
+    plant.submit(MotionCommand(1, motions.ptp(THERE)))
     plant.step(200)
     plant.cancel(1)
-    plant.submit(Order(2, "ptp", joints=READY, listener=ear))
-    plant.submit(Order(3, "ptp", joints=(0, 3.0, 0, 0, 0, 0, 0), listener=(bad := Ear())))
+    plant.submit(MotionCommand(2, motions.ptp(READY), listener=ear))
+    plant.submit(MotionCommand(3, motions.ptp((0, 3.0, 0, 0, 0, 0, 0)), listener=(bad := Ear())))
     run(plant)
     assert ear.causes == ["started", "done"]
     assert bad.causes == ["error"] and "violates limit A2" in bad.heard[0][1]
@@ -89,7 +90,7 @@ def test_an_order_given_while_the_arm_brakes_is_planned_when_it_rests() -> None:
 
 def test_pausing_keeps_the_order_and_resuming_finishes_it() -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "ptp", joints=THERE, listener=ear))
+    plant.submit(MotionCommand(1, motions.ptp(THERE), listener=ear))
     plant.step(200)
     plant.pause()
     plant.step(500)
@@ -108,7 +109,7 @@ def test_the_override_slows_down_what_runs() -> None:
         plant = ready()
         plant.override = override
         plant.step(400)  # the override slews
-        lengths.append(len(run(plant, Order(1, "ptp", joints=THERE)).q))
+        lengths.append(len(run(plant, MotionCommand(1, motions.ptp(THERE))).q))
     assert lengths[1] == pytest.approx(lengths[0] / 0.3, rel=0.1)
 
 
@@ -116,7 +117,7 @@ def test_a_stop_comes_to_rest_at_any_instant_and_within_its_time() -> None:
     random = np.random.default_rng(0)
     for _ in range(20):
         plant = ready()
-        plant.submit(Order(1, "lin_rel", offset=(0.05, 0.25, 0.05, 0, 0, 0, 1), reference=(0, 0, 0, 1)))
+        plant.submit(MotionCommand(1, motions.lin_rel((0.05, 0.25, 0.05, 0, 0, 0, 1), (0, 0, 0, 1))))
         plant.step(int(random.integers(1, 900)))
         plant.stop()
         for _ in range(700):

@@ -11,8 +11,8 @@ import pytest
 
 from heptarm.fri.protocol.version import Version
 from heptarm.planning import seam
-from heptarm.planning.command import Order
 from heptarm.planning.seam import SLOTS, HeaderWords, StateWords
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import SharedState
@@ -20,6 +20,7 @@ from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
 from heptarm.sim.runtime.rest import AWAKE, LONGEST, Rest
 from heptarm.values.robot import Body
+from tests.sim import motions
 from tests.sim.driving import ready
 
 
@@ -63,8 +64,8 @@ def rested(plant: Plant, *, ticks: int = 3000) -> tuple[Rest, Timers, SimulatedO
     raise AssertionError("the plant does not come to rest")
 
 
-def _motion() -> Order:
-    return Order(1, "ptp", joints=(0.2, 0.5, 0.0, -1.2, 0.0, 0.9, 0.2))
+def _motion() -> MotionCommand:
+    return MotionCommand(1, motions.ptp((0.2, 0.5, 0.0, -1.2, 0.0, 0.9, 0.2)))
 
 
 def test_time_passes_at_rest_and_the_next_tick_continues() -> None:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.planning.command import Order
 from heptarm.planning.seam import SLOTS, OperationMode, SafetyFlags, StateWords
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.interpolator import REDUCED_SPEED
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
 from tests.sim.ideal import KINDS, LINE, begin, stopping_time
 
@@ -77,7 +78,7 @@ def test_two_requests_both_have_to_go() -> None:
 @pytest.mark.parametrize("asked", STOPS)
 def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(asked: StopRequest) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    plant.submit(MotionCommand(1, KINDS["ptp"].motion, listener=ear))
     plant.step(500)
     speed = np.abs(plant.snapshot.dq).max()
     plant.safety.request_stop(asked)
@@ -97,7 +98,7 @@ def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(asked
     plant.resume()
     run(plant)
     assert ear.causes == ["started", "done"]
-    assert np.abs(plant.snapshot.q - KINDS["ptp"].joints).max() < 1e-4
+    assert np.abs(plant.snapshot.q - KINDS["ptp"].motion.q).max() < 1e-4
     assert flags(plant) & SafetyFlags.BRAKES_OPEN
 
 
@@ -144,7 +145,7 @@ def _distance(travel: Array, place: Array) -> float:
 
 def test_brakes_hold_a_compliant_arm_against_a_push() -> None:
     plant = ready()
-    plant.submit(Order(1, "hold", mode=JointImpedance(50.0)))
+    plant.submit(MotionCommand(1, motions.hold(), mode=JointImpedance(50.0)))
     plant.step(100)
     plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     plant.step(500)
@@ -167,7 +168,7 @@ def test_brakes_hold_a_compliant_arm_against_a_push() -> None:
 def test_what_waits_begins_after_the_stop_only() -> None:
     plant, ear = ready(), Ear()
     plant.safety.request_stop(StopRequest.OPERATOR_SAFETY)
-    plant.submit(Order(1, "ptp", joints=(0.1, *READY[1:]), listener=ear))
+    plant.submit(MotionCommand(1, motions.ptp((0.1, *READY[1:])), listener=ear))
     plant.step(200)
     assert ear.causes == []
     plant.safety.withdraw()
@@ -178,8 +179,8 @@ def test_what_waits_begins_after_the_stop_only() -> None:
 
 def test_a_motion_can_be_cancelled_during_a_stop() -> None:
     plant, ear, next_ear = ready(), Ear(), Ear()
-    plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
-    plant.submit(Order(2, "ptp", joints=READY, listener=next_ear))
+    plant.submit(MotionCommand(1, KINDS["ptp"].motion, listener=ear))
+    plant.submit(MotionCommand(2, motions.ptp(READY), listener=next_ear))
     plant.step(400)
     plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     plant.step(40)
@@ -188,7 +189,7 @@ def test_a_motion_can_be_cancelled_during_a_stop() -> None:
     assert plant.idle and ear.causes == ["started", "cancelled"] and next_ear.causes == ["cancelled"]
     plant.safety.withdraw()
     plant.resume()
-    run(plant, Order(3, "ptp", joints=READY, listener=(after := Ear())))
+    run(plant, MotionCommand(3, motions.ptp(READY), listener=(after := Ear())))
     assert after.causes == ["started", "done"]
 
 
@@ -197,7 +198,7 @@ def test_a_motion_can_be_cancelled_during_a_stop() -> None:
 
 def test_a_drive_error_fails_what_runs_and_has_to_be_acknowledged() -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    plant.submit(MotionCommand(1, KINDS["ptp"].motion, listener=ear))
     plant.step(400)
     plant.trip("drive error in A3")
     plant.step(1200)
@@ -210,7 +211,7 @@ def test_a_drive_error_fails_what_runs_and_has_to_be_acknowledged() -> None:
     plant.resume()
     plant.step(2)
     assert flags(plant) & (SafetyFlags.READY | SafetyFlags.PAUSED) == SafetyFlags.READY
-    run(plant, Order(2, "ptp", joints=READY, listener=(after := Ear())))
+    run(plant, MotionCommand(2, motions.ptp(READY), listener=(after := Ear())))
     assert after.causes == ["started", "done"]
 
 
@@ -239,7 +240,7 @@ def test_letting_the_enabling_switch_go_pauses() -> None:
     plant.safety.choose(OperationMode.T2)
     plant.safety.enable()
     plant.resume()
-    plant.submit(Order(1, "lin_rel", offset=LINE, reference=(0.0, 0.0, 0.0, 1.0), listener=ear))
+    plant.submit(MotionCommand(1, motions.lin_rel(LINE, (0.0, 0.0, 0.0, 1.0)), listener=ear))
     plant.step(400)
     plant.safety.release()
     to_standstill(plant)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from heptarm.model import dynamics
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.safety_monitor import (
@@ -19,12 +19,13 @@ from heptarm.sim.plant.safety_monitor import (
     parse_safety,
 )
 from heptarm.values.robot import Body, robot
+from tests.sim import motions
 from tests.sim.driving import READY
 
 LOAD = Body(3.0, np.array((0.02, 0.0, 0.1)), inertia=np.array((0.02, 0.03, 0.025, 0.001, 0.0, 0.002)))
 NOTHING = Body(0.0, np.zeros(3))
-HOLD = Order(1, "hold")
-FAST = Order(1, "ptp", joints=(1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8))
+HOLD = MotionCommand(1, motions.hold())
+FAST = MotionCommand(1, motions.ptp((1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8)))
 #: Largest torque of the load at READY [Nm].
 WEIGHT = float(
     np.abs(
@@ -34,7 +35,7 @@ WEIGHT = float(
 
 
 def moving(
-    limit: float, order: Order, *, declared: Body, counted: Body, hanging: Body | None = None
+    limit: float, order: MotionCommand, *, declared: Body, counted: Body, hanging: Body | None = None
 ) -> Plant:
     """A plant that has begun a motion: loads of the controller, of the safety functions, and the true one."""
     plant = Plant("iiwa14", q=READY, limits=SafetyLimits(limit))

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant import sensor_errors as errors
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors, parse_sensors, sensor_errors
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
+from tests.sim import motions
 from tests.sim.driving import READY, run
 
 IIWA = robot("iiwa14")
@@ -78,14 +79,14 @@ def test_the_errors_are_of_the_stated_size() -> None:
 def test_positions_stay_accurate() -> None:
     plant = noisy()
     goal = np.array(READY) + 0.3
-    run(plant, Order(1, "ptp", joints=tuple(goal)))
+    run(plant, MotionCommand(1, motions.ptp(tuple(goal))))
     assert np.abs(plant.snapshot.q - goal).max() < 5e-4  # friction by the stiffness of the joints
 
 
 def test_friction_slows_a_compliant_joint_down() -> None:
     overshoots = []
     for plant in (Plant("iiwa14", q=READY), noisy()):
-        plant.submit(Order(1, "hold", duration=3.0, mode=JointImpedance(100.0)))
+        plant.submit(MotionCommand(1, motions.hold(3.0), mode=JointImpedance(100.0)))
         plant.step(100)
         plant.apply_wrench((0.0, 6.0, 0.0), duration=0.2)
         path = []

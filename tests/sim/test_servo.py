@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heptarm.planning.command import Order
 from heptarm.planning.seam import ServoTiming
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready
 
 KINDS = ("servo", "direct")
 HERE = np.array(READY)
 
 
-def serving(kind: str = "servo", **terms: object) -> tuple[Plant, Ear]:
+def serving(kind: str = "servo", timing: ServoTiming | None = None, **terms: Any) -> tuple[Plant, Ear]:
     plant, ear = ready(), Ear()
-    plant.submit(Order(7, kind, listener=ear, **terms))  # type: ignore[arg-type]
+    mode = terms.pop("mode", None)
+    motion = (motions.direct if kind == "direct" else motions.servo)(timing, **terms)
+    plant.submit(MotionCommand(7, motion, mode=mode, listener=ear))
     plant.step(2)
     return plant, ear
 
@@ -116,14 +121,14 @@ def test_a_passing_velocity_is_kept_for_a_moment_then_the_arm_rests() -> None:
 
 
 def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
-    plant, ear = serving(servo_timing=ServoTiming(goal_timeout=0.3))
+    plant, ear = serving(timing=ServoTiming(goal_timeout=0.3))
     plant.shared.post(7, HERE + 0.05)
     to_rest(plant)
     assert ear.causes == ["started", "done"]
 
 
 def test_a_velocity_that_goes_out_of_the_limits_stops_the_arm() -> None:
-    plant, ear = serving(servo_timing=ServoTiming(speed_timeout=1.0))
+    plant, ear = serving(timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
     plant.shared.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))
@@ -168,7 +173,7 @@ def test_without_stiffness_the_arm_floats_away_from_a_push() -> None:
 def test_impedance_follows_a_motion_and_rests(stiffness: float) -> None:
     plant, ear = ready(), Ear()
     target = HERE + [0.5, 0, 0, 0.2, 0, 0, 0.5]
-    plant.submit(Order(1, "ptp", joints=tuple(target), mode=JointImpedance(stiffness), listener=ear))
+    plant.submit(MotionCommand(1, motions.ptp(tuple(target)), mode=JointImpedance(stiffness), listener=ear))
     to_rest(plant, most=8000)
     assert ear.causes == ["started", "done"]
     assert np.abs(plant.snapshot.q - target).max() < 2e-3
@@ -206,8 +211,8 @@ def test_stiff_again_the_arm_stays_where_it_was_pushed_to() -> None:
 def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -> None:
     plant, ear = ready(), Ear()
     plant.apply_wrench((0.0, 20.0, 0.0))
-    plant.submit(Order(1, "hold", duration=2.0, mode=JointImpedance(100.0)))
-    plant.submit(Order(2, "ptp", joints=READY, listener=ear))
+    plant.submit(MotionCommand(1, motions.hold(2.0), mode=JointImpedance(100.0)))
+    plant.submit(MotionCommand(2, motions.ptp(READY), listener=ear))
     fastest = 0.0
     while not plant.idle:
         plant.tick()
@@ -283,7 +288,11 @@ def test_a_target_that_is_passed_before_a_limit_leaves_room_to_brake(
     """As when the program that streams velocities dies beside a limit."""
     plant, ear = Plant("iiwa14", q=tuple(np.radians([0, 30, 0, -90, 0, 80, 0]).tolist())), Ear()
     plant.submit(
-        Order(7, "servo", joint_velocity=(1.0,) * 7, joint_acceleration=(acceleration,) * 7, listener=ear)
+        MotionCommand(
+            7,
+            motions.servo(joint_velocity=(1.0,) * 7, joint_acceleration=(acceleration,) * 7),
+            listener=ear,
+        )
     )
     plant.step(2)
     plant.shared.post(7, np.radians([0, 30, 0, -90, 0, target, 0]), speed * np.eye(7)[5])

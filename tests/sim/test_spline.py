@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning.motion import PlanError
+from heptarm.planning.targets import SplineSegment
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready, run
 from tests.sim.test_batch import check_limits, points, speeds, start_of
 
@@ -28,12 +30,17 @@ def to(start: Pose, x: float, y: float, z: float, a: float = 0.0, b: float = 0.0
     return Pose(start.xyz + [x, y, z], (start @ Pose.xyz_abc(a=a, b=b)).quat)
 
 
-def segment(kind: str, pose: Pose, speed: float = 0.2, **more: Any) -> Order:
-    return Order(1, kind, pose=numbers(pose), cart_velocity=speed, **more)
+def segment(kind: str, pose: Pose, speed: float = 0.2, **more: Any) -> SplineSegment:
+    made: SplineSegment = getattr(motions, kind)(numbers(pose), velocity=speed, **more)
+    return made
 
 
-def curve(plant: Plant, knots: tuple[tuple[float, ...], ...] = KNOTS) -> Order:
-    return Order(1, "spline", parts=tuple(segment("spl", to(start_of(plant), *knot)) for knot in knots))
+def arc_to(via: Pose, end: Pose) -> SplineSegment:
+    return motions.circ(numbers(via), numbers(end), velocity=0.2)
+
+
+def curve(plant: Plant, knots: tuple[tuple[float, ...], ...] = KNOTS) -> MotionCommand:
+    return MotionCommand(1, motions.spline(*(segment("spl", to(start_of(plant), *knot)) for knot in knots)))
 
 
 def test_a_spline_passes_through_its_points_within_half_a_millimetre() -> None:
@@ -69,15 +76,15 @@ def test_constant_keeps_and_ignore_leaves_the_orientation_to_the_neighbours() ->
     plant = ready()
     start = start_of(plant)
     poses = [to(start, *knot, a=0.4) for knot in KNOTS]
-    parts = [segment("spl", pose, orientation=Orientation("constant")) for pose in poses]
-    track = run(plant, Order(1, "spline", parts=tuple(parts)))
+    parts = [segment("spl", pose, orientation=("constant", "base")) for pose in poses]
+    track = run(plant, MotionCommand(1, motions.spline(*parts)))
     assert max(Pose.from_matrix(forward(plant.robot, q)).angle_to(start) for q in track.q_cmd[::20]) < 1e-6
     plant = ready()
     kinds = ("ignore", "ignore", "ignore", "variable")
     parts = [
-        segment("spl", pose, orientation=Orientation(kind)) for pose, kind in zip(poses, kinds, strict=True)
+        segment("spl", pose, orientation=(kind, "base")) for pose, kind in zip(poses, kinds, strict=True)
     ]
-    track = run(plant, Order(1, "spline", parts=tuple(parts)))
+    track = run(plant, MotionCommand(1, motions.spline(*parts)))
     seen = [Pose.from_matrix(forward(plant.robot, q)) for q in track.q_cmd]
     middle = min(seen, key=poses[1].distance_to)
     assert 0.1 < middle.angle_to(start) < 0.3, "it turns all the way"
@@ -89,9 +96,9 @@ def test_lines_and_arcs_of_a_spline_keep_their_shape_and_its_speed() -> None:
     start = start_of(plant)
     r, h = 0.06, 0.06 * np.sqrt(0.5)
     line = segment("lin", to(start, 0, 0.1, 0))
-    arc = segment("circ", to(start, r, 0.1 + r, 0), via=numbers(to(start, r - h, 0.1 + h, 0)))
+    arc = arc_to(to(start, r - h, 0.1 + h, 0), to(start, r, 0.1 + r, 0))
     back = segment("spl", to(start, 0.1, 0.1, -0.03))
-    track = run(plant, Order(1, "spline", parts=(line, arc, back)))
+    track = run(plant, MotionCommand(1, motions.spline(line, arc, back)))
     seen = points(plant, track.q_cmd) - start.xyz
     on_line = seen[seen[:, 1] < 0.0999][: len(seen) // 2]
     assert np.abs(on_line[:, [0, 2]]).max() < 1e-6
@@ -105,7 +112,7 @@ def test_every_segment_has_its_speed_and_a_corner_is_a_halt() -> None:
     plant = ready()
     start = start_of(plant)
     lines = [segment("lin", to(start, 0, y, 0), v) for y, v in ((0.1, 0.3), (0.2, 0.1), (0.3, 0.3))]
-    track = run(plant, Order(1, "spline", parts=tuple(lines)))
+    track = run(plant, MotionCommand(1, motions.spline(*lines)))
     travel, speed = points(plant, track.q_cmd)[1:, 1] - start.xyz[1], speeds(track, plant)
     assert speed[(travel > 0.1) & (travel < 0.2)].max() <= 0.1 * 1.05
     assert speed[(travel > 0.12) & (travel < 0.18)].min() >= 0.1 * 0.95
@@ -113,7 +120,8 @@ def test_every_segment_has_its_speed_and_a_corner_is_a_halt() -> None:
     plant = ready()
     corner = to(start, 0, 0.1, 0)
     track = run(
-        plant, Order(1, "spline", parts=(segment("lin", corner), segment("lin", to(start, 0.1, 0.1, 0))))
+        plant,
+        MotionCommand(1, motions.spline(segment("lin", corner), segment("lin", to(start, 0.1, 0.1, 0)))),
     )
     seen = points(plant, track.q_cmd)
     assert np.linalg.norm(seen - corner.xyz, axis=1).min() < 1e-6
@@ -122,8 +130,8 @@ def test_every_segment_has_its_speed_and_a_corner_is_a_halt() -> None:
 
 def test_a_joint_spline_passes_through_its_points() -> None:
     plant, ear = ready(), Ear()
-    parts = tuple(Order(1, "ptp", joints=q) for q in (*JOINTS, READY))
-    track = run(plant, Order(1, "spline_joints", parts=parts, listener=ear))
+    parts = tuple(motions.ptp(q) for q in (*JOINTS, READY))
+    track = run(plant, MotionCommand(1, motions.spline_joints(*parts), listener=ear))
     assert ear.causes == ["started", "done"]
     for q in JOINTS:
         assert np.abs(track.q_cmd - q).max(axis=1).min() < 2e-3
@@ -131,9 +139,9 @@ def test_a_joint_spline_passes_through_its_points() -> None:
         assert np.abs(track.dq[near]).max() > 0.1, "it rests at a point"
     assert np.abs(plant.snapshot.q - READY).max() <= 1e-4
     check_limits(track, plant)
-    slow = tuple(replace(part, joint_velocity=(0.3,) * 7) for part in parts)
+    slow = tuple(motions.ptp(part.q, joint_velocity=(0.3,) * 7) for part in parts)
     plant = ready()
-    gentle = run(plant, Order(1, "spline_joints", parts=slow))
+    gentle = run(plant, MotionCommand(1, motions.spline_joints(*slow)))
     assert (np.abs(gentle.dq).max(axis=0) <= 0.3 * plant.robot.dq_max * 1.02).all()
 
 
@@ -142,33 +150,33 @@ def test_what_makes_no_spline_is_refused_by_name() -> None:
     start = start_of(plant)
     good = segment("spl", to(start, *KNOTS[0]))
     for part, words in (
-        (replace(good, orientation=Orientation("joint")), "segment 2.*joint"),
-        (replace(good, orientation=Orientation("constant", "path")), "segment 2.*path"),
-        (Order(1, "ptp", joints=READY), "kind 'ptp'"),
-        (segment("circ", to(start, 0.1, 0.1, 0), via=numbers(to(start, 0.075, 0.075, 0))), "lie on a line"),
+        (segment("spl", to(start, *KNOTS[0]), orientation=("joint", "base")), "segment 2.*joint"),
+        (segment("spl", to(start, *KNOTS[0]), orientation=("constant", "path")), "segment 2.*path"),
+        (motions.ptp(READY), "kind Ptp"),
+        (arc_to(to(start, 0.075, 0.075, 0), to(start, 0.1, 0.1, 0)), "lie on a line"),
         (segment("spl", to(start, 0, 0.9, 0)), "not reachable"),
     ):
         with pytest.raises(PlanError, match=words):
-            plant.submit(Order(1, "spline", parts=(good, part)))
+            plant.submit(MotionCommand(1, motions.spline(good, part)))
     with pytest.raises(PlanError, match=r"violates limit A2.*point 1"):
-        plant.submit(Order(1, "spline_joints", parts=(Order(1, "ptp", joints=(0, 3, 0, 0, 0, 0, 0)),)))
-    with pytest.raises(PlanError, match="joint spline cannot have a segment of kind 'spl'"):
-        plant.submit(Order(1, "spline_joints", parts=(good,)))
+        plant.submit(MotionCommand(1, motions.spline_joints(motions.ptp((0, 3, 0, 0, 0, 0, 0)))))
+    with pytest.raises(PlanError, match="joint spline cannot have a segment of kind Spl"):
+        plant.submit(MotionCommand(1, motions.spline_joints(good)))
     assert plant.idle
 
 
 def test_a_spline_of_nothing_ends_at_once() -> None:
     plant, ear = ready(), Ear()
-    run(plant, Order(1, "spline", parts=(segment("spl", start_of(plant)),), listener=ear))
-    run(plant, Order(2, "spline_joints", parts=(Order(1, "ptp", joints=READY),), listener=ear))
+    run(plant, MotionCommand(1, motions.spline(segment("spl", start_of(plant))), listener=ear))
+    run(plant, MotionCommand(2, motions.spline_joints(motions.ptp(READY)), listener=ear))
     assert ear.causes == ["started", "done"] * 2
 
 
 @pytest.mark.parametrize("kind", ["spline", "spline_joints"])
 def test_a_stop_in_a_spline_comes_to_rest_on_it(kind: str) -> None:
     random = np.random.default_rng(4)
-    parts = tuple(Order(1, "ptp", joints=q) for q in (*JOINTS, READY))
-    order = curve(ready()) if kind == "spline" else Order(1, kind, parts=parts)
+    parts = tuple(motions.ptp(q) for q in (*JOINTS, READY))
+    order = curve(ready()) if kind == "spline" else MotionCommand(1, motions.spline_joints(*parts))
     plant = ready()
     path = run(plant, order).q_cmd
     for instant in (*random.integers(1, 1800, 4).tolist(), 1756):  # the last: while it brakes anyway

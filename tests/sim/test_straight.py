@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order
-from heptarm.planning.seam import ServoTiming, StraightLimits
+from heptarm.planning.seam import ServoTiming
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from tests.long import longer
+from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
 
-LIMITS = StraightLimits(velocity=(0.2, 0.2, 0.2, 0.5, 0.5, 0.5), acceleration=(1.0, 1.0, 1.0, 3.0, 3.0, 3.0))
+LIMITS = {"velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5), "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0)}
 TCP = Pose.xyz_abc(0.02, 0.0, 0.15, 0.3, 0.0, 0.2)
 
 
-def serving(tcp: Pose | None = None, **terms: object) -> tuple[Plant, Ear, Pose]:
+def serving(tcp: Pose | None = None, **terms: Any) -> tuple[Plant, Ear, Pose]:
     plant, ear = ready(), Ear()
     tip = tcp or Pose.of((0.0, 0.0, 0.0))
-    wanted: dict[str, object] = {"straight_limits": LIMITS, "tcp": numbers(tip), "listener": ear, **terms}
-    plant.submit(Order(7, "straight", **wanted))  # type: ignore[arg-type]
+    mode = terms.pop("mode", None)
+    motion = motions.straight(**{**LIMITS, **terms})
+    plant.submit(MotionCommand(7, motion, tcp=numbers(tip), mode=mode, listener=ear))
     plant.step(2)
     return plant, ear, Pose.from_matrix(forward(plant.robot, np.array(READY))) @ tip
 
@@ -72,7 +75,7 @@ def test_a_target_that_comes_again_while_the_acceleration_has_a_kink_changes_not
 @pytest.mark.parametrize("turned", [False, True])
 def test_limits_hold_along_each_axis_of_the_chosen_frame(turned: bool) -> None:
     axes = Pose.xyz_abc(0, 0, 0, 0.6, 0.3, 0.0)
-    plant, ear, start = serving(reference=tuple(axes.quat.tolist()) if turned else None)
+    plant, ear, start = serving(axes=tuple(axes.quat.tolist()) if turned else None)
     random = np.random.default_rng(3)
     line = [start.xyz] * 2
     for _ in range(12):
@@ -117,7 +120,7 @@ def test_a_target_across_the_way_bends_it_without_a_halt() -> None:
 
 
 def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
-    plant, ear, start = serving(straight_limits=StraightLimits(velocity=(0.5,) * 6, acceleration=(0.4,) * 6))
+    plant, ear, start = serving(velocity=(0.5,) * 6, acceleration=(0.4,) * 6)
     goal = start.xyz + [0.0, 0.3, 0.1]
     plant.shared.post(7, Pose.of(goal, start.quat).array)
     places(plant, 900)
@@ -133,7 +136,7 @@ def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
 
 
 def test_at_its_target_it_times_out() -> None:
-    plant, ear, start = serving(servo_timing=ServoTiming(goal_timeout=0.3))
+    plant, ear, start = serving(timing=ServoTiming(goal_timeout=0.3))
     plant.shared.post(7, Pose.of(start.xyz + [0, 0, 0.02], start.quat).array)
     while not plant.idle:
         plant.tick()
@@ -153,7 +156,7 @@ def test_the_override_and_a_pause_slow_it_down() -> None:
 
 # ------------------------------------------------------------------------------------- the limits of the axes
 
-QUICK = StraightLimits(velocity=(0.5,) * 3 + (1.0,) * 3, acceleration=(2.0,) * 3 + (4.0,) * 3)
+QUICK: dict[str, Any] = {"velocity": (0.5,) * 3 + (1.0,) * 3, "acceleration": (2.0,) * 3 + (4.0,) * 3}
 HOME = (0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0)
 
 
@@ -161,7 +164,7 @@ def at(*degrees: float) -> tuple[Plant, Ear, Pose]:
     """A plant with a quick straight servo motion, and the pose at its start."""
     plant, ear = Plant("iiwa14", q=tuple(np.radians(degrees).tolist())), Ear()
     start = Pose.from_matrix(forward(plant.robot, plant.snapshot.q_cmd))
-    plant.submit(Order(7, "straight", straight_limits=QUICK, listener=ear))
+    plant.submit(MotionCommand(7, motions.straight(**QUICK), listener=ear))
     plant.step(2)
     return plant, ear, start
 

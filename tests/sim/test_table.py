@@ -8,26 +8,25 @@ import numpy as np
 import pytest
 
 from heptarm._library import SWITCH
-from heptarm.planning.command import TICK, Order
+from heptarm.planning.motion import TICK
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
 from heptarm.planning.time_scaling import TabulatedProfile
 from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
+from tests.sim import motions
 from tests.sim.driving import READY
 
 IIWA = robot("iiwa14")
 START = np.array(READY)
 FAR, NEAR = (1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8), (0.002, 0.5, 0.0, -1.3, 0.0, 0.9, 0.001)
 NO_LIMIT = np.full(7, 10.0)
-ORDERS = {
-    "ptp": Order(1, "ptp", joints=FAR),
-    "slow": Order(1, "ptp", joints=FAR, joint_velocity=(0.3,) * 7),
-    "short": Order(1, "ptp", joints=NEAR),
-    "three with rests": Order(
-        1, "batch", parts=tuple(Order(1, "ptp", joints=one) for one in (FAR, NEAR, READY))
-    ),
+MOTIONS = {
+    "ptp": motions.ptp(FAR),
+    "slow": motions.ptp(FAR, joint_velocity=(0.3,) * 7),
+    "short": motions.ptp(NEAR),
+    "three with rests": motions.batch(*(motions.ptp(one) for one in (FAR, NEAR, READY))),
 }
 
 
@@ -55,9 +54,9 @@ def follow(planned: Plan, step: float, leap: Array = NO_LIMIT) -> tuple[list[int
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.37])
-@pytest.mark.parametrize("name", ORDERS)
+@pytest.mark.parametrize("name", MOTIONS)
 def test_they_are_those_of_the_path_and_its_profile(name: str, factor: float, language: str) -> None:
-    planned = plan(IIWA, ORDERS[name], START)
+    planned = plan(IIWA, MOTIONS[name], START)
     assert planned.path is not None and planned.timing is not None
     profile = planned.timing.profile
     counts, found = follow(planned, factor * TICK)
@@ -78,7 +77,7 @@ def test_a_profile_of_samples_consists_of_pieces() -> None:
 
 
 def test_the_first_that_an_axis_cannot_follow_is_none_of_them() -> None:
-    planned = plan(IIWA, ORDERS["ptp"], START)
+    planned = plan(IIWA, MOTIONS["ptp"], START)
     _, whole = follow(planned, TICK)
     steps = np.abs(np.diff(whole[:, 2:], axis=0, prepend=START[None]))
     leap = np.where(np.arange(7) == 5, 0.5 * steps[:, 5].max(), NO_LIMIT)
@@ -89,7 +88,7 @@ def test_the_first_that_an_axis_cannot_follow_is_none_of_them() -> None:
 
 def test_paths_in_space_have_no_table() -> None:
     offset = (0.05, 0.1, 0.05, 0.0, 0.0, 0.0, 1.0)
-    line = Order(1, "lin_rel", offset=offset, reference=(0.0, 0.0, 0.0, 1.0))
+    line = motions.lin_rel(offset, (0.0, 0.0, 0.0, 1.0))
     assert plan(IIWA, line, START).table is None
-    blended = tuple(Order(1, "ptp", joints=one, blending=(0.1, 0.0, 0.0)) for one in (FAR, READY))
-    assert plan(IIWA, Order(1, "batch", parts=blended), START).table is None
+    blended = tuple(motions.ptp(one, blending=(0.1, 0.0, 0.0)) for one in (FAR, READY))
+    assert plan(IIWA, motions.batch(*blended), START).table is None

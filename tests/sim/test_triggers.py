@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import ConditionWatch, Order
 from heptarm.planning.seam import Condition, PathReached, PathReference, SignalIs
+from heptarm.sim.controller.command import ConditionWatch, MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from tests.sim import motions
 from tests.sim.driving import READY, ready, run
 
 START, END = PathReference
@@ -57,20 +58,17 @@ def point(reference: PathReference, distance: float, delay: float = 0.0) -> Path
 
 def corner(
     plant: Plant, log: Log, *watches: ConditionWatch, kind: str = "batch", blend: float = 0.0
-) -> Order:
+) -> MotionCommand:
     """100 mm along y, then 100 mm along z."""
     here = Pose.from_matrix(forward(plant.robot, plant.snapshot.q))
     parts = tuple(
-        Order(
-            1,
-            "lin",
-            pose=tuple(Pose(here.xyz + travel, here.quat).array.tolist()),
-            blending=(0.0, blend, 0.0),
+        motions.lin(
+            Pose(here.xyz + travel, here.quat).array.tolist(), blending=(0.0, blend, 0.0), velocity=SPEED
         )
         for travel in ((0.0, 0.1, 0.0), (0.0, 0.1, 0.1))
     )
-    paced = tuple(Order(1, "lin", pose=p.pose, blending=p.blending, cart_velocity=SPEED) for p in parts)
-    return Order(1, kind, parts=paced, listener=log, part_listener=log, watches=watches)
+    motion = motions.batch(*parts) if kind == "batch" else motions.spline(*parts)
+    return MotionCommand(1, motion, listener=log, part_listener=log, watches=watches)
 
 
 @pytest.mark.parametrize("kind", ["batch", "spline"])
@@ -165,7 +163,7 @@ def test_an_arm_that_is_there_already_has_the_ends_only() -> None:
         log.watch("end", point(END, -0.01)),
         log.watch("on the way", point(START, 0.01)),
     )
-    run(plant, Order(1, "ptp", joints=READY, listener=log, watches=watches))
+    run(plant, MotionCommand(1, motions.ptp(READY), listener=log, watches=watches))
     assert log.names == ["started", "start", "end", "done"]
 
 
@@ -173,8 +171,8 @@ def test_segments_of_a_joint_spline_are_reported() -> None:
     plant = ready()
     log = Log(plant)
     knots = [(0.1 * k, *READY[1:]) for k in (1, 2, 2, 3)]  # the third one has no length
-    parts = tuple(Order(1, "ptp", joints=knot) for knot in knots)
-    order = Order(1, "spline_joints", parts=parts, listener=log, part_listener=log)
+    parts = tuple(motions.ptp(knot) for knot in knots)
+    order = MotionCommand(1, motions.spline_joints(*parts), listener=log, part_listener=log)
     seen = []
     plant.submit(order)
     while not plant.idle:

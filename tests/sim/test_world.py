@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from heptarm.planning.command import Order
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.scene import Scene, Wiring, names
 from heptarm.sim.plant.shared_state import PositionsFile
@@ -17,6 +17,7 @@ from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import Body
+from tests.sim import motions
 from tests.sim.driving import numbers, run
 
 DOWN = tuple(deg(0, 25, 0, -90, 0, 65, 0).tolist())
@@ -42,7 +43,7 @@ def drive(plant: Plant, *, close: bool) -> None:
 def to(plant: Plant, x: float, y: float, z: float, speed: float = 0.2) -> None:
     """Move the tip of the gripper on a line, its fingers down."""
     target = Pose.of((x, y, z), (0.0, 1.0, 0.0, 0.0))
-    run(plant, Order(1, "lin", pose=numbers(target), tcp=TIP, cart_velocity=speed))
+    run(plant, MotionCommand(1, motions.lin(numbers(target), velocity=speed), tcp=TIP))
 
 
 @pytest.mark.parametrize("name", names())
@@ -120,7 +121,7 @@ def test_the_arm_pushes_what_is_in_its_path_and_meets_the_table() -> None:
 def test_without_a_scene_the_same_numbers_come_as_from_the_bare_model() -> None:
     assert compiled("iiwa14").nq == 7
     plant = Plant(q=DOWN)
-    plant.submit(Order(1, "ptp", joints=(0.2, 0.5, 0.0, -1.2, 0.0, 0.9, 0.2)))
+    plant.submit(MotionCommand(1, motions.ptp((0.2, 0.5, 0.0, -1.2, 0.0, 0.9, 0.2))))
     plant.step(400)
     assert plant.model.nbody == 10  # with the one that shapes of tools are mounted on
     assert plant.data.ncon == 0
@@ -133,7 +134,7 @@ def test_an_arm_in_a_scene_moves_as_one_without_where_it_touches_nothing() -> No
         plant = Plant(q=DOWN, scene=scene)
         if scene is not None:
             plant.set_load_data(GRIPPER)
-        plant.submit(Order(1, "ptp", joints=(0.4, 0.3, 0.1, -1.2, 0.0, 0.9, 0.2)))
+        plant.submit(MotionCommand(1, motions.ptp((0.4, 0.3, 0.1, -1.2, 0.0, 0.9, 0.2))))
         rows = []
         for _ in range(1500):
             plant.tick()

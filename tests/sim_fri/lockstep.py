@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.fri.guard.fallback import Missing, Policy
-from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.cycle import Cycle, Law
-from heptarm.fri.loop.user_api import Params
+from heptarm.fri.loop.cycle import Cycle
+from heptarm.fri.loop.settings import Law, LoopSettings
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
@@ -30,7 +29,7 @@ EPOCH = 10**12
 
 
 class Lockstep:
-    """A session at 1 kHz; each answer arrives half a tick after its message.
+    """A session; each answer arrives half a tick after its message.
 
     Args:
         law: of the client; None: it takes `command`.
@@ -38,6 +37,7 @@ class Lockstep:
         command: what is commanded.
         control: control mode of the hold underneath.
         q: where the arm stands at first, shape (7,) [rad].
+        period_ms: of the session.
 
     Attributes:
         track: the plant after each tick since commands became effective.
@@ -52,25 +52,19 @@ class Lockstep:
         command: CommandMode = CommandMode.POSITION,
         control: Mode | None = None,
         q: tuple[float, ...] = READY,
+        period_ms: int = 1,
     ) -> None:
-        values, schema = Params.flat(params or {})
-        block = MemoryBlock(at.Layout.words(history=64, params=values.size))
+        settings = LoopSettings(law=law, params=params, policy=Policy(Missing.HOLD, patience=1e6), history=64)
+        block = MemoryBlock(at.Layout.words(**settings.sizes))
         block.unlink()
-        self.layout = at.Layout(block, history=64, params=values.size)
-        self.layout.params.write(values)
+        self.layout = at.Layout(block, **settings.sizes)
+        self.layout.params.write(settings.law_params[0])
         self.plant = Plant("iiwa14", q=q)
-        self.cycle = Cycle(
-            self.layout,
-            version=None,
-            limits=Limits.of(self.plant.robot),
-            policy=Policy(Missing.HOLD, patience=1e6),
-            law=law,
-            params=Params(np.zeros(values.size), schema),
-        )
+        self.cycle = Cycle(self.layout, settings)
         self.track: list[Snapshot] = []
         self.ends: list[OverlayEnded] = []
         self._arm = PlantArm(self.plant)
-        self._controller = Controller(SessionConfiguration(Version.V1_15, 1), self.plant.robot)
+        self._controller = Controller(SessionConfiguration(Version.V1_15, period_ms), self.plant.robot)
         self._answer: bytes | None = None
         self._held: list[bytes] | None = None
         self._controller.open()
@@ -86,6 +80,17 @@ class Lockstep:
         """Let time pass."""
         for _ in range(round(seconds * 1e3)):
             self._tick()
+
+    def end(self, way: str) -> None:
+        """End the session: the program leaves its block, the overlay stops, it closes, the client falls silent."""
+        if way == "leave":
+            self._arm.release()
+        elif way == "stop":
+            self._controller.stop()
+        elif way == "close":
+            self._controller.close()
+        else:
+            self._held = []
 
     def lose(self, ticks: int) -> None:
         """Let messages get lost."""
@@ -108,13 +113,15 @@ class Lockstep:
         """The command of the user's process, shape (7,) [rad]."""
         words = np.zeros(at.COMMAND_WORDS)
         words[at.C_Q : at.C_Q + 7] = q
-        words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_Q
+        ints = words.view(np.int64)
+        ints[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_Q
+        ints[at.C_EPOCH] = self.layout.header[at.EPOCH]
         self.layout.commands.write(words[1:])
 
     @property
     def limited(self) -> list[str]:
         """What the guard has limited, as text."""
-        return self.cycle.guard.report.lines
+        return at.report_lines(self.layout)
 
     def _until(self, state: State) -> None:
         for _ in range(3000):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.session.answers import Setpoint
-from heptarm.fri.session.session import Session
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.faults import NONE, FaultyLink, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import Event, OverlayEnded, SessionConfiguration
+from tests.oracles.fri.answers import Setpoint
+from tests.oracles.fri.session import Session
 from tests.sim_fri.rig import Arm, State
 
 

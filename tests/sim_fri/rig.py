@@ -8,10 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.codec import decode_monitoring, encode_command
 from heptarm.fri.protocol.version import Version
-from heptarm.planning.command import TICK_NS
-from heptarm.planning.seam import HeaderWords
+from heptarm.planning.seam import TICK_NS, HeaderWords
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading
@@ -20,6 +18,7 @@ from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode
 from heptarm.values.robot import RobotModel, robot
+from tests.oracles.fri.codec import decode_monitoring, encode_command
 
 State = m.SessionState
 READY = (0.0, 0.5, 0.1, -1.3, 0.2, 0.9, 0.0)

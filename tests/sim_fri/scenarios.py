@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.session import Session
 from heptarm.sim.fri.faults import FaultyLink, LinkFaults, translate
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import SessionConfiguration
+from tests.oracles.fri.session import Session
 from tests.sim_fri.pair import Pair
 from tests.sim_fri.rig import State
 
@@ -63,7 +63,9 @@ def foreign(pair: Pair) -> str:
     whole = pair.there.send
 
     def send(datagram: bytes, now: int) -> None:
-        whole(translate(datagram, Version.V1_15, Version.V2_7), now)
+        said = pair.controller.said
+        assert said is not None
+        whole(translate(said, Version.V2_7), now)
 
     pair.session = Session(Version.V1_15)
     pair.there.send = send  # type: ignore[method-assign]

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.answers import Setpoint
-from heptarm.fri.session.session import Kind
+from heptarm.fri.session.events import Kind
 from heptarm.sim.fri.faults import FaultyLink, LinkFaults
 from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
 from heptarm.sim.fri.settings import SessionConfiguration
+from tests.oracles.fri.answers import Setpoint
 from tests.sim_fri.pair import Pair
 from tests.sim_fri.rig import READY, State
 

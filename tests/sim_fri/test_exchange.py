@@ -9,10 +9,11 @@ import pytest
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.codec import encode_command, encode_monitoring
+from heptarm.fri.protocol.codec import encode_monitoring
 from heptarm.fri.protocol.version import Version
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.settings import FrameProvided, OutputWritten, SessionConfiguration
+from tests.oracles.fri.codec import encode_command
 from tests.sim_fri.rig import Rig, State, mirror
 
 IN, OUT = m.IoDirection.INPUT, m.IoDirection.OUTPUT

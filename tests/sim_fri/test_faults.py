@@ -9,13 +9,13 @@ import pytest
 
 from heptarm.errors import LimitError
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.codec import decode_monitoring
 from heptarm.fri.protocol.protobuf import MalformedMessage
 from heptarm.fri.protocol.version import Version, recognise
-from heptarm.planning.command import TICK_NS
+from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.faults import NONE, FaultScenario, FaultyLink, LinkFaultCounts, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import OverlayEnded
+from tests.oracles.fri.codec import decode_monitoring
 from tests.sim_fri.rig import Arm, Rig, State
 
 MS = 1_000_000
@@ -123,7 +123,9 @@ class Trial:
             rig.events += rig.controller.events()
             rig.arm.tick()
             assert datagram is not None
-            self.there.send(self.scenario.sent(datagram, self.version, elapsed), rig.now)
+            said = rig.controller.said
+            assert said is not None
+            self.there.send(self.scenario.sent(datagram, said, elapsed), rig.now)
             for message in self.there.arrived(rig.now):
                 try:
                     answer_now = rig.client.answer(message)
@@ -206,7 +208,8 @@ def test_a_cabinet_can_speak_another_version(own: Version, other: Version) -> No
     rig, scenario = trial.rig, trial.scenario
     datagram = rig.controller.tick(Arm().reading(), rig.now)
     assert datagram is not None
-    strange = scenario.sent(datagram, own, 0.0)
+    assert rig.controller.said is not None
+    strange = scenario.sent(datagram, rig.controller.said, 0.0)
     reported, spoken = recognise(strange), decode_monitoring(strange, other)
     assert reported is other or {reported, other} == {Version.V1_11, Version.V1_15}
     assert spoken.header == decode_monitoring(datagram, own).header

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from heptarm.fri.guard.fallback import Missing, Policy
-from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.cycle import Cycle, Law
+from heptarm.fri.loop.cycle import Cycle
+from heptarm.fri.loop.settings import Law, LoopSettings
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
@@ -37,24 +37,18 @@ class Both:
     """Controller, plant and the client's loop, one after the other on the ticks' clock; between them is a network."""
 
     def __init__(self, law: Law | None) -> None:
-        block = MemoryBlock(at.Layout.words(history=64, params=0))
+        settings = LoopSettings(law=law, policy=Policy(Missing.HOLD, patience=1e6), history=64)
+        block = MemoryBlock(at.Layout.words(**settings.sizes))
         block.unlink()
-        self.layout = at.Layout(block, history=64, params=0)
+        self.layout = at.Layout(block, **settings.sizes)
         self.plant = Plant("iiwa14", q=READY)
-        self.cycle = Cycle(
-            self.layout,
-            version=None,
-            limits=Limits.of(self.plant.robot),
-            policy=Policy(Missing.HOLD, patience=1e6),
-            law=law,
-            params=Params(np.zeros(0), {}),
-        )
+        self.cycle = Cycle(self.layout, settings)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind((HERE, 0))
         self.socket.settimeout(20.0)
         self.said: list[str] = []
         self.track: list[Array] = []  # position of the flange, shape (3,) [m]
-        settings = StandaloneSettings(
+        standalone = StandaloneSettings(
             configuration=SessionConfiguration(Version.V2_5, 1),
             client=self.socket.getsockname(),
             port=0,
@@ -62,7 +56,7 @@ class Both:
             speed=0.0,
         )
         self.controller = Standalone(
-            PlantArm(self.plant), settings, listener=lambda event: self.said.append(describe(event))
+            PlantArm(self.plant), standalone, listener=lambda event: self.said.append(describe(event))
         )
 
     def run(self, seconds: float) -> None:
@@ -84,12 +78,14 @@ class Both:
         """The command of the user's process, shape (7,) [m, x y z w]."""
         numbers = np.zeros(at.COMMAND_WORDS)
         numbers[at.C_POSE : at.C_POSE + 7] = pose
-        numbers.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_POSE
+        ints = numbers.view(np.int64)
+        ints[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_POSE
+        ints[at.C_EPOCH] = self.layout.header[at.EPOCH]
         self.layout.commands.write(numbers[1:])
 
     @property
     def limited(self) -> list[str]:
-        return self.cycle.pose_commander.guard.report.lines
+        return at.report_lines(self.layout)
 
     @property
     def is_commanding(self) -> bool:

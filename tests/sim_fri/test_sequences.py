@@ -13,11 +13,11 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.codec import encode_command
 from heptarm.fri.protocol.version import Version
 from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration, StateChanged
 from tests.fri import strategies as messages
+from tests.oracles.fri.codec import encode_command
 from tests.sim_fri.rig import READY, Rig, State, mirror
 
 W, R, CW, CA = State.MONITORING_WAIT, State.MONITORING_READY, State.COMMANDING_WAIT, State.COMMANDING_ACTIVE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -382,6 +383,29 @@ def test_what_does_not_go_together_is_refused_before_a_port_is_taken(
         pass
     with pytest.raises(CommandRejected, match="one of monitor, position"):
         command_mode("velocity")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux for its sockets")
+def test_a_client_that_hears_another_port_is_named() -> None:
+    """KUKA's SDK with the cabinet's address: its socket is connected to the cabinet's port, on one machine its own."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as application:
+        application.bind((HERE, 0))
+        port = application.getsockname()[1]
+        application.connect((HERE, port))
+        said: list[str] = []
+        server = Server(
+            SessionConfiguration(Version.V1_15),
+            Arm(),
+            client=(HERE, port),
+            port=0,
+            speed=0.0,
+            listener=lambda event: said.append(describe(event)),
+        )
+        server.open()
+        for _ in range(1100):
+            server.tick()
+        server.release()
+    assert sum(f"only receives from port {port}" in line for line in said) == 1
 
 
 def test_events_have_words() -> None:

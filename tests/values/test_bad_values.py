@@ -69,7 +69,7 @@ CALLED_BY_HEPTARM = ("given", "longest_duration", "path_time", "plot", "replace"
 EXPECTED: dict[str, type[Exception]] = {
     "CollisionGuard.collision": heptarm.StaleState,
     "CollisionGuard.seen": heptarm.StaleState,
-    "Trajectory.load": CommandRejected,
+    "Trajectory.load": heptarm.CommandRejected,
     "load": heptarm.CommandRejected,
     "law_from": heptarm.CommandRejected,
 }

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.arm.translate.motions import in_base, items
+from heptarm.arm.translate.motions import in_base, item
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
@@ -54,7 +54,7 @@ def test_arcs_and_ellipses_lie_in_the_frame() -> None:
 @pytest.mark.parametrize("name", MADE)
 def test_a_message_never_has_poses_in_another_frame(name: str) -> None:
     motion = MADE[name](lambda pose: pose, frame="/Table")
-    for unknown in (lambda: in_base(motion, {}), lambda: items([motion], robot("iiwa14"), 1.0)):
+    for unknown in (lambda: in_base(motion, {}), lambda: item(motion, robot("iiwa14"))):
         with pytest.raises(
             CommandRejected, match=r"frame of a target must be one of base, got '/Table' .*lin_rel"
         ):

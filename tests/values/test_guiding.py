@@ -115,7 +115,7 @@ def test_files(tmp_path: Path) -> None:
     for wrong in (other, broken):
         with pytest.raises(ha.CommandRejected, match="is not a trajectory"):
             ha.Trajectory.load(wrong)
-    with pytest.raises(OSError, match="missing"):
+    with pytest.raises(ha.CommandRejected, match="missing"):
         ha.Trajectory.load(tmp_path / "missing.npz")
 
 

@@ -75,6 +75,16 @@ def test_kuka_angles_at_gimbal_lock(b: float) -> None:
     assert Pose.xyz_abc(0, 0, 0, *pose.abc).angle_to(pose) < 1e-7
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("off", [0.0, *(10.0**k for k in range(-16, -1))])
+def test_kuka_angles_near_gimbal_lock_lose_nothing(side: int, off: float) -> None:
+    """Within 1e-8 of it they lost 6e-4 rad."""
+    for a, c in ((0.5, 0.3), (-2.9, 3.0), (0.0, 1.0), (3.1, -0.2)):
+        pose = Pose.xyz_abc(a=a, b=side * (math.pi / 2 - off), c=c)
+        again = Pose.xyz_abc(0, 0, 0, *pose.abc)
+        assert np.abs(again.rotation - pose.rotation).max() <= 1e-9
+
+
 @given(poses, poses, poses)
 def test_distances_are_metrics(a: Pose, b: Pose, c: Pose) -> None:
     assert a.distance_to(b) == b.distance_to(a)

@@ -128,3 +128,9 @@ def test_a_rate_that_is_not_ours_is_known_to_a_hundredth_so_that_a_ping_after_a_
     cabinet.offset, cabinet.rate = cabinet.clock(now) - 5.03 * now, 5.03
     cabinet.ping(estimate, now + 10e9)
     assert estimate.rate == pytest.approx(5.03, rel=1e-3)
+
+
+def test_two_pings_show_a_rate() -> None:
+    cabinet, estimate = Cabinet(rate=5.0), ClockOffset()
+    run(cabinet, estimate, start=1e9, pings=2, every=1e9)
+    assert estimate.rate == pytest.approx(5.0, rel=1e-3)

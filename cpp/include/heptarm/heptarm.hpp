@@ -888,7 +888,7 @@ struct Pose {
 
 /// KUKA's redundancy of an LBR pose.
 struct Redundancy {
-    double e1 = unset;  ///< arm angle; NaN: keep the current one [rad]
+    double e1 = unset;  ///< E1, the angle of A3; NaN: keep the current one [rad]
     std::int32_t status = -1;  ///< -1: keep
     std::int32_t turn = -1;  ///< -1: not given
 

@@ -23,9 +23,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, TypeVar
 
-from heptarm.arm.arm import Arm, camera_feed
+from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
 from heptarm.arm.motion.handle import MotionHandle, check_timeout
+from heptarm.arm.verbs import camera_feed
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
 from heptarm.values.arrays import flag, instance, shown, within

@@ -38,7 +38,7 @@ from heptarm.cli.output import emit
 from heptarm.errors import EXTRAS, CommandRejected, ConnectFailed, HeptarmError, Timeout
 from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
-from heptarm.fri.session.session import Event, Kind
+from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import UdpSocket
 from heptarm.wire.messages import MAJOR, MINOR, PORT
 

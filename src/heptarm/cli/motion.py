@@ -11,7 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from heptarm.arm.motion.servo import ServoStats
-from heptarm.arm.translate.motions import in_base, items
+from heptarm.arm.translate.motions import in_base, item
 from heptarm.cli.options import (
     NO_TARGET,
     Access,
@@ -122,7 +122,7 @@ def _move(motion: Motion, options: MoveOptions) -> int:
     """
     with options.target.connect(control=not options.dry_run) as arm:
         # a motion outside the limits is refused here, before any question
-        items((in_base(motion, arm.frames),), arm.robot, options.speed)
+        item(in_base(motion, arm.frames), arm.robot, speed=options.speed)
         title, percent = arm.robot.title, f"{options.speed:.0%}"
         if options.dry_run:
             preview = arm.plan(motion, speed=options.speed)

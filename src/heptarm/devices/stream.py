@@ -15,7 +15,7 @@ from heptarm.devices.device import REST, DeviceInput, InputDevice, Roles
 from heptarm.errors import CommandRejected
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import callback, finite, flag, instance
-from heptarm.values.files import path_of, read_text, refuse_existing, unreadable
+from heptarm.values.files import path_of, read_text, refuse_existing, unreadable, unwritable
 from heptarm.values.sealed import Sealed
 
 #: The first line of a file of inputs.
@@ -137,9 +137,7 @@ class RecordingDevice(Sealed):
         try:
             self._file: TextIO | None = Path(path).open("w", encoding="utf-8")  # noqa: SIM115 (closed by close)
         except OSError as error:
-            raise CommandRejected(
-                f"{path}: {error.strerror}", parameter="path", value=str(path), hint="choose another file"
-            ) from error
+            raise unwritable(Path(path), error) from error
         roles = self.roles
         head = {"format": _FORMAT, "roles": [roles.dead_man, roles.gripper, roles.quit]}
         self._file.write(json.dumps(head) + "\n")

@@ -18,6 +18,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote
 
 from heptarm.errors import CommandRejected
+from heptarm.io.folders import private_folder, settings_folder
 from heptarm.values.files import open_regular, path_of
 
 #: Environment variable with a key.
@@ -123,6 +124,8 @@ def write_key_file(file: Path, key: str, *, replace: bool = False) -> None:
         CommandRejected: the file exists and is not to be replaced, or it cannot be written.
     """
     try:
+        if settings_folder() in file.parents:
+            private_folder(file.parent)
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if file.exists() and not replace:
             raise CommandRejected(
@@ -146,14 +149,6 @@ def write_key_file(file: Path, key: str, *, replace: bool = False) -> None:
             parameter="key_file",
             value=str(file),
         ) from None
-
-
-def settings_folder() -> Path:
-    """Folder of the user's settings: heptarm in XDG_CONFIG_HOME (~/.config), on Windows in APPDATA."""
-    base = os.environ.get("XDG_CONFIG_HOME", "")
-    if not os.path.isabs(base):  # the specification: a relative path is to be ignored
-        base = os.environ.get("APPDATA", "") if sys.platform == "win32" else ""
-    return Path(base or Path.home() / ".config") / "heptarm"
 
 
 def key_folder() -> Path:

@@ -12,7 +12,6 @@ import io
 import json
 import os
 import shutil
-import stat
 import tempfile
 import time
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from heptarm.io.folders import is_private, private_folder, runtime_folder
 from heptarm.values.arrays import Array, Value
 
 _CARD, _SUFFIX = "panel.json", ".npz"
@@ -51,11 +51,7 @@ class PlanOutline(Value):
 
 def folder() -> Path:
     """Folder of this user's open panels: heptarm/panels in XDG_RUNTIME_DIR, otherwise in the temporary folder."""
-    base = os.environ.get("XDG_RUNTIME_DIR", "")
-    if base and os.path.isabs(base):
-        return Path(base) / "heptarm" / "panels"
-    user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
-    return Path(tempfile.gettempdir()) / f"heptarm-{user}" / "panels"
+    return runtime_folder() / "panels"
 
 
 class PlanBox:
@@ -69,7 +65,7 @@ class PlanBox:
         self._folder: Path | None = None
         self._robots = json.dumps(list(robots)).encode()
         with contextlib.suppress(OSError):
-            self._folder = _private(folder() / str(os.getpid()))
+            self._folder = private_folder(folder() / str(os.getpid()))
 
     def take(self) -> PlanOutline | None:
         """The newest plan that has arrived since the last call, None: there is none; to be called every second."""
@@ -113,7 +109,7 @@ def _open_panels(robot: str) -> list[Path]:
     found, now = [], time.time()
     with contextlib.suppress(OSError):
         for place in folder().iterdir():
-            if not place.name.isdigit() or not _is_private(place):
+            if not place.name.isdigit() or not is_private(place):
                 continue
             with contextlib.suppress(OSError, ValueError):
                 card = place / _CARD
@@ -123,26 +119,6 @@ def _open_panels(robot: str) -> list[Path]:
                 elif age < _FRESH and robot in json.loads(card.read_text(encoding="utf-8")):
                     found.append((place.stat().st_ctime_ns, place))
     return [place for _, place in sorted(found, reverse=True)]
-
-
-def _private(place: Path) -> Path:
-    """Make a folder that only this user may enter.
-
-    Raises:
-        OSError: it cannot be made, or is another user's.
-    """
-    for one in (place.parent.parent, place.parent, place):
-        one.mkdir(mode=0o700, exist_ok=True)
-        if not _is_private(one):
-            raise PermissionError(f"{one} is not this user's alone")
-    return place
-
-
-def _is_private(place: Path) -> bool:
-    if not hasattr(os, "getuid"):
-        return place.is_dir()
-    about = place.lstat()
-    return stat.S_ISDIR(about.st_mode) and about.st_uid == os.getuid() and not about.st_mode & 0o077
 
 
 def _put(file: Path, content: bytes) -> None:

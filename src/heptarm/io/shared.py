@@ -17,6 +17,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.errors import HeptarmError
+
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
@@ -30,6 +32,9 @@ class MemoryBlock:
     Args:
         words: size in words of eight bytes; 0 maps an existing file.
         path: the file; None creates one, in memory where the system has a file system for that.
+
+    Raises:
+        HeptarmError: there is not so much memory; the hint names remedies.
 
     Attributes:
         path: the file.
@@ -45,8 +50,18 @@ class MemoryBlock:
             handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
         try:
             if words:
-                os.truncate(handle, 8 * words)
+                _reserve(handle, 8 * words)
             self._map = mmap.mmap(handle, 0)
+        except OSError as error:
+            if words:
+                with contextlib.suppress(OSError):
+                    os.unlink(path)
+            raise HeptarmError(
+                f"{8 * words / 1024:.0f} KiB of shared memory cannot be reserved in {os.path.dirname(path)}: "
+                f"{(error.strerror or str(error)).lower()}",
+                hint=f"free some space there (df -h {os.path.dirname(path)}), or give it more: "
+                "mount -o remount,size=256M /dev/shm, docker run --shm-size=256m",
+            ) from error
         finally:
             os.close(handle)
         self.path = path
@@ -62,6 +77,17 @@ class MemoryBlock:
         # Windows keeps files that are in use, and the other process may have deleted it already
         with contextlib.suppress(OSError):
             os.unlink(self.path)
+
+
+def _reserve(handle: int, size: int) -> None:
+    """Give a file a size, and reserve all of it: where the memory is full, writing a mapped file kills the process.
+
+    Raises:
+        OSError: there is not so much.
+    """
+    os.truncate(handle, size)
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(handle, 0, size)
 
 
 class Ring:

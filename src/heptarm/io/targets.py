@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from heptarm.errors import CommandRejected
-from heptarm.io.keys import settings_folder
+from heptarm.io.folders import private_folder, settings_folder
 from heptarm.values.arrays import shown
 from heptarm.values.files import read_text
 from heptarm.values.robot import flange
@@ -73,7 +73,7 @@ class SavedTarget:
     def mark_used(self) -> None:
         """Note that a client has connected to it; where that cannot be written, nothing is noted."""
         with contextlib.suppress(OSError):
-            _mark(self.name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            private_folder(_mark(self.name).parent)
             _mark(self.name).touch()
 
 
@@ -255,7 +255,7 @@ def _write(text: str) -> None:
     file = targets_file()
     part = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private_folder(file.parent)
         part.write_text(text, encoding="utf-8")
         part.replace(file)
     except OSError as error:

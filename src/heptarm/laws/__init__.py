@@ -1,7 +1,8 @@
 """Ready control laws for FRI, compiled once from C: they run in the native loop without Python.
 
 Each function returns a law for `arm.fri(..., law=...)` or `heptarm.fri.Client`. Its parameters change live through
-`rt.params`, what it keeps and reports is in `rt.memory`. The dynamics are those of `heptarm.model`.
+`rt.params`, within the ranges and at the rates with which they are declared; what it keeps and reports is in
+`rt.memory`. The dynamics are those of `heptarm.model`.
 """
 
 from __future__ import annotations

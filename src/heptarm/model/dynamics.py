@@ -2,8 +2,9 @@
 
 `native/dynamics.h` computes it by the recursion of Newton and Euler (Featherstone, "Rigid Body Dynamics
 Algorithms", 2008, chapter 5), and C by the Jacobians of the links (Siciliano, Sciavicco, Villani, Oriolo,
-"Robotics", 2009, section 7.1): with it the matrix dM/dt - 2 C is skew-symmetric. Rotor inertia is not in it, and friction only as you give it: the
-torque sensors sit behind the gears. The link data are nominal, see `heptarm.values.robot`.
+"Robotics", 2009, section 7.1): with it the matrix dM/dt - 2 C is skew-symmetric. Rotor inertia is not in it, and
+friction only as you give it: the torque sensors sit behind the gears. The link data are nominal, see
+`heptarm.values.robot`.
 """
 
 from __future__ import annotations

@@ -150,8 +150,9 @@ def solve(
 
     E1, Status and arm angle are kept if given. Otherwise A3 and Status stay those of `near`, unless another arm
     position needs less than a fifth of that way: then it is the one nearest to `near`. If there is a solution within
-    the limits, one is found. Where axes coincide, so that the pose does not determine joints (A2, A4 or A6 near 0), those joints
-    stay as near to `near` as the pose allows within 1e-9 m and rad. Without `near`, a usual bent arm takes its place.
+    the limits, one is found. Where axes coincide, so that the pose does not determine joints (A2, A4 or A6 near 0),
+    those joints stay as near to `near` as the pose allows within 1e-9 m and rad. Without `near`, a usual bent arm takes
+    its place.
 
     Args:
         robot: the robot.

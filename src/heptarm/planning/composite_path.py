@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.batch import forward_batch
-from heptarm.planning.command import PlanError
+from heptarm.planning.motion import PlanError
 from heptarm.planning.path import JointPath
 from heptarm.planning.time_scaling import PathConstraints
 from heptarm.values.arrays import Array

@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import Vec, flange
-from heptarm.planning.command import PlanError
+from heptarm.planning.motion import PlanError
 from heptarm.values.arrays import Array
 from heptarm.values.motion.circle import arc_of
 from heptarm.values.motion.orientation import Orientation
@@ -48,16 +48,38 @@ class OrientationPath(Protocol):
         """Orientation in the base."""
 
 
+#: Half a turn, whose direction is free: cosine of half the angle between two orientations, which are known to 1e-6 rad.
+_HALF_TURN = 1e-6
+
+
+def is_half_turn(start: Array, end: Array) -> bool:
+    """Whether one orientation is half a turn from another, so that two directions lead to it."""
+    return abs(float(start @ end)) < _HALF_TURN
+
+
 class Slerp:
-    """From one orientation to another about a fixed axis, by the smaller angle."""
+    """From one orientation to another about a fixed axis, by the smaller angle.
+
+    Half a turn goes about the axis whose first component that is not 0 is positive, in base axes.
+
+    Args:
+        start: quaternion x y z w.
+        end: quaternion x y z w.
+        is_other: half a turn goes in the other direction.
+    """
 
     __slots__ = ("_from", "_half", "_to", "angle")
 
-    def __init__(self, start: Array, end: Array) -> None:
+    def __init__(self, start: Array, end: Array, *, is_other: bool = False) -> None:
         dot = float(start @ end)
+        sign = 1.0 if dot >= 0 else -1.0
+        if is_half_turn(start, end):
+            axis = multiply(end, start * np.array([-1.0, -1.0, -1.0, 1.0]))[:3]
+            leading = axis[int(np.argmax(np.abs(axis) > 1e-3))]
+            sign = 1.0 if (leading >= 0.0) != is_other else -1.0
         self._from: Quat = tuple(start.tolist())
-        self._to: Quat = tuple((end if dot >= 0 else -end).tolist())
-        self._half = acos(min(1.0, abs(dot)))
+        self._to: Quat = tuple((sign * end).tolist())
+        self._half = acos(max(-1.0, min(1.0, sign * dot)))
         self.angle = Pose.of((0, 0, 0), start).angle_to(Pose.of((0, 0, 0), end))
 
     def at(self, s: float) -> Quat:
@@ -172,15 +194,15 @@ class Arc:
         self.angle = turn.angle + (self.sweep if follows else 0.0)
         return self
 
-    def oriented(self, start: Array, end: Array, control: Orientation) -> Arc:
-        """This arc with an orientation from one quaternion to another, relative to base or path."""
+    def oriented(self, start: Array, end: Array, control: Orientation, *, is_other: bool = False) -> Arc:
+        """This arc with an orientation from one quaternion to another, relative to base or path; see `Slerp`."""
         follows = control.reference == "path"
         if control.type == "constant":
             end = start
         elif follows:
             half = -self.sweep / 2
             end = multiply(np.array([*(self.axis * sin(half)), cos(half)]), end)
-        return self.turning(Slerp(start, end), follows=follows)
+        return self.turning(Slerp(start, end, is_other=is_other), follows=follows)
 
     def point(self, s: float) -> Vec:
         """Position in the base [m]."""

@@ -1,39 +1,36 @@
 """Plans a program of motions as the controller would, before it is sent.
 
-The values that a client sends become the orders that the cabinet's doubles would give to the plant, and `plan` plans
+The items that a client sends become the motions that the cabinet's doubles would give to the plant, and `plan` plans
 them: there is one planner. It runs beside a robot, too: it needs neither Java nor MuJoCo.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from math import ceil, isinf, nan
+from dataclasses import dataclass, fields
+from enum import Enum
+from math import ceil, isnan
+from typing import Any, TypeVar
 
 import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError, Unreachable
-from heptarm.model.inverse_kinematics import redundancy
-from heptarm.planning.command import Order, PlanError, Seven
+from heptarm.planning import seam
+from heptarm.planning.motion import PlanError
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.frames import TOOL
-from heptarm.values.motion.circle import Circ
-from heptarm.values.motion.dynamics import Blended, Dynamics
-from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.line import Lin, LinRel
-from heptarm.values.motion.motion import Hold, Motion
-from heptarm.values.motion.ptp import Ptp, PtpHome, PtpPose
-from heptarm.values.motion.spline import JointSpline, Segment, Spline
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
+from heptarm.wire import messages as wire
+
+_Planned = TypeVar("_Planned")
 
 #: Time on both sides of a sample from which its velocity and acceleration are computed [s].
 _STENCIL = 1e-3
 #: Most samples of a program; a longer one is sampled more coarsely.
 _MOST_SAMPLES = 5000
-_KEEP = (nan, -1, -1)
 #: Slowest speed ds/dt that is no rest [1/s].
 _RESTS = 1e-6
 #: The errors of what a plan is refused for, and their remedies.
@@ -85,14 +82,14 @@ class PlannedProgram:
 
 
 def look_ahead(
-    robot: RobotModel, start: Array, motions: Sequence[Motion], frames: FramesOfArm, *, step: float
+    robot: RobotModel, start: Array, items: Sequence[wire.Item], frames: FramesOfArm, *, step: float
 ) -> PlannedProgram:
     """Plan motions one after the other, as one program.
 
     Args:
         robot: the robot.
         start: joint positions at rest, shape (7,) [rad].
-        motions: in their order.
+        items: of the program, in their order; their poses are in the base.
         frames: what the names of frames mean.
         step: largest time between two samples [s].
 
@@ -104,11 +101,11 @@ def look_ahead(
     """
     plans: list[Plan] = []
     here, first = start, 0
-    while first < len(motions):
+    while first < len(items):
         last = first
-        while last + 1 < len(motions) and _joins(motions[last], motions[last + 1]):
+        while last + 1 < len(items) and _joins(items[last], items[last + 1]):
             last += 1
-        plans.append(_planned(robot, here, motions, range(first, last + 1), frames))
+        plans.append(_planned(robot, here, items, range(first, last + 1), frames))
         here, first = plans[-1].end, last + 1
     coarse = max(step, sum(one.duration for one in plans) / _MOST_SAMPLES)
     samples = [_Samples.of(one, coarse) for one in plans]
@@ -142,9 +139,10 @@ class _Samples:
     @classmethod
     def of(cls, planned: Plan, step: float) -> _Samples:
         """Sample a plan at even times, its ends included."""
-        count = len(planned.order.parts) if planned.order.kind == "batch" else 1
+        motion = planned.motion
+        count = len(motion.motions) if isinstance(motion, seam.Batch) else 1
         if planned.path is None or planned.timing is None:
-            hold = planned.duration if planned.order.kind == "hold" else 0.0
+            hold = planned.duration if isinstance(motion, seam.Hold) else 0.0
             t, still = np.array([0.0, hold]), np.zeros((2, 7))
             q = np.tile(planned.start, (2, 1))
             return cls(t, q, still, still, (0.0,) * count, (False,) * count)
@@ -162,176 +160,112 @@ class _Samples:
         before, q, after = np.array(joints).transpose(1, 0, 2)
         dq, ddq = (after - before) / (2 * h), (after - 2 * q + before) / h**2
         dq[[0, -1]] = ddq[[0, -1]] = 0.0  # at rest
-        marks = planned.marks if planned.order.kind == "batch" else ()
+        marks = planned.marks if isinstance(motion, seam.Batch) else ()
         begins = [0.0, *np.interp(marks, places, t).tolist()]
         moves = [profile.at(begin)[1] > _RESTS for begin in begins[1:]]
         return cls(t, q, dq, ddq, tuple(begins), (*moves, False))
 
 
-# --------------------------------------------------------------------------------------- motions as orders
+# ------------------------------------------------------------------------------------ items as the plant's motions
 
 
-def _joins(motion: Motion, following: Motion) -> bool:
+def _joins(item: wire.Item, following: wire.Item) -> bool:
     """Whether the cabinet sends two motions to the robot as one batch: the first one is blended into the second."""
-    if not isinstance(motion, Blended) or not isinstance(following, Blended):
+    zone = getattr(item.motion, "blending", None)
+    if zone is None or not hasattr(following.motion, "blending"):
         return False
-    blending = motion.blending
-    has_zone = blending.relative > 0 or blending.distance > 0 or blending.orientation > 0
-    return has_zone and _moving(motion) == _moving(following)
-
-
-def _moving(motion: Motion) -> str:
-    return getattr(motion, "moving", TOOL)
+    has_zone = zone.relative > 0 or zone.distance > 0 or zone.orientation > 0
+    return has_zone and item.frame == following.frame
 
 
 def _planned(
-    robot: RobotModel, start: Array, motions: Sequence[Motion], which: range, frames: FramesOfArm
+    robot: RobotModel, start: Array, items: Sequence[wire.Item], which: range, frames: FramesOfArm
 ) -> Plan:
-    """The plan of some of the motions, which the controller executes together."""
+    """The plan of some of the items, which the controller executes together."""
+    tcp = frames.tip(items[which[0]].frame or TOOL)
+    place = _place(which, items)
     try:
-        parts = tuple(_order(robot, motions[index], frames) for index in which)
+        motions = tuple(_motion(items[index], tcp, frames) for index in which)
     except CommandRejected as error:
-        if place := _place(which, motions):
+        if place:
             error.parameter = ""  # it is the whole motion
         raise error.inside(place) from None
-    order = parts[0]
-    if len(parts) > 1:
-        order = Order(0, "batch", tcp=parts[0].tcp, parts=parts)
+    motion = motions[0] if len(motions) == 1 else seam.Batch(motions=motions)
     try:
-        return plan(robot, order, start)
+        return plan(robot, motion, start, tcp=tuple(tcp.array.tolist()))
     except PlanError as error:
         kind = _ERRORS.get(error.kind, CommandRejected)
-        place = _place(which, motions)
         parameter = "" if place else "motion"
         raise kind(str(error), parameter=parameter, hint=_REMEDIES[kind]).inside(place) from None
 
 
-def _place(which: range, motions: Sequence[Motion]) -> str:
+def _place(which: range, items: Sequence[wire.Item]) -> str:
     """The motions of a program of several; "": it has only one."""
-    if len(motions) == 1:
+    if len(items) == 1:
         return ""
     return f"motions[{which[0]}]" if len(which) == 1 else f"motions[{which[0]}:{which[-1] + 1}]"
 
 
-def _order(robot: RobotModel, motion: Motion, frames: FramesOfArm) -> Order:
-    """The order that the plant would get for a motion."""
-    tcp = frames.tip(_moving(motion))
-    base = Order(0, "hold", tcp=_seven(tcp))
-    if isinstance(motion, Hold):
-        if isinf(motion.duration):
-            raise CommandRejected(
-                "a hold without a duration has no end to look ahead to",
-                parameter="motion",
-                hint="give it a duration, such as hold(2.0)",
-            )
-        return replace(base, duration=motion.duration)
-    if isinstance(motion, HandGuide):
+def _motion(item: wire.Item, tcp: Pose, frames: FramesOfArm) -> seam.PlantMotion:
+    """The motion that the plant would get for an item.
+
+    A motion of the plant has mostly the name and the fields of its message; what differs stands here.
+    """
+    motion = item.motion
+    if isinstance(motion, wire.PtpHome):
+        return _same(seam.Ptp, motion, q=(0.0,) * 7)
+    if isinstance(motion, wire.LinRel):
+        return _same(seam.LinRel, motion, **_relative(motion, item.frame, tcp, frames))
+    if isinstance(motion, wire.Spline):
+        segments = (
+            _same(getattr(seam, type(one).__name__.removesuffix("Segment")), one) for one in motion.segments
+        )
+        return _same(seam.Spline, motion, segments=tuple(segments))
+    if isinstance(motion, wire.JointSpline):
+        points = (_same(seam.Ptp, one) for one in motion.points)
+        return _same(seam.JointSpline, motion, points=tuple(points))
+    if isinstance(motion, wire.HandGuide):
         raise CommandRejected(
             "hand guiding has no path to look ahead along: the person chooses it",
             parameter="motion",
             hint="leave it out of the program",
         )
-    if isinstance(motion, Spline):
-        parts = tuple(_segment(base, one, motion.dynamics) for one in motion.segments)
-        return _limited(replace(base, kind="spline", parts=parts), motion.dynamics)
-    if isinstance(motion, JointSpline):
-        for index, point in enumerate(motion.points):
-            robot.check(point.q, f"points[{index}].q")
-        points = tuple(
-            _limited(
-                replace(base, kind="ptp", joints=tuple(one.q.tolist())),
-                one.dynamics.filled_from(motion.dynamics),
-            )
-            for one in motion.points
-        )
-        return _limited(replace(base, kind="spline_joints", parts=points), motion.dynamics)
-    if not isinstance(motion, Blended):
+    if isinstance(motion, wire.Hold) and isnan(motion.duration):
         raise CommandRejected(
-            f"{type(motion).__name__} cannot be looked ahead",
+            "a hold without a duration has no end to look ahead to",
             parameter="motion",
-            hint="leave it out of the program",
+            hint="give it a duration, such as hold(2.0)",
         )
-    order = _limited(_aimed(base, robot, motion, tcp, frames), motion.dynamics)
-    zone = motion.blending
-    return replace(order, blending=(zone.relative, zone.distance, zone.orientation))
+    kind: type[seam.PlantMotion] = getattr(seam, type(motion).__name__)
+    return _same(kind, motion)
 
 
-def _aimed(order: Order, robot: RobotModel, motion: Blended, tcp: Pose, frames: FramesOfArm) -> Order:
-    """An order with kind and target of a motion from one place to another."""
-    if isinstance(motion, Ptp):
-        robot.check(motion.q)
-        return replace(order, kind="ptp", joints=tuple(motion.q.tolist()))
-    if isinstance(motion, PtpHome):
-        return replace(order, kind="ptp", joints=(0.0,) * 7)
-    if isinstance(motion, LinRel):
-        return _relative(replace(order, orientation=motion.orientation), motion, tcp, frames)
-    target = replace(order, redundancy=_redundancy(robot, motion))
-    if isinstance(motion, PtpPose):
-        return replace(target, kind="ptp", pose=_seven(motion.target))
-    if isinstance(motion, Lin):
-        return replace(target, kind="lin", pose=_seven(motion.target), orientation=motion.orientation)
-    assert isinstance(motion, Circ)
-    return replace(
-        target,
-        kind="circ",
-        via=_seven(motion.via),
-        pose=_seven(motion.end),
-        orientation=motion.orientation,
-    )
+def _same(kind: type[_Planned], message: Any, **given: Any) -> _Planned:
+    """A value of the seam with the fields that a message has under the same names, and the `given` ones."""
+    same = {
+        one.name: _converted(getattr(message, one.name))
+        for one in fields(kind)  # type: ignore[arg-type]
+        if one.name not in given and hasattr(message, one.name)
+    }
+    return kind(**same, **given)
 
 
-def _relative(order: Order, motion: LinRel, tcp: Pose, frames: FramesOfArm) -> Order:
-    """The order of a relative line: its offset in the axes of the motion frame, or of a fixed frame."""
-    order = replace(order, kind="lin_rel", offset=_seven(motion.offset))
-    if motion.frame in (TOOL, motion.moving):
-        return order
-    fixed = frames.fixed(motion.frame)
+def _converted(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return getattr(seam, type(value).__name__)[value.name]
+    if isinstance(value, float | int | str | bool | tuple):
+        return value
+    return _same(getattr(seam, type(value).__name__), value)
+
+
+def _relative(motion: wire.LinRel, moving: str, tcp: Pose, frames: FramesOfArm) -> dict[str, Any]:
+    """Offset and axes of a relative line: in the axes of the motion frame, or of a fixed frame."""
+    if motion.reference in ("", moving):
+        return {}
+    fixed = frames.fixed(motion.reference)
     if fixed is not None:
-        return replace(order, reference=tuple(fixed.quat.tolist()))
+        return {"axes": tuple(fixed.quat.tolist())}
     # a frame on the flange turns with the motion frame
-    turn = Pose.of((0.0, 0.0, 0.0), (tcp.inverse() @ frames.tip(motion.frame)).quat)
-    return replace(order, offset=_seven(turn @ motion.offset @ turn.inverse()))
-
-
-def _segment(order: Order, one: Segment, whole: Dynamics) -> Order:
-    """The order of a segment of a spline."""
-    if isinstance(one, Circ):
-        made = replace(order, kind="circ", via=_seven(one.via), pose=_seven(one.end))
-    else:
-        made = replace(order, kind="lin" if isinstance(one, Lin) else "spl", pose=_seven(one.target))
-    return _limited(replace(made, orientation=one.orientation), one.dynamics.filled_from(whole))
-
-
-def _limited(order: Order, dynamics: Dynamics) -> Order:
-    """An order with the limits of a motion."""
-    return replace(
-        order,
-        joint_velocity=_fractions(dynamics.joint_speed),
-        joint_acceleration=_fractions(dynamics.joint_acceleration),
-        joint_jerk=_fractions(dynamics.joint_jerk),
-        cart_velocity=dynamics.speed_mps,
-        cart_acceleration=dynamics.acceleration_mps2,
-        cart_jerk=dynamics.jerk_mps3,
-        ori_velocity=dynamics.speed_radps,
-        ori_acceleration=dynamics.acceleration_radps2,
-        ori_jerk=dynamics.jerk_radps3,
-    )
-
-
-def _fractions(values: Array) -> Seven:
-    return tuple(np.where(np.isnan(values), 1.0, values).tolist())
-
-
-def _redundancy(robot: RobotModel, motion: Blended) -> tuple[float, int, int]:
-    """Arm angle, Status and Turn of a target: as given, as near joint positions, or as now."""
-    near, given = getattr(motion, "near", None), getattr(motion, "redundancy", None)
-    if near is not None:
-        robot.check(near, "near")
-        own = redundancy(robot, near.tolist())
-        return own.e1, own.status, -1
-    return _KEEP if given is None else (given.e1, given.status, given.turn)
-
-
-def _seven(pose: Pose) -> Seven:
-    """Position [m] and quaternion."""
-    return (*pose.xyz.tolist(), *pose.quat.tolist())
+    turn = Pose.of((0.0, 0.0, 0.0), (tcp.inverse() @ frames.tip(motion.reference)).quat)
+    offset = turn @ Pose.of(motion.offset.xyz, motion.offset.quat) @ turn.inverse()
+    return {"offset": seam.Pose(xyz=tuple(offset.xyz.tolist()), quat=tuple(offset.quat.tolist()))}

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.model.inverse_kinematics import PathInverse
+from heptarm.model.inverse_kinematics import PathInverse, status_of
 from heptarm.planning.geometry import Geometry, blend_weight
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -68,6 +68,7 @@ class CartesianPath(Sequential):
     Attributes:
         length: [m].
         angle: by which the tool frame turns [rad].
+        status: of the arm at the start.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class CartesianPath(Sequential):
         self.geometry = geometry
         self.length, self.angle = geometry.length, geometry.angle
         self._inverse = PathInverse(robot, tcp)
-        self._start = float(start[2])
+        self.status, self._start = status_of(robot, start.tolist()), float(start[2])
         self._turn = 0.0 if e1 is None else remainder(e1, 2 * pi) - self._start
         self._a3 = self._free if e1 is None else self._linear
 

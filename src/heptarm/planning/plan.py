@@ -9,7 +9,7 @@ from math import inf, isnan
 
 import numpy as np
 
-from heptarm.planning.command import Order
+from heptarm.planning import seam
 from heptarm.planning.composite_path import CompositePath, constraints, sample
 from heptarm.planning.path import JointPath, PathLengths
 from heptarm.planning.table import MotionTable
@@ -26,7 +26,7 @@ class Plan:
     """A motion that can be executed.
 
     Attributes:
-        order: its command.
+        motion: what it executes.
         start: joint positions at its start, shape (7,) [rad].
         end: joint positions at its end, shape (7,) [rad].
         path: joint positions over s; None: it follows no path.
@@ -36,7 +36,7 @@ class Plan:
         table: computes many set-points at once; None: they have to be computed one by one.
     """
 
-    order: Order
+    motion: seam.PlantMotion
     start: Array
     end: Array
     path: JointPath | None = None
@@ -50,7 +50,9 @@ class Plan:
         """Time at full speed [s]; infinite for an endless hold."""
         if self.timing is not None:
             return self.timing.profile.duration
-        return _NEVER if isnan(self.order.duration) else self.order.duration
+        if isinstance(self.motion, seam.Hold) and not isnan(self.motion.duration):
+            return self.motion.duration
+        return _NEVER
 
     def span(self, part: int) -> tuple[float, float]:
         """Path parameter at which a part begins and ends; -1: the whole."""
@@ -63,7 +65,7 @@ class Plan:
 
     def measured(self, part: int) -> tuple[float, float]:
         """Path parameters between which progress is measured: of the motion of a batch, or of the whole."""
-        return self.span(part if self.marks and self.order.kind == "batch" else -1)
+        return self.span(part if self.marks and isinstance(self.motion, seam.Batch) else -1)
 
     def progress(self, s: float, part: int) -> float:
         """Progress of the running motion of a batch at s in [0, 1]; any other motion is its only part."""
@@ -75,8 +77,9 @@ class Plan:
 
 def timed(
     robot: RobotModel,
-    order: Order,
+    motion: seam.PlantMotion,
     start: Array,
+    tcp: Pose,
     path: CompositePath,
     rests: Sequence[int],
     marks: Sequence[float],
@@ -85,8 +88,9 @@ def timed(
 
     Args:
         robot: the robot.
-        order: the command.
+        motion: what is executed.
         start: joint positions, shape (7,) [rad].
+        tcp: flange to motion frame.
         path: the path.
         rests: segments behind which the arm rests, ascending; the last segment is the last of them.
         marks: s at which the parts begin, without the first.
@@ -94,7 +98,7 @@ def timed(
     Raises:
         PlanError: the path leaves the workspace or the joint limits, or passes a singularity.
     """
-    samples = sample(robot, path, start, Pose.of(order.tcp[:3], order.tcp[3:]))
+    samples = sample(robot, path, start, tcp)
     edges = [0, *(index + 1 for index in rests)]
     sections = tuple(constraints(robot, path, samples, a, b) for a, b in pairwise(edges))
     timing = PathTiming(tuple(path.marks[edge] for edge in edges[1:]), sections)
@@ -103,4 +107,4 @@ def timed(
     ]
     lengths = PathLengths.through(np.concatenate(fractions), np.concatenate(samples.positions))
     table = MotionTable.of(path, timing.profile)
-    return Plan(order, start, samples.q[-1][-1], path, timing, lengths, tuple(marks), table)
+    return Plan(motion, start, samples.q[-1][-1], path, timing, lengths, tuple(marks), table)

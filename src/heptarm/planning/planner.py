@@ -1,37 +1,52 @@
-"""Plans a command of any kind, or refuses it with a text of the kind that Sunrise gives."""
+"""Plans a motion of any kind, or refuses it with a text of the kind that Sunrise gives."""
 
 from __future__ import annotations
 
 from heptarm.errors import CommandRejected
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning import seam
+from heptarm.planning.motion import (
+    ON_FLANGE,
+    PlanError,
+    ServoMotion,
+    check_numbers,
+    check_places,
+)
 from heptarm.planning.plan import Plan
-from heptarm.planning.program import plan_motions
+from heptarm.planning.program import plan_batch, plan_motion
 from heptarm.planning.spline import plan_joint_spline, plan_spline
-from heptarm.planning.targets import LINES, check_numbers
 from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
-_PLANNERS = {
-    "batch": plan_motions,
-    "ptp": plan_motions,
-    **dict.fromkeys(LINES, plan_motions),
-    "spline": plan_spline,
-    "spline_joints": plan_joint_spline,
-}
 
+def plan(
+    robot: RobotModel, motion: seam.PlantMotion, start: Array, *, tcp: tuple[float, ...] = ON_FLANGE
+) -> Plan:
+    """Plan a motion from rest.
 
-def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
-    """Plan a command from rest at `start`, shape (7,) [rad].
+    Args:
+        robot: the robot.
+        motion: the motion.
+        start: joint positions, shape (7,) [rad].
+        tcp: flange to motion frame, x y z [m], quaternion x y z w.
 
     Raises:
         PlanError: a joint limit, an unreachable pose, a path through a singularity, or values that make no sense.
     """
     try:
-        check_numbers(order)
-        if order.kind in ("hold", "guide") or order.is_servo:
-            return Plan(order, start, start)
-        if order.kind not in _PLANNERS:
-            raise PlanError("planning", f"Can not plan motion: there is no motion of kind {order.kind!r}")
-        return _PLANNERS[order.kind](robot, order, start)
+        check_numbers(motion)
+        check_places(tcp)
+        frame = Pose.of(tcp[:3], tcp[3:])
+        if isinstance(motion, seam.Hold | seam.HandGuide | ServoMotion):
+            return Plan(motion, start, start)
+        if isinstance(motion, seam.Batch):
+            return plan_batch(robot, motion, start, frame)
+        if isinstance(motion, seam.Spline):
+            return plan_spline(robot, motion, start, frame)
+        if isinstance(motion, seam.JointSpline):
+            return plan_joint_spline(robot, motion, start, frame)
+        if isinstance(motion, seam.Spl):
+            raise PlanError("planning", "Can not plan motion: a SPL is a segment of a spline, no motion by itself")
+        return plan_motion(robot, motion, start, frame)
     except CommandRejected as error:
         raise PlanError("planning", f"Can not plan motion: {error}") from None

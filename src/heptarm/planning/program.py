@@ -8,7 +8,7 @@ from math import inf, isnan
 import numpy as np
 
 from heptarm.model.kinematics import Vec
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning import seam
 from heptarm.planning.composite_path import (
     UNBOUND,
     CompositePath,
@@ -19,13 +19,21 @@ from heptarm.planning.composite_path import (
     turns,
 )
 from heptarm.planning.geometry import Geometry, Quat, blend_weight, product
+from heptarm.planning.motion import (
+    PlanError,
+    check_numbers,
+    fractions,
+    inherited,
+    kind_of,
+)
 from heptarm.planning.path import CartesianPath, JointLine, JointPath, Sequential
 from heptarm.planning.plan import Plan, timed
 from heptarm.planning.targets import (
-    LINES,
     STILL,
+    JointMotion,
+    PathMotion,
     cartesian_path,
-    check_numbers,
+    e1_of,
     joint_target,
     programmed_speed,
     segment_limits,
@@ -53,8 +61,12 @@ class JointBlend(Sequential):
         self._last, self._first, self._corner = last, first, corner
 
     def at(self, s: float, near: Array) -> Array:
-        """Joint positions, shape (7,) [rad]."""
-        before = self._before.at(1.0 - self._last * blend_weight(s), near)
+        """Joint positions, shape (7,) [rad].
+
+        Both paths are followed next to the corner: `near` is beside both of them, and what a path leaves free, such as
+        A3, would then follow the blend and be counted twice.
+        """
+        before = self._before.at(1.0 - self._last * blend_weight(s), self._corner)
         return before + self._after.at(self._first * blend_weight(1.0 - s), self._corner) - self._corner
 
 
@@ -88,34 +100,31 @@ class GeometryBlend:
         return product(product(before, self._back), self._after.quat(self._first * blend_weight(1.0 - s)))
 
 
-def blending_zone(
-    positions: Array, rotations: Array, blending: tuple[float, float, float], *, backwards: bool
-) -> float:
+def blending_zone(positions: Array, rotations: Array, blending: seam.Blending, *, backwards: bool) -> float:
     """Fraction of a path that a blending allows at one of its ends.
 
     Args:
         positions: of the tool frame at even samples, shape (n, 3) [m].
         rotations: likewise, shape (n, 3, 3).
-        blending: fraction of the path, distance [m], rotation [rad]; zeros do not count.
+        blending: what is zero or not given does not count.
         backwards: at its end.
     """
-    relative, distance, turn = blending
     if backwards:
         positions, rotations = positions[::-1], rotations[::-1]
-    fractions = [relative] if relative > 0 else []
+    found = [blending.relative] if blending.relative > 0 else []
     for most, distances in (
-        (distance, np.linalg.norm(positions - positions[0], axis=1)),
-        (turn, turns(rotations, rotations[0])),
+        (blending.distance, np.linalg.norm(positions - positions[0], axis=1)),
+        (blending.orientation, turns(rotations, rotations[0])),
     ):
         if most > 0:
             beyond = np.flatnonzero(distances > most)
             if len(beyond):
                 k = int(beyond[0])
                 part = (most - distances[k - 1]) / (distances[k] - distances[k - 1])
-                fractions.append((k - 1 + float(part)) / (len(distances) - 1))
+                found.append((k - 1 + float(part)) / (len(distances) - 1))
             else:
-                fractions.append(1.0)
-    return min(fractions, default=0.0)
+                found.append(1.0)
+    return min(found, default=0.0)
 
 
 #: Samples of a motion to find its blending zones with.
@@ -157,53 +166,68 @@ class _Motion:
     finish: float = 0.0
 
 
-def plan_motions(robot: RobotModel, order: Order, start: Array) -> Plan:
-    """Plan a motion or a batch of them from rest at `start`, shape (7,) [rad].
+def plan_motion(robot: RobotModel, motion: JointMotion | PathMotion, start: Array, tcp: Pose) -> Plan:
+    """Plan a motion by itself from rest at `start`, shape (7,) [rad].
 
     Raises:
-        PlanError: one of the motions cannot be planned; of a batch the error names it.
+        PlanError: it cannot be planned.
     """
-    if order.kind != "batch":
-        return _program(robot, order, start, [_motion(robot, order, start, is_alone=True)])
+    return _program(robot, motion, start, tcp, [_motion(robot, motion, start, tcp, is_alone=True)])
+
+
+def plan_batch(robot: RobotModel, batch: seam.Batch, start: Array, tcp: Pose) -> Plan:
+    """Plan a batch of motions from rest at `start`, shape (7,) [rad].
+
+    Raises:
+        PlanError: one of the motions cannot be planned; the error names it.
+    """
     motions: list[_Motion] = []
+    zones: list[seam.Blending] = []
     here = start
-    for index, one in enumerate(order.parts):
+    for index, part in enumerate(batch.motions):
         try:
-            check_numbers(one)
-            motion = _motion(robot, replace(one, tcp=order.tcp), here, is_alone=len(order.parts) == 1)
+            check_numbers(part)
+            if not isinstance(part, JointMotion | PathMotion):
+                raise PlanError(
+                    "planning", f"Can not plan motion: a batch cannot have a motion of kind {kind_of(part)}"
+                )
+            whole = inherited(part, batch)
+            motion = _motion(robot, whole, here, tcp, is_alone=len(batch.motions) == 1)
         except PlanError as error:
             raise PlanError(error.kind, f"{error} (motion {index + 1} of the batch)") from None
         motions.append(motion)
+        zones.append(whole.blending)
         here = motion.end
-    for before, after, one in zip(motions, motions[1:], order.parts, strict=False):
-        _blend_ends(before, after, one.blending)
-    return _program(robot, order, start, motions)
+    for before, after, zone in zip(motions, motions[1:], zones, strict=False):
+        _blend_ends(before, after, zone)
+    return _program(robot, batch, start, tcp, motions)
 
 
-def _program(robot: RobotModel, order: Order, start: Array, motions: list[_Motion]) -> Plan:
+def _program(
+    robot: RobotModel, whole: seam.PlantMotion, start: Array, tcp: Pose, motions: list[_Motion]
+) -> Plan:
     path, rests, marks = _composed(motions)
     if path is None:
-        return Plan(order, start, motions[-1].end, marks=(0.0,) * (len(motions) - 1))
-    return timed(robot, order, start, path, rests, marks)
+        return Plan(whole, start, motions[-1].end, marks=(0.0,) * (len(motions) - 1))
+    return timed(robot, whole, start, tcp, path, rests, marks)
 
 
-def _motion(robot: RobotModel, order: Order, start: Array, *, is_alone: bool) -> _Motion:
+def _motion(
+    robot: RobotModel, motion: JointMotion | PathMotion, start: Array, tcp: Pose, *, is_alone: bool
+) -> _Motion:
     path: CartesianPath | JointLine | None
-    if order.kind == "ptp":
-        end = joint_target(robot, order, start)
+    if isinstance(motion, JointMotion):
+        end = joint_target(robot, motion, start, tcp)
         path = JointLine(start, end)
-        speed = float((robot.dq_max * order.joint_velocity / np.maximum(np.abs(end - start), 1e-12)).min())
+        fastest = robot.dq_max * fractions(motion.dynamics.velocity)
+        speed = float((fastest / np.maximum(np.abs(end - start), 1e-12)).min())
         is_still = float(np.abs(end - start).max()) < _STILL_JOINTS
-    elif order.kind in LINES:
-        end = start
-        path = cartesian_path(robot, order, start)
-        speed = programmed_speed(order, path)
-        is_still = path.length < STILL and path.angle < STILL and isnan(order.redundancy[0])
     else:
-        raise PlanError(
-            "planning", f"Can not plan motion: a batch cannot have a motion of kind {order.kind!r}"
-        )
-    limits, nothing = segment_limits(order), (np.zeros((0, 3)), np.zeros((0, 3, 3)))
+        end = start
+        path = cartesian_path(robot, motion, start, tcp)
+        speed = programmed_speed(motion.dynamics, path)
+        is_still = path.length < STILL and path.angle < STILL and isnan(e1_of(motion))
+    limits, nothing = segment_limits(motion), (np.zeros((0, 3)), np.zeros((0, 3, 3)))
     if is_still:
         return _Motion(None, 0.0, limits, 1.0, end, *nothing)
     # where only the elbow moves, the joints' limits alone count
@@ -211,14 +235,14 @@ def _motion(robot: RobotModel, order: Order, start: Array, *, is_alone: bool) ->
     if is_alone:
         return _Motion(path, time, limits, speed_limit, end, *nothing)
     segment = Segment(path, 1.0, limits, samples=_ZONE_SAMPLES)
-    samples = sample(robot, CompositePath([segment]), start, Pose.of(order.tcp[:3], order.tcp[3:]))
+    samples = sample(robot, CompositePath([segment]), start, tcp)
     (q,), (positions,), (rotations,) = samples.q, samples.positions, samples.rotations
     return _Motion(path, time, limits, speed_limit, q[-1], positions, rotations)
 
 
-def _blend_ends(before: _Motion, after: _Motion, blending: tuple[float, float, float]) -> None:
+def _blend_ends(before: _Motion, after: _Motion, blending: seam.Blending) -> None:
     """Give the blend of two motions a fraction of both, equally long at programmed speed."""
-    if before.path is None or after.path is None or not any(blending):
+    if before.path is None or after.path is None:
         return
     one = blending_zone(before.positions, before.rotations, blending, backwards=True)
     other = blending_zone(after.positions, after.rotations, blending, backwards=False)

@@ -24,24 +24,6 @@ SLOTS = 512
 SIGNALS = 512
 
 
-class MotionKind(enum.IntEnum):
-    """Kind of a motion."""
-
-    PTP = 0
-    LIN = 1
-    LIN_REL = 2
-    CIRC = 3
-    SPL = 4
-    HOLD = 5
-    BATCH = 6
-    SPLINE = 7
-    SPLINE_JOINTS = 8
-    GUIDE = 9
-    SERVO = 10
-    DIRECT = 11
-    STRAIGHT = 12
-
-
 class OrientationType(enum.IntEnum):
     """How the orientation changes along a Cartesian path."""
 
@@ -63,20 +45,6 @@ class PathReference(enum.IntEnum):
 
     START = 0
     END = 1
-
-
-class AtLimit(enum.IntEnum):
-    """What stops when a hand-guided axis reaches its limit: that axis, or all of them."""
-
-    AXIS = 0
-    ALL = 1
-
-
-class OutsideLimit(enum.IntEnum):
-    """What happens to an axis that starts outside its limits: it moves back freely, or is pulled back."""
-
-    FREE = 0
-    PULL = 1
 
 
 class EndCause(enum.IntEnum):
@@ -964,6 +932,36 @@ class Inverted:
 
 (_Inverted_part,) = codec.setters(Inverted)
 
+_Pose_0 = Struct(">3d4d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Pose:
+    """Pose of the motion frame in the base."""
+
+    #: [m]
+    xyz: tuple[float, ...]
+    #: x y z w
+    quat: tuple[float, ...]
+
+    def __init__(self, *, xyz: tuple[float, ...], quat: tuple[float, ...]) -> None:
+        _Pose_xyz(self, xyz)
+        _Pose_quat(self, quat)
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Pose_0.pack(*self.xyz, *self.quat))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Pose, int]:
+        v = codec.unpack(_Pose_0, data, pos)
+        pos += _Pose_0.size
+        xyz = v[0:3]
+        quat = v[3:7]
+        return cls(xyz=xyz, quat=quat), pos
+
+
+_Pose_xyz, _Pose_quat = codec.setters(Pose)
+
 _Redundancy_0 = Struct(">dii")
 
 
@@ -971,11 +969,11 @@ _Redundancy_0 = Struct(">dii")
 class Redundancy:
     """Which arm posture reaches a pose."""
 
-    #: Arm angle; NaN: keep [rad]
+    #: E1, the angle of A3; NaN: keep the current one [rad]
     e1: float = nan
     #: -1: keep
     status: int = -1
-    #: -1: keep
+    #: -1: not given
     turn: int = -1
 
     def __init__(self, *, e1: float = nan, status: int = -1, turn: int = -1) -> None:
@@ -998,12 +996,56 @@ class Redundancy:
 
 _Redundancy_e1, _Redundancy_status, _Redundancy_turn = codec.setters(Redundancy)
 
+_Orientation_0 = Struct(">B")
+_Orientation_1 = Struct(">B")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Orientation:
+    """How the orientation changes along a path; a part of a spline takes what is not given from the spline."""
+
+    #: None: variable
+    type: OrientationType | None = None
+    #: None: base
+    reference: OrientationReference | None = None
+
+    def __init__(self, *, type: OrientationType | None = None, reference: OrientationReference | None = None) -> None:
+        _Orientation_type(self, type)
+        _Orientation_reference(self, reference)
+
+    def _write(self, out: list[bytes]) -> None:
+        if self.type is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            out.append(_Orientation_0.pack(self.type))
+        if self.reference is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            out.append(_Orientation_1.pack(self.reference))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Orientation, int]:
+        present, pos = codec.read_flag(data, pos)
+        type: OrientationType | None = None
+        if present:
+            type, pos = codec.read_enum(OrientationType, codec.unpack(_Orientation_0, data, pos)[0]), pos + _Orientation_0.size
+        present, pos = codec.read_flag(data, pos)
+        reference: OrientationReference | None = None
+        if present:
+            reference, pos = codec.read_enum(OrientationReference, codec.unpack(_Orientation_1, data, pos)[0]), pos + _Orientation_1.size
+        return cls(type=type, reference=reference), pos
+
+
+_Orientation_type, _Orientation_reference = codec.setters(Orientation)
+
 _JointDynamics_0 = Struct(">7d7d7d")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class JointDynamics:
-    """Fractions of each axis' maximum; NaN: not given."""
+    """Fractions of each axis' maximum; NaN: those of the batch or spline, otherwise 1."""
 
     velocity: tuple[float, ...] = (nan,) * 7
     acceleration: tuple[float, ...] = (nan,) * 7
@@ -1034,7 +1076,7 @@ _CartesianDynamics_0 = Struct(">dddddd")
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class CartesianDynamics:
-    """Largest values on a Cartesian path; NaN: not given."""
+    """Largest values on a Cartesian path; NaN: those of the spline, otherwise the default."""
 
     #: [m/s]
     velocity: float = nan
@@ -1080,22 +1122,22 @@ _Blending_0 = Struct(">ddd")
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class Blending:
-    """Where a motion may blend into its successor; NaN: not given."""
+    """Where a motion may blend into its successor; NaN: as the batch, otherwise 0."""
 
     #: Fraction of the path
     relative: float = nan
     #: To the end of the path [m]
     distance: float = nan
     #: To the final orientation [rad]
-    angle: float = nan
+    orientation: float = nan
 
-    def __init__(self, *, relative: float = nan, distance: float = nan, angle: float = nan) -> None:
+    def __init__(self, *, relative: float = nan, distance: float = nan, orientation: float = nan) -> None:
         _Blending_relative(self, relative)
         _Blending_distance(self, distance)
-        _Blending_angle(self, angle)
+        _Blending_orientation(self, orientation)
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_Blending_0.pack(self.relative, self.distance, self.angle))
+        out.append(_Blending_0.pack(self.relative, self.distance, self.orientation))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[Blending, int]:
@@ -1103,11 +1145,429 @@ class Blending:
         pos += _Blending_0.size
         relative = v[0]
         distance = v[1]
-        angle = v[2]
-        return cls(relative=relative, distance=distance, angle=angle), pos
+        orientation = v[2]
+        return cls(relative=relative, distance=distance, orientation=orientation), pos
 
 
-_Blending_relative, _Blending_distance, _Blending_angle = codec.setters(Blending)
+_Blending_relative, _Blending_distance, _Blending_orientation = codec.setters(Blending)
+
+_Ptp_0 = Struct(">7d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Ptp:
+    """Point to point in joint space, to joint positions."""
+
+    #: [rad]
+    q: tuple[float, ...]
+    dynamics: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+
+    def __init__(self, *, q: tuple[float, ...], dynamics: JointDynamics = JointDynamics(), blending: Blending = Blending()) -> None:
+        _Ptp_q(self, q)
+        _Ptp_dynamics(self, dynamics)
+        _Ptp_blending(self, blending)
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Ptp_0.pack(*self.q))
+        self.dynamics._write(out)
+        self.blending._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Ptp, int]:
+        v = codec.unpack(_Ptp_0, data, pos)
+        pos += _Ptp_0.size
+        q = v[0:7]
+        dynamics, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        return cls(q=q, dynamics=dynamics, blending=blending), pos
+
+
+_Ptp_q, _Ptp_dynamics, _Ptp_blending = codec.setters(Ptp)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class PtpPose:
+    """Point to point in joint space, to a pose."""
+
+    target: Pose
+    redundancy: Redundancy = Redundancy()
+    dynamics: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+
+    def __init__(self, *, target: Pose, redundancy: Redundancy = Redundancy(), dynamics: JointDynamics = JointDynamics(), blending: Blending = Blending()) -> None:
+        _PtpPose_target(self, target)
+        _PtpPose_redundancy(self, redundancy)
+        _PtpPose_dynamics(self, dynamics)
+        _PtpPose_blending(self, blending)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.target._write(out)
+        self.redundancy._write(out)
+        self.dynamics._write(out)
+        self.blending._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[PtpPose, int]:
+        target, pos = Pose._read(data, pos)
+        redundancy, pos = Redundancy._read(data, pos)
+        dynamics, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        return cls(target=target, redundancy=redundancy, dynamics=dynamics, blending=blending), pos
+
+
+_PtpPose_target, _PtpPose_redundancy, _PtpPose_dynamics, _PtpPose_blending = codec.setters(PtpPose)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Lin:
+    """Straight line to a pose."""
+
+    target: Pose
+    redundancy: Redundancy = Redundancy()
+    dynamics: CartesianDynamics = CartesianDynamics()
+    joints: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+    orientation: Orientation = Orientation()
+
+    def __init__(self, *, target: Pose, redundancy: Redundancy = Redundancy(), dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), blending: Blending = Blending(), orientation: Orientation = Orientation()) -> None:
+        _Lin_target(self, target)
+        _Lin_redundancy(self, redundancy)
+        _Lin_dynamics(self, dynamics)
+        _Lin_joints(self, joints)
+        _Lin_blending(self, blending)
+        _Lin_orientation(self, orientation)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.target._write(out)
+        self.redundancy._write(out)
+        self.dynamics._write(out)
+        self.joints._write(out)
+        self.blending._write(out)
+        self.orientation._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Lin, int]:
+        target, pos = Pose._read(data, pos)
+        redundancy, pos = Redundancy._read(data, pos)
+        dynamics, pos = CartesianDynamics._read(data, pos)
+        joints, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        orientation, pos = Orientation._read(data, pos)
+        return cls(target=target, redundancy=redundancy, dynamics=dynamics, joints=joints, blending=blending, orientation=orientation), pos
+
+
+_Lin_target, _Lin_redundancy, _Lin_dynamics, _Lin_joints, _Lin_blending, _Lin_orientation = codec.setters(Lin)
+
+_LinRel_0 = Struct(">4d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class LinRel:
+    """Straight line by an offset from the pose at the start."""
+
+    #: translation and rotation, in the axes of the reference frame
+    offset: Pose
+    dynamics: CartesianDynamics = CartesianDynamics()
+    joints: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+    orientation: Orientation = Orientation()
+    #: Quaternion of the offset's axes in the base; none: axes of the motion frame
+    axes: tuple[float, ...] | None = None
+
+    def __init__(self, *, offset: Pose, dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), blending: Blending = Blending(), orientation: Orientation = Orientation(), axes: tuple[float, ...] | None = None) -> None:
+        _LinRel_offset(self, offset)
+        _LinRel_dynamics(self, dynamics)
+        _LinRel_joints(self, joints)
+        _LinRel_blending(self, blending)
+        _LinRel_orientation(self, orientation)
+        _LinRel_axes(self, axes)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.offset._write(out)
+        self.dynamics._write(out)
+        self.joints._write(out)
+        self.blending._write(out)
+        self.orientation._write(out)
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            out.append(_LinRel_0.pack(*self.axes))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[LinRel, int]:
+        offset, pos = Pose._read(data, pos)
+        dynamics, pos = CartesianDynamics._read(data, pos)
+        joints, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        orientation, pos = Orientation._read(data, pos)
+        present, pos = codec.read_flag(data, pos)
+        axes: tuple[float, ...] | None = None
+        if present:
+            axes, pos = codec.unpack(_LinRel_0, data, pos), pos + _LinRel_0.size
+        return cls(offset=offset, dynamics=dynamics, joints=joints, blending=blending, orientation=orientation, axes=axes), pos
+
+
+_LinRel_offset, _LinRel_dynamics, _LinRel_joints, _LinRel_blending, _LinRel_orientation, _LinRel_axes = codec.setters(LinRel)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Circ:
+    """Arc of a circle through an auxiliary point."""
+
+    via: Pose
+    end: Pose
+    redundancy: Redundancy = Redundancy()
+    dynamics: CartesianDynamics = CartesianDynamics()
+    joints: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+    orientation: Orientation = Orientation()
+
+    def __init__(self, *, via: Pose, end: Pose, redundancy: Redundancy = Redundancy(), dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), blending: Blending = Blending(), orientation: Orientation = Orientation()) -> None:
+        _Circ_via(self, via)
+        _Circ_end(self, end)
+        _Circ_redundancy(self, redundancy)
+        _Circ_dynamics(self, dynamics)
+        _Circ_joints(self, joints)
+        _Circ_blending(self, blending)
+        _Circ_orientation(self, orientation)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.via._write(out)
+        self.end._write(out)
+        self.redundancy._write(out)
+        self.dynamics._write(out)
+        self.joints._write(out)
+        self.blending._write(out)
+        self.orientation._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Circ, int]:
+        via, pos = Pose._read(data, pos)
+        end, pos = Pose._read(data, pos)
+        redundancy, pos = Redundancy._read(data, pos)
+        dynamics, pos = CartesianDynamics._read(data, pos)
+        joints, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        orientation, pos = Orientation._read(data, pos)
+        return cls(via=via, end=end, redundancy=redundancy, dynamics=dynamics, joints=joints, blending=blending, orientation=orientation), pos
+
+
+_Circ_via, _Circ_end, _Circ_redundancy, _Circ_dynamics, _Circ_joints, _Circ_blending, _Circ_orientation = codec.setters(Circ)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Spl:
+    """Curved segment of a spline, shaped by its neighbours."""
+
+    target: Pose
+    dynamics: CartesianDynamics = CartesianDynamics()
+    orientation: Orientation = Orientation()
+    joints: JointDynamics = JointDynamics()
+
+    def __init__(self, *, target: Pose, dynamics: CartesianDynamics = CartesianDynamics(), orientation: Orientation = Orientation(), joints: JointDynamics = JointDynamics()) -> None:
+        _Spl_target(self, target)
+        _Spl_dynamics(self, dynamics)
+        _Spl_orientation(self, orientation)
+        _Spl_joints(self, joints)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.target._write(out)
+        self.dynamics._write(out)
+        self.orientation._write(out)
+        self.joints._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Spl, int]:
+        target, pos = Pose._read(data, pos)
+        dynamics, pos = CartesianDynamics._read(data, pos)
+        orientation, pos = Orientation._read(data, pos)
+        joints, pos = JointDynamics._read(data, pos)
+        return cls(target=target, dynamics=dynamics, orientation=orientation, joints=joints), pos
+
+
+_Spl_target, _Spl_dynamics, _Spl_orientation, _Spl_joints = codec.setters(Spl)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Spline:
+    """Segments of a Cartesian path (Spl, Lin, Circ) without a stop between them."""
+
+    dynamics: CartesianDynamics = CartesianDynamics()
+    joints: JointDynamics = JointDynamics()
+    orientation: Orientation = Orientation()
+    segments: tuple[PlantMotion, ...] = ()
+
+    def __init__(self, *, dynamics: CartesianDynamics = CartesianDynamics(), joints: JointDynamics = JointDynamics(), orientation: Orientation = Orientation(), segments: tuple[PlantMotion, ...] = ()) -> None:
+        _Spline_dynamics(self, dynamics)
+        _Spline_joints(self, joints)
+        _Spline_orientation(self, orientation)
+        _Spline_segments(self, segments)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.dynamics._write(out)
+        self.joints._write(out)
+        self.orientation._write(out)
+        out.append(codec.put_count(len(self.segments)))
+        for one_segments in self.segments:
+            _write_PlantMotion(one_segments, out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Spline, int]:
+        dynamics, pos = CartesianDynamics._read(data, pos)
+        joints, pos = JointDynamics._read(data, pos)
+        orientation, pos = Orientation._read(data, pos)
+        size, pos = codec.read_count(data, pos)
+        segments_list: list[PlantMotion] = []
+        for _ in range(size):
+            one_segments, pos = _read_PlantMotion(data, pos)
+            segments_list.append(one_segments)
+        segments = tuple(segments_list)
+        return cls(dynamics=dynamics, joints=joints, orientation=orientation, segments=segments), pos
+
+
+_Spline_dynamics, _Spline_joints, _Spline_orientation, _Spline_segments = codec.setters(Spline)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class JointSpline:
+    """A curve through the targets of PTPs."""
+
+    dynamics: JointDynamics = JointDynamics()
+    points: tuple[PlantMotion, ...] = ()
+
+    def __init__(self, *, dynamics: JointDynamics = JointDynamics(), points: tuple[PlantMotion, ...] = ()) -> None:
+        _JointSpline_dynamics(self, dynamics)
+        _JointSpline_points(self, points)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.dynamics._write(out)
+        out.append(codec.put_count(len(self.points)))
+        for one_points in self.points:
+            _write_PlantMotion(one_points, out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[JointSpline, int]:
+        dynamics, pos = JointDynamics._read(data, pos)
+        size, pos = codec.read_count(data, pos)
+        points_list: list[PlantMotion] = []
+        for _ in range(size):
+            one_points, pos = _read_PlantMotion(data, pos)
+            points_list.append(one_points)
+        points = tuple(points_list)
+        return cls(dynamics=dynamics, points=points), pos
+
+
+_JointSpline_dynamics, _JointSpline_points = codec.setters(JointSpline)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Batch:
+    """Motions that are executed as one, each blended into the next."""
+
+    dynamics: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+    motions: tuple[PlantMotion, ...] = ()
+
+    def __init__(self, *, dynamics: JointDynamics = JointDynamics(), blending: Blending = Blending(), motions: tuple[PlantMotion, ...] = ()) -> None:
+        _Batch_dynamics(self, dynamics)
+        _Batch_blending(self, blending)
+        _Batch_motions(self, motions)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.dynamics._write(out)
+        self.blending._write(out)
+        out.append(codec.put_count(len(self.motions)))
+        for one_motions in self.motions:
+            _write_PlantMotion(one_motions, out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Batch, int]:
+        dynamics, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        size, pos = codec.read_count(data, pos)
+        motions_list: list[PlantMotion] = []
+        for _ in range(size):
+            one_motions, pos = _read_PlantMotion(data, pos)
+            motions_list.append(one_motions)
+        motions = tuple(motions_list)
+        return cls(dynamics=dynamics, blending=blending, motions=motions), pos
+
+
+_Batch_dynamics, _Batch_blending, _Batch_motions = codec.setters(Batch)
+
+_Hold_0 = Struct(">d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class Hold:
+    """Holds the position."""
+
+    #: NaN: until cancelled [s]
+    duration: float
+
+    def __init__(self, *, duration: float) -> None:
+        _Hold_duration(self, duration)
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Hold_0.pack(self.duration))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Hold, int]:
+        v = codec.unpack(_Hold_0, data, pos)
+        pos += _Hold_0.size
+        duration = v[0]
+        return cls(duration=duration), pos
+
+
+(_Hold_duration,) = codec.setters(Hold)
+
+_HandGuide_0 = Struct(">7d7dddBB")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class HandGuide:
+    """Hand guiding while the enabling switch is held."""
+
+    #: NaN: the axis' own limit [rad]
+    q_min: tuple[float, ...] = (nan,) * 7
+    #: [rad]
+    q_max: tuple[float, ...] = (nan,) * 7
+    #: limit of every axis; NaN: half of the slowest axis' maximum [rad/s]
+    joint_velocity: float = nan
+    #: of the motion frame; NaN: 0.25 m/s [m/s]
+    cartesian_velocity: float = nan
+    #: at a limit every axis stops until the switch is released; otherwise only the axis at its limit, outwards
+    freezes_all: bool = False
+    #: an axis that is beyond its limit at the start is pulled back; otherwise it can only be guided back
+    pulls_back: bool = False
+
+    def __init__(self, *, q_min: tuple[float, ...] = (nan,) * 7, q_max: tuple[float, ...] = (nan,) * 7, joint_velocity: float = nan, cartesian_velocity: float = nan, freezes_all: bool = False, pulls_back: bool = False) -> None:
+        _HandGuide_q_min(self, q_min)
+        _HandGuide_q_max(self, q_max)
+        _HandGuide_joint_velocity(self, joint_velocity)
+        _HandGuide_cartesian_velocity(self, cartesian_velocity)
+        _HandGuide_freezes_all(self, freezes_all)
+        _HandGuide_pulls_back(self, pulls_back)
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_HandGuide_0.pack(*self.q_min, *self.q_max, self.joint_velocity, self.cartesian_velocity, self.freezes_all, self.pulls_back))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[HandGuide, int]:
+        v = codec.unpack(_HandGuide_0, data, pos)
+        pos += _HandGuide_0.size
+        q_min = v[0:7]
+        q_max = v[7:14]
+        joint_velocity = v[14]
+        cartesian_velocity = v[15]
+        freezes_all = codec.read_bool(v[16])
+        pulls_back = codec.read_bool(v[17])
+        return cls(q_min=q_min, q_max=q_max, joint_velocity=joint_velocity, cartesian_velocity=cartesian_velocity, freezes_all=freezes_all, pulls_back=pulls_back), pos
+
+
+_HandGuide_q_min, _HandGuide_q_max, _HandGuide_joint_velocity, _HandGuide_cartesian_velocity, _HandGuide_freezes_all, _HandGuide_pulls_back = codec.setters(HandGuide)
 
 _ServoTiming_0 = Struct(">ddd")
 
@@ -1143,79 +1603,140 @@ class ServoTiming:
 
 _ServoTiming_min_trajectory_time, _ServoTiming_goal_timeout, _ServoTiming_speed_timeout = codec.setters(ServoTiming)
 
-_StraightLimits_0 = Struct(">6d6d")
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class ServoSmart:
+    """Follows joint targets, far or near, on trajectories within the limits."""
+
+    timing: ServoTiming = ServoTiming()
+    dynamics: JointDynamics = JointDynamics()
+
+    def __init__(self, *, timing: ServoTiming = ServoTiming(), dynamics: JointDynamics = JointDynamics()) -> None:
+        _ServoSmart_timing(self, timing)
+        _ServoSmart_dynamics(self, dynamics)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.timing._write(out)
+        self.dynamics._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ServoSmart, int]:
+        timing, pos = ServoTiming._read(data, pos)
+        dynamics, pos = JointDynamics._read(data, pos)
+        return cls(timing=timing, dynamics=dynamics), pos
+
+
+_ServoSmart_timing, _ServoSmart_dynamics = codec.setters(ServoSmart)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
-class StraightLimits:
-    """Limits of a straight servo motion; NaN: the default."""
+class ServoDirect:
+    """Follows close and smooth joint targets."""
 
+    timing: ServoTiming = ServoTiming()
+    dynamics: JointDynamics = JointDynamics()
+
+    def __init__(self, *, timing: ServoTiming = ServoTiming(), dynamics: JointDynamics = JointDynamics()) -> None:
+        _ServoDirect_timing(self, timing)
+        _ServoDirect_dynamics(self, dynamics)
+
+    def _write(self, out: list[bytes]) -> None:
+        self.timing._write(out)
+        self.dynamics._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ServoDirect, int]:
+        timing, pos = ServoTiming._read(data, pos)
+        dynamics, pos = JointDynamics._read(data, pos)
+        return cls(timing=timing, dynamics=dynamics), pos
+
+
+_ServoDirect_timing, _ServoDirect_dynamics = codec.setters(ServoDirect)
+
+_ServoStraight_0 = Struct(">6d6d")
+_ServoStraight_1 = Struct(">4d")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, init=False)
+class ServoStraight:
+    """Follows poses on straight lines; limits x y z, then about x y z, NaN: the default."""
+
+    timing: ServoTiming = ServoTiming()
     #: [m/s, rad/s]
     velocity: tuple[float, ...] = (nan,) * 6
     #: [m/s², rad/s²]
     acceleration: tuple[float, ...] = (nan,) * 6
+    #: Quaternion of the limits' axes in the base; none: those of the base
+    axes: tuple[float, ...] | None = None
 
-    def __init__(self, *, velocity: tuple[float, ...] = (nan,) * 6, acceleration: tuple[float, ...] = (nan,) * 6) -> None:
-        _StraightLimits_velocity(self, velocity)
-        _StraightLimits_acceleration(self, acceleration)
+    def __init__(self, *, timing: ServoTiming = ServoTiming(), velocity: tuple[float, ...] = (nan,) * 6, acceleration: tuple[float, ...] = (nan,) * 6, axes: tuple[float, ...] | None = None) -> None:
+        _ServoStraight_timing(self, timing)
+        _ServoStraight_velocity(self, velocity)
+        _ServoStraight_acceleration(self, acceleration)
+        _ServoStraight_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_StraightLimits_0.pack(*self.velocity, *self.acceleration))
+        self.timing._write(out)
+        out.append(_ServoStraight_0.pack(*self.velocity, *self.acceleration))
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            out.append(_ServoStraight_1.pack(*self.axes))
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[StraightLimits, int]:
-        v = codec.unpack(_StraightLimits_0, data, pos)
-        pos += _StraightLimits_0.size
+    def _read(cls, data: bytes, pos: int) -> tuple[ServoStraight, int]:
+        timing, pos = ServoTiming._read(data, pos)
+        v = codec.unpack(_ServoStraight_0, data, pos)
+        pos += _ServoStraight_0.size
         velocity = v[0:6]
         acceleration = v[6:12]
-        return cls(velocity=velocity, acceleration=acceleration), pos
+        present, pos = codec.read_flag(data, pos)
+        axes: tuple[float, ...] | None = None
+        if present:
+            axes, pos = codec.unpack(_ServoStraight_1, data, pos), pos + _ServoStraight_1.size
+        return cls(timing=timing, velocity=velocity, acceleration=acceleration, axes=axes), pos
 
 
-_StraightLimits_velocity, _StraightLimits_acceleration = codec.setters(StraightLimits)
+_ServoStraight_timing, _ServoStraight_velocity, _ServoStraight_acceleration, _ServoStraight_axes = codec.setters(ServoStraight)
 
-_HandGuiding_0 = Struct(">7d7dddBB")
+_MotionCondition_0 = Struct(">BiH")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
-class HandGuiding:
-    """Limits of hand guiding."""
+class MotionCondition:
+    """A break condition or a trigger of a motion."""
 
-    #: NaN: the axis' own limit [rad]
-    q_min: tuple[float, ...] = (nan,) * 7
-    #: NaN: the axis' own limit [rad]
-    q_max: tuple[float, ...] = (nan,) * 7
-    #: NaN: half of each axis' maximum [rad/s]
-    joint_velocity: float = nan
-    #: Of the motion frame; NaN: 0.25 m/s [m/s]
-    cartesian_velocity: float = nan
-    at_limit: AtLimit = AtLimit.AXIS
-    outside: OutsideLimit = OutsideLimit.FREE
+    condition: Condition
+    #: Whether it ends the motion, otherwise it is a trigger
+    breaks: bool
+    #: Part of a batch or spline that it belongs to; -1: the whole
+    part: int = -1
+    #: Among the conditions of its kind there
+    index: int
 
-    def __init__(self, *, q_min: tuple[float, ...] = (nan,) * 7, q_max: tuple[float, ...] = (nan,) * 7, joint_velocity: float = nan, cartesian_velocity: float = nan, at_limit: AtLimit = AtLimit.AXIS, outside: OutsideLimit = OutsideLimit.FREE) -> None:
-        _HandGuiding_q_min(self, q_min)
-        _HandGuiding_q_max(self, q_max)
-        _HandGuiding_joint_velocity(self, joint_velocity)
-        _HandGuiding_cartesian_velocity(self, cartesian_velocity)
-        _HandGuiding_at_limit(self, at_limit)
-        _HandGuiding_outside(self, outside)
+    def __init__(self, *, condition: Condition, breaks: bool, part: int = -1, index: int) -> None:
+        _MotionCondition_condition(self, condition)
+        _MotionCondition_breaks(self, breaks)
+        _MotionCondition_part(self, part)
+        _MotionCondition_index(self, index)
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_HandGuiding_0.pack(*self.q_min, *self.q_max, self.joint_velocity, self.cartesian_velocity, self.at_limit, self.outside))
+        _write_Condition(self.condition, out)
+        out.append(_MotionCondition_0.pack(self.breaks, self.part, self.index))
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[HandGuiding, int]:
-        v = codec.unpack(_HandGuiding_0, data, pos)
-        pos += _HandGuiding_0.size
-        q_min = v[0:7]
-        q_max = v[7:14]
-        joint_velocity = v[14]
-        cartesian_velocity = v[15]
-        at_limit = codec.read_enum(AtLimit, v[16])
-        outside = codec.read_enum(OutsideLimit, v[17])
-        return cls(q_min=q_min, q_max=q_max, joint_velocity=joint_velocity, cartesian_velocity=cartesian_velocity, at_limit=at_limit, outside=outside), pos
+    def _read(cls, data: bytes, pos: int) -> tuple[MotionCondition, int]:
+        condition, pos = _read_Condition(data, pos)
+        v = codec.unpack(_MotionCondition_0, data, pos)
+        pos += _MotionCondition_0.size
+        breaks = codec.read_bool(v[0])
+        part = v[1]
+        index = v[2]
+        return cls(condition=condition, breaks=breaks, part=part, index=index), pos
 
 
-_HandGuiding_q_min, _HandGuiding_q_max, _HandGuiding_joint_velocity, _HandGuiding_cartesian_velocity, _HandGuiding_at_limit, _HandGuiding_outside = codec.setters(HandGuiding)
+_MotionCondition_condition, _MotionCondition_breaks, _MotionCondition_part, _MotionCondition_index = codec.setters(MotionCondition)
 
 _FriOverlay_0 = Struct(">qB")
 
@@ -1247,239 +1768,75 @@ class FriOverlay:
 
 _FriOverlay_session, _FriOverlay_command = codec.setters(FriOverlay)
 
-_MotionOrder_0 = Struct(">qB")
+_MotionOrder_0 = Struct(">q")
 _MotionOrder_1 = Struct(">7d")
-_MotionOrder_2 = Struct(">7d")
-_MotionOrder_3 = Struct(">7d")
-_MotionOrder_4 = Struct(">B")
-_MotionOrder_5 = Struct(">B")
-_MotionOrder_6 = Struct(">7d")
-_MotionOrder_7 = Struct(">7d")
-_MotionOrder_8 = Struct(">4d")
-_MotionOrder_9 = Struct(">d")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, init=False)
 class MotionOrder:
-    """One motion with all its parameters."""
+    """A motion, and under what terms it is executed."""
 
     #: Unique, chosen by Java
     id: int
-    kind: MotionKind = MotionKind.PTP
-    #: Target of a ptp; none: the pose is the target [rad]
-    joints: tuple[float, ...] | None = None
-    #: Target of the motion frame in the base
-    pose: tuple[float, ...] | None = None
-    #: Auxiliary point of a circ, as the pose
-    via: tuple[float, ...] | None = None
-    redundancy: Redundancy = Redundancy()
-    #: None: variable
-    orientation_type: OrientationType | None = None
-    #: None: base
-    orientation_reference: OrientationReference | None = None
-    blending: Blending = Blending()
-    joint_dynamics: JointDynamics = JointDynamics()
-    cartesian_dynamics: CartesianDynamics = CartesianDynamics()
+    motion: PlantMotion
     #: Motion frame seen from the flange
     tcp: tuple[float, ...]
-    #: Of a lin_rel, in the axes of the reference
-    offset: tuple[float, ...] | None = None
-    #: Quaternion of an offset's axes (none: those of the motion frame) or of straight servo limits (none: those of the base)
-    reference: tuple[float, ...] | None = None
-    #: Of a hold; NaN: until cancelled [s]
-    duration: float = nan
     #: None: position control
     mode: ImpedanceMode | None = None
-    servo_timing: ServoTiming = ServoTiming()
-    straight_limits: StraightLimits | None = None
-    hand_guiding: HandGuiding | None = None
     fri_overlay: FriOverlay | None = None
-    #: Break conditions
-    breaks: tuple[Condition, ...] = ()
-    #: Conditions of triggers
-    triggers: tuple[Condition, ...] = ()
-    #: Motions of a batch, segments of a spline
-    parts: tuple[MotionOrder, ...] = ()
+    #: A condition that is both comes first as a trigger
+    conditions: tuple[MotionCondition, ...] = ()
 
-    def __init__(self, *, id: int, kind: MotionKind = MotionKind.PTP, joints: tuple[float, ...] | None = None, pose: tuple[float, ...] | None = None, via: tuple[float, ...] | None = None, redundancy: Redundancy = Redundancy(), orientation_type: OrientationType | None = None, orientation_reference: OrientationReference | None = None, blending: Blending = Blending(), joint_dynamics: JointDynamics = JointDynamics(), cartesian_dynamics: CartesianDynamics = CartesianDynamics(), tcp: tuple[float, ...], offset: tuple[float, ...] | None = None, reference: tuple[float, ...] | None = None, duration: float = nan, mode: ImpedanceMode | None = None, servo_timing: ServoTiming = ServoTiming(), straight_limits: StraightLimits | None = None, hand_guiding: HandGuiding | None = None, fri_overlay: FriOverlay | None = None, breaks: tuple[Condition, ...] = (), triggers: tuple[Condition, ...] = (), parts: tuple[MotionOrder, ...] = ()) -> None:
+    def __init__(self, *, id: int, motion: PlantMotion, tcp: tuple[float, ...], mode: ImpedanceMode | None = None, fri_overlay: FriOverlay | None = None, conditions: tuple[MotionCondition, ...] = ()) -> None:
         _MotionOrder_id(self, id)
-        _MotionOrder_kind(self, kind)
-        _MotionOrder_joints(self, joints)
-        _MotionOrder_pose(self, pose)
-        _MotionOrder_via(self, via)
-        _MotionOrder_redundancy(self, redundancy)
-        _MotionOrder_orientation_type(self, orientation_type)
-        _MotionOrder_orientation_reference(self, orientation_reference)
-        _MotionOrder_blending(self, blending)
-        _MotionOrder_joint_dynamics(self, joint_dynamics)
-        _MotionOrder_cartesian_dynamics(self, cartesian_dynamics)
+        _MotionOrder_motion(self, motion)
         _MotionOrder_tcp(self, tcp)
-        _MotionOrder_offset(self, offset)
-        _MotionOrder_reference(self, reference)
-        _MotionOrder_duration(self, duration)
         _MotionOrder_mode(self, mode)
-        _MotionOrder_servo_timing(self, servo_timing)
-        _MotionOrder_straight_limits(self, straight_limits)
-        _MotionOrder_hand_guiding(self, hand_guiding)
         _MotionOrder_fri_overlay(self, fri_overlay)
-        _MotionOrder_breaks(self, breaks)
-        _MotionOrder_triggers(self, triggers)
-        _MotionOrder_parts(self, parts)
+        _MotionOrder_conditions(self, conditions)
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_MotionOrder_0.pack(self.id, self.kind))
-        if self.joints is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_1.pack(*self.joints))
-        if self.pose is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_2.pack(*self.pose))
-        if self.via is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_3.pack(*self.via))
-        self.redundancy._write(out)
-        if self.orientation_type is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_4.pack(self.orientation_type))
-        if self.orientation_reference is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_5.pack(self.orientation_reference))
-        self.blending._write(out)
-        self.joint_dynamics._write(out)
-        self.cartesian_dynamics._write(out)
-        out.append(_MotionOrder_6.pack(*self.tcp))
-        if self.offset is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_7.pack(*self.offset))
-        if self.reference is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            out.append(_MotionOrder_8.pack(*self.reference))
-        out.append(_MotionOrder_9.pack(self.duration))
+        out.append(_MotionOrder_0.pack(self.id))
+        _write_PlantMotion(self.motion, out)
+        out.append(_MotionOrder_1.pack(*self.tcp))
         if self.mode is None:
             out.append(b"\x00")
         else:
             out.append(b"\x01")
             _write_ImpedanceMode(self.mode, out)
-        self.servo_timing._write(out)
-        if self.straight_limits is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            self.straight_limits._write(out)
-        if self.hand_guiding is None:
-            out.append(b"\x00")
-        else:
-            out.append(b"\x01")
-            self.hand_guiding._write(out)
         if self.fri_overlay is None:
             out.append(b"\x00")
         else:
             out.append(b"\x01")
             self.fri_overlay._write(out)
-        out.append(codec.put_count(len(self.breaks)))
-        for one_breaks in self.breaks:
-            _write_Condition(one_breaks, out)
-        out.append(codec.put_count(len(self.triggers)))
-        for one_triggers in self.triggers:
-            _write_Condition(one_triggers, out)
-        out.append(codec.put_count(len(self.parts)))
-        for one_parts in self.parts:
-            one_parts._write(out)
+        out.append(codec.put_count(len(self.conditions)))
+        for one_conditions in self.conditions:
+            one_conditions._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[MotionOrder, int]:
         v = codec.unpack(_MotionOrder_0, data, pos)
         pos += _MotionOrder_0.size
         id = v[0]
-        kind = codec.read_enum(MotionKind, v[1])
-        present, pos = codec.read_flag(data, pos)
-        joints: tuple[float, ...] | None = None
-        if present:
-            joints, pos = codec.unpack(_MotionOrder_1, data, pos), pos + _MotionOrder_1.size
-        present, pos = codec.read_flag(data, pos)
-        pose: tuple[float, ...] | None = None
-        if present:
-            pose, pos = codec.unpack(_MotionOrder_2, data, pos), pos + _MotionOrder_2.size
-        present, pos = codec.read_flag(data, pos)
-        via: tuple[float, ...] | None = None
-        if present:
-            via, pos = codec.unpack(_MotionOrder_3, data, pos), pos + _MotionOrder_3.size
-        redundancy, pos = Redundancy._read(data, pos)
-        present, pos = codec.read_flag(data, pos)
-        orientation_type: OrientationType | None = None
-        if present:
-            orientation_type, pos = codec.read_enum(OrientationType, codec.unpack(_MotionOrder_4, data, pos)[0]), pos + _MotionOrder_4.size
-        present, pos = codec.read_flag(data, pos)
-        orientation_reference: OrientationReference | None = None
-        if present:
-            orientation_reference, pos = codec.read_enum(OrientationReference, codec.unpack(_MotionOrder_5, data, pos)[0]), pos + _MotionOrder_5.size
-        blending, pos = Blending._read(data, pos)
-        joint_dynamics, pos = JointDynamics._read(data, pos)
-        cartesian_dynamics, pos = CartesianDynamics._read(data, pos)
-        v = codec.unpack(_MotionOrder_6, data, pos)
-        pos += _MotionOrder_6.size
+        motion, pos = _read_PlantMotion(data, pos)
+        v = codec.unpack(_MotionOrder_1, data, pos)
+        pos += _MotionOrder_1.size
         tcp = v[0:7]
-        present, pos = codec.read_flag(data, pos)
-        offset: tuple[float, ...] | None = None
-        if present:
-            offset, pos = codec.unpack(_MotionOrder_7, data, pos), pos + _MotionOrder_7.size
-        present, pos = codec.read_flag(data, pos)
-        reference: tuple[float, ...] | None = None
-        if present:
-            reference, pos = codec.unpack(_MotionOrder_8, data, pos), pos + _MotionOrder_8.size
-        v = codec.unpack(_MotionOrder_9, data, pos)
-        pos += _MotionOrder_9.size
-        duration = v[0]
         present, pos = codec.read_flag(data, pos)
         mode: ImpedanceMode | None = None
         if present:
             mode, pos = _read_ImpedanceMode(data, pos)
-        servo_timing, pos = ServoTiming._read(data, pos)
-        present, pos = codec.read_flag(data, pos)
-        straight_limits: StraightLimits | None = None
-        if present:
-            straight_limits, pos = StraightLimits._read(data, pos)
-        present, pos = codec.read_flag(data, pos)
-        hand_guiding: HandGuiding | None = None
-        if present:
-            hand_guiding, pos = HandGuiding._read(data, pos)
         present, pos = codec.read_flag(data, pos)
         fri_overlay: FriOverlay | None = None
         if present:
             fri_overlay, pos = FriOverlay._read(data, pos)
         size, pos = codec.read_count(data, pos)
-        breaks_list: list[Condition] = []
+        conditions_list: list[MotionCondition] = []
         for _ in range(size):
-            one_breaks, pos = _read_Condition(data, pos)
-            breaks_list.append(one_breaks)
-        breaks = tuple(breaks_list)
-        size, pos = codec.read_count(data, pos)
-        triggers_list: list[Condition] = []
-        for _ in range(size):
-            one_triggers, pos = _read_Condition(data, pos)
-            triggers_list.append(one_triggers)
-        triggers = tuple(triggers_list)
-        size, pos = codec.read_count(data, pos)
-        parts_list: list[MotionOrder] = []
-        for _ in range(size):
-            one_parts, pos = MotionOrder._read(data, pos)
-            parts_list.append(one_parts)
-        parts = tuple(parts_list)
-        return cls(id=id, kind=kind, joints=joints, pose=pose, via=via, redundancy=redundancy, orientation_type=orientation_type, orientation_reference=orientation_reference, blending=blending, joint_dynamics=joint_dynamics, cartesian_dynamics=cartesian_dynamics, tcp=tcp, offset=offset, reference=reference, duration=duration, mode=mode, servo_timing=servo_timing, straight_limits=straight_limits, hand_guiding=hand_guiding, fri_overlay=fri_overlay, breaks=breaks, triggers=triggers, parts=parts), pos
+            one_conditions, pos = MotionCondition._read(data, pos)
+            conditions_list.append(one_conditions)
+        conditions = tuple(conditions_list)
+        return cls(id=id, motion=motion, tcp=tcp, mode=mode, fri_overlay=fri_overlay, conditions=conditions), pos
 
     def encode(self) -> bytes:
         """The body."""
@@ -1495,7 +1852,7 @@ class MotionOrder:
         return value
 
 
-_MotionOrder_id, _MotionOrder_kind, _MotionOrder_joints, _MotionOrder_pose, _MotionOrder_via, _MotionOrder_redundancy, _MotionOrder_orientation_type, _MotionOrder_orientation_reference, _MotionOrder_blending, _MotionOrder_joint_dynamics, _MotionOrder_cartesian_dynamics, _MotionOrder_tcp, _MotionOrder_offset, _MotionOrder_reference, _MotionOrder_duration, _MotionOrder_mode, _MotionOrder_servo_timing, _MotionOrder_straight_limits, _MotionOrder_hand_guiding, _MotionOrder_fri_overlay, _MotionOrder_breaks, _MotionOrder_triggers, _MotionOrder_parts = codec.setters(MotionOrder)
+_MotionOrder_id, _MotionOrder_motion, _MotionOrder_tcp, _MotionOrder_mode, _MotionOrder_fri_overlay, _MotionOrder_conditions = codec.setters(MotionOrder)
 
 _FriSignal_0 = Struct(">BBHdd")
 
@@ -1713,3 +2070,60 @@ def encode_condition(value: Condition) -> bytes:
     out: list[bytes] = []
     _write_Condition(value, out)
     return b"".join(out)
+
+
+PlantMotion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Circ | Spl | Spline | JointSpline | Batch | Hold | HandGuide | ServoSmart | ServoDirect | ServoStraight
+_PlantMotion_TAGS = {
+    Ptp: 1,
+    PtpPose: 2,
+    Lin: 3,
+    LinRel: 4,
+    Circ: 5,
+    Spl: 6,
+    Spline: 7,
+    JointSpline: 8,
+    Batch: 9,
+    Hold: 10,
+    HandGuide: 11,
+    ServoSmart: 12,
+    ServoDirect: 13,
+    ServoStraight: 14,
+}
+
+
+def _write_PlantMotion(value: PlantMotion, out: list[bytes]) -> None:
+    out.append(bytes((_PlantMotion_TAGS[type(value)],)))
+    value._write(out)
+
+
+def _read_PlantMotion(data: bytes, pos: int) -> tuple[PlantMotion, int]:
+    tag, pos = codec.read_tag(data, pos)
+    if tag == 1:
+        return Ptp._read(data, pos)
+    if tag == 2:
+        return PtpPose._read(data, pos)
+    if tag == 3:
+        return Lin._read(data, pos)
+    if tag == 4:
+        return LinRel._read(data, pos)
+    if tag == 5:
+        return Circ._read(data, pos)
+    if tag == 6:
+        return Spl._read(data, pos)
+    if tag == 7:
+        return Spline._read(data, pos)
+    if tag == 8:
+        return JointSpline._read(data, pos)
+    if tag == 9:
+        return Batch._read(data, pos)
+    if tag == 10:
+        return Hold._read(data, pos)
+    if tag == 11:
+        return HandGuide._read(data, pos)
+    if tag == 12:
+        return ServoSmart._read(data, pos)
+    if tag == 13:
+        return ServoDirect._read(data, pos)
+    if tag == 14:
+        return ServoStraight._read(data, pos)
+    raise DecodeError(f"PlantMotion has tag {tag}; legal are [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14]")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,19 +10,23 @@ from itertools import pairwise
 import numpy as np
 
 from heptarm.model.kinematics import Vec, forward
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning import seam
 from heptarm.planning.composite_path import UNBOUND, CompositePath, Segment, SubPath
 from heptarm.planning.geometry import Arc, Quat, Slerp, Straight
-from heptarm.planning.path import CartesianPath, Sequential
-from heptarm.planning.plan import Plan, timed
-from heptarm.planning.targets import (
+from heptarm.planning.motion import (
     CARTESIAN_DEFAULT,
     ORIENTATION_DEFAULT,
+    PlanError,
     check_numbers,
-    joint_target,
+    fractions,
+    inherited,
+    kind_of,
     or_default,
-    segment_limits,
+    orientation_of,
 )
+from heptarm.planning.path import CartesianPath, Sequential
+from heptarm.planning.plan import Plan, timed
+from heptarm.planning.targets import JointMotion, SplineSegment, joint_target, pose_of, segment_limits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
@@ -219,7 +223,8 @@ class _SplineSegment:
     """A segment of a spline.
 
     Attributes:
-        order: its command.
+        motion: what is followed.
+        part: its number among the parts of the spline.
         start: position at its start, shape (3,) [m].
         end: position at its end.
         length: growth of the spline's parameter along it [m].
@@ -227,7 +232,8 @@ class _SplineSegment:
         turns: it only turns.
     """
 
-    order: Order
+    motion: SplineSegment
+    part: int
     start: Array
     end: Array
     length: float
@@ -246,17 +252,16 @@ class _SplineSegment:
         return self.line.curvature(s) if isinstance(self.line, Arc) else np.zeros(3)
 
 
-def plan_spline(robot: RobotModel, order: Order, start: Array) -> Plan:
+def plan_spline(robot: RobotModel, whole: seam.Spline, start: Array, tcp: Pose) -> Plan:
     """Plan a Cartesian spline block from rest at `start`, shape (7,) [rad].
 
     Raises:
         PlanError: a segment makes no sense, or the path leaves the workspace or passes a singularity.
     """
-    tcp = Pose.of(order.tcp[:3], order.tcp[3:])
     origin = Pose.from_matrix(forward(robot, start)) @ tcp
-    segments, turning = _segments(order, origin)
+    segments, turning = _segments(whole, origin)
     if not segments:
-        return Plan(order, start, start)
+        return Plan(whole, start, start)
     lengths = np.array([segment.length for segment in segments])
     geometry = SplineGeometry(lengths, _curves(segments), turning)
     path = CartesianPath(robot, start, geometry, tcp, None)
@@ -264,46 +269,42 @@ def plan_spline(robot: RobotModel, order: Order, start: Array) -> Plan:
         Segment(
             SubPath(path, low, high),
             segment.length,
-            segment_limits(segment.order),
+            segment_limits(segment.motion),
             _speed_limits(geometry, segment, low, high),
             int(np.clip(segment.length * _PER_METRE, _FEW, _MANY)),
         )
         for segment, (low, high) in zip(segments, pairwise(geometry.marks), strict=True)
     ]
     rests = [i for i, (one, two) in enumerate(pairwise(segments)) if _is_corner(one, two)]
-    begins = _begins(order.parts, [segment.order for segment in segments], geometry.marks)
-    return timed(robot, order, start, CompositePath(pieces), [*rests, len(pieces) - 1], begins)
+    begins = _begins(len(whole.segments), [segment.part for segment in segments], geometry.marks)
+    return timed(robot, whole, start, tcp, CompositePath(pieces), [*rests, len(pieces) - 1], begins)
 
 
-def _begins(parts: Sequence[Order], kept: Sequence[Order], marks: Sequence[float]) -> list[float]:
+def _begins(parts: int, kept: Sequence[int], marks: Sequence[float]) -> list[float]:
     """Path parameter at which the parts begin, without the first; one without motion begins with the next."""
-    result, place = [], 0
-    for one in parts:
-        result.append(marks[place])
-        if place < len(kept) and kept[place] is one:
-            place += 1
-    return result[1:]
+    return [marks[bisect_left(kept, part)] for part in range(1, parts)]
 
 
-def _segments(order: Order, origin: Pose) -> tuple[list[_SplineSegment], Orientations]:
+def _segments(whole: seam.Spline, origin: Pose) -> tuple[list[_SplineSegment], Orientations]:
     """The segments that move, and the orientation along them."""
     segments: list[_SplineSegment] = []
     here, quat, place = origin.xyz, origin.quat, 0.0
     known = [(place, quat)]
-    for index, one in enumerate(order.parts):
-        check_numbers(one)
-        if one.kind not in ("spl", "lin", "circ") or one.pose is None:
+    for index, part in enumerate(whole.segments):
+        check_numbers(part)
+        if not isinstance(part, SplineSegment):
             raise PlanError(
-                "planning", f"Can not plan motion: a spline cannot have a segment of kind {one.kind!r}"
+                "planning", f"Can not plan motion: a spline cannot have a segment of kind {kind_of(part)}"
             )
-        control = one.orientation
+        one = inherited(part, whole)
+        control = orientation_of(one.orientation)
         if control.type == "joint" or control.reference == "path":
             raise PlanError(
                 "planning",
                 f"Can not plan motion: segment {index + 1} of the spline: orientation must be variable, constant or "
                 f"ignored, relative to the base; got {control.type} relative to the {control.reference}",
             )
-        target = Pose.of(one.pose[:3], one.pose[3:])
+        target = pose_of(one.end if isinstance(one, seam.Circ) else one.target)
         goal = target.quat if control.type == "variable" else quat
         segment = _segment(one, here, target.xyz, Pose(here, quat).angle_to(Pose(here, goal)), index)
         if segment is not None:
@@ -318,22 +319,23 @@ def _segments(order: Order, origin: Pose) -> tuple[list[_SplineSegment], Orienta
     )
 
 
-def _segment(one: Order, here: Array, end: Array, angle: float, index: int) -> _SplineSegment | None:
+def _segment(one: SplineSegment, here: Array, end: Array, angle: float, index: int) -> _SplineSegment | None:
     chord = float(np.linalg.norm(end - here))
-    if one.kind == "circ":
-        assert one.via is not None
+    if isinstance(one, seam.Circ):
         try:
-            arc = Arc(here, np.array(one.via[:3]), end)
+            arc = Arc(here, np.array(one.via.xyz), end)
         except PlanError as error:
             raise PlanError(error.kind, f"{error} (segment {index + 1} of the spline)") from None
-        return _SplineSegment(one, here, end, arc.length, arc, False)
+        return _SplineSegment(one, index, here, end, arc.length, arc, False)
     none = np.array([0.0, 0.0, 0.0, 1.0])
     if chord < _SHORT:
         if angle < _STILL:
             return None
-        return _SplineSegment(one, here, end, _LEVER * angle, Straight(here, end, Slerp(none, none)), True)
-    line = Straight(here, end, Slerp(none, none)) if one.kind == "lin" else None
-    return _SplineSegment(one, here, end, chord, line, False)
+        return _SplineSegment(
+            one, index, here, end, _LEVER * angle, Straight(here, end, Slerp(none, none)), True
+        )
+    line = Straight(here, end, Slerp(none, none)) if isinstance(one, seam.Lin) else None
+    return _SplineSegment(one, index, here, end, chord, line, False)
 
 
 def _is_corner(one: _SplineSegment, two: _SplineSegment) -> bool:
@@ -380,8 +382,8 @@ def _speed_limits(
     geometry: SplineGeometry, segment: _SplineSegment, low: float, high: float
 ) -> tuple[float, ...]:
     """Largest speed of the spline's parameter that the program allows on a segment, at even samples [m/s]."""
-    speed = or_default(segment.order.cart_velocity, CARTESIAN_DEFAULT[0])
-    turn = or_default(segment.order.ori_velocity, ORIENTATION_DEFAULT[0])
+    speed = or_default(segment.motion.dynamics.velocity, CARTESIAN_DEFAULT[0])
+    turn = or_default(segment.motion.dynamics.orientation_velocity, ORIENTATION_DEFAULT[0])
     result = []
     step = (high - low) * 1e-3
     for fraction in np.linspace(0.0, 1.0, _LOOKS).tolist():
@@ -395,37 +397,40 @@ def _speed_limits(
     return tuple(result)
 
 
-def plan_joint_spline(robot: RobotModel, order: Order, start: Array) -> Plan:
+def plan_joint_spline(robot: RobotModel, whole: seam.JointSpline, start: Array, tcp: Pose) -> Plan:
     """Plan a spline through joint positions from rest at `start`, shape (7,) [rad].
 
     Raises:
         PlanError: a point is outside the limits or not reachable, or the curve between two leaves the limits.
     """
-    points, lengths, orders = [start], [], []
-    for index, one in enumerate(order.parts):
-        check_numbers(one)
-        if one.kind != "ptp":
+    points, lengths, kept, limits = [start], [], [], []
+    for index, part in enumerate(whole.points):
+        check_numbers(part)
+        if not isinstance(part, JointMotion):
             raise PlanError(
-                "planning", f"Can not plan motion: a joint spline cannot have a segment of kind {one.kind!r}"
+                "planning",
+                f"Can not plan motion: a joint spline cannot have a segment of kind {kind_of(part)}",
             )
+        one = inherited(part, whole)
         try:
-            target = joint_target(robot, one, points[-1])
+            target = joint_target(robot, one, points[-1], tcp)
         except PlanError as error:
             raise PlanError(error.kind, f"{error} (point {index + 1} of the spline)") from None
-        length = float((np.abs(target - points[-1]) / (robot.dq_max * one.joint_velocity)).max())
+        fastest = robot.dq_max * fractions(one.dynamics.velocity)
+        length = float((np.abs(target - points[-1]) / fastest).max())
         if length < _STILL:
             continue
         points.append(target)
         lengths.append(length)
-        orders.append(one)
-    if not orders:
-        return Plan(order, start, start)
+        kept.append(index)
+        limits.append(segment_limits(one))
+    if not kept:
+        return Plan(whole, start, start)
     path = JointCurve(np.array(points), np.array(lengths))
     marks = [0.0, *(np.cumsum(lengths) / sum(lengths)).tolist()]
     pieces = [
-        Segment(SubPath(path, low, min(1.0, high)), length, segment_limits(one), (UNBOUND, UNBOUND), 33)
-        for one, length, (low, high) in zip(orders, lengths, pairwise(marks), strict=True)
+        Segment(SubPath(path, low, min(1.0, high)), length, limit, (UNBOUND, UNBOUND), 33)
+        for limit, length, (low, high) in zip(limits, lengths, pairwise(marks), strict=True)
     ]
-    return timed(
-        robot, order, start, CompositePath(pieces), [len(pieces) - 1], _begins(order.parts, orders, marks)
-    )
+    begins = _begins(len(whole.points), kept, marks)
+    return timed(robot, whole, start, tcp, CompositePath(pieces), [len(pieces) - 1], begins)

@@ -1,4 +1,4 @@
-"""What an order asks for: target joints, path of the tool frame, limits along it.
+"""What a motion asks for: target joints, path of the tool frame, limits along it.
 
 Speed parameters are applied as the cabinet does: relative ones scale each axis' limit before the smallest counts,
 Cartesian ones bound the path.
@@ -7,78 +7,65 @@ Cartesian ones bound the path.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, isnan, sqrt
-from typing import NoReturn
+from math import inf, isnan, nan, sqrt
+from typing import TypeAlias
 
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model.inverse_kinematics import PathInverse, solve
+from heptarm.model.inverse_kinematics import PathInverse, inside, solve
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import Order, PlanError
-from heptarm.planning.composite_path import SegmentLimits, check_limits
+from heptarm.planning import seam
+from heptarm.planning.composite_path import LARGEST_STEP, SegmentLimits, check_limits
 from heptarm.planning.geometry import Arc, Geometry, JointOrientation, OrientationPath, Slerp, Straight
+from heptarm.planning.motion import (
+    CARTESIAN_DEFAULT,
+    ORIENTATION_DEFAULT,
+    PlanError,
+    fractions,
+    or_default,
+    orientation_of,
+)
 from heptarm.planning.path import CartesianPath
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 
-#: Limits of a Cartesian motion whose order names none: m/s, m/s², m/s³ and rad/s, rad/s², rad/s³.
-CARTESIAN_DEFAULT = (1.0, 4.0, 40.0)
-ORIENTATION_DEFAULT = (1.5, 6.0, 60.0)
+#: To a place in joint space, or along a path of the motion frame: what may be alone or in a batch.
+JointMotion: TypeAlias = seam.Ptp | seam.PtpPose
+PathMotion: TypeAlias = seam.Lin | seam.LinRel | seam.Circ
+#: What a spline consists of.
+SplineSegment: TypeAlias = seam.Spl | seam.Lin | seam.Circ
 
-#: Kinds of motions on a Cartesian path.
-LINES = ("lin", "lin_rel", "circ")
 #: A path shorter than this [m or rad] does not move.
 STILL = 1e-7
-#: Smallest speed, acceleration or jerk: a fraction of the axes' maxima, or along a path in SI units.
-SLOWEST = 1e-6
-#: Farthest position of a target or of a tool frame [m].
-FARTHEST = 100.0
+#: Cosine of half the angle between two orientations above which they are the same.
+_SAME_TURN = 0.99
+#: Samples of a path that tell whether the arm can follow it.
+_LOOKS = 101
 
 
-def check_numbers(order: Order) -> None:
-    """Refuse speeds and positions that no motion can have, before anything divides by them or squares them."""
-    fractions = (*order.joint_velocity, *order.joint_acceleration, *order.joint_jerk)
-    line = (order.cart_velocity, order.cart_acceleration, order.cart_jerk)
-    turn = (order.ori_velocity, order.ori_acceleration, order.ori_jerk)
-    for value in fractions:
-        if not SLOWEST <= value <= 1.0:
-            _refuse_number("relative speeds", value, f"in [{SLOWEST:g}, 1]")
-    for value in (*line, *turn):
-        if not (isnan(value) or SLOWEST <= value < inf):
-            _refuse_number("Cartesian speeds", value, f"finite and at least {SLOWEST:g}")
-    for place in (order.pose, order.via, order.offset, order.tcp):
-        for value in place or ():
-            if not abs(value) <= FARTHEST:
-                _refuse_number("positions", value, f"in [{-FARTHEST:g}, {FARTHEST:g}] m")
+def pose_of(given: seam.Pose) -> Pose:
+    """A pose of the seam as a value."""
+    return Pose.of(given.xyz, given.quat)
 
 
-def _refuse_number(what: str, value: float, allowed: str) -> NoReturn:
-    raise PlanError("planning", f"Can not plan motion: {what} must be {allowed}, got {value:g}")
-
-
-def _pose(values: tuple[float, ...]) -> Pose:
-    return Pose.of(values[:3], values[3:])
-
-
-def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
-    """Joint positions at the end of a ptp, shape (7,) [rad].
+def joint_target(robot: RobotModel, motion: JointMotion, start: Array, tcp: Pose) -> Array:
+    """Joint positions at the end of a PTP, shape (7,) [rad].
 
     Raises:
         PlanError: they are outside the limits, or the pose is not reachable.
     """
-    if order.joints is not None:
-        target = np.array(order.joints)
+    if isinstance(motion, seam.Ptp):
+        target = np.array(motion.q)
     else:
-        assert order.pose is not None
-        e1, status, _ = order.redundancy
+        given = motion.redundancy
         try:
             target = solve(
                 robot,
-                _pose(order.pose) @ _pose(order.tcp).inverse(),
-                e1=None if isnan(e1) else e1,
-                status=None if status < 0 else status,
+                pose_of(motion.target) @ tcp.inverse(),
+                e1=None if isnan(given.e1) else given.e1,
+                status=None if given.status < 0 else given.status,
                 near=start.tolist(),
             )
         except Unreachable as error:
@@ -89,26 +76,37 @@ def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
     return target
 
 
-def _target(order: Order, origin: Pose) -> Pose:
-    if order.offset is None:
-        assert order.pose is not None
-        return _pose(order.pose)
-    offset = _pose(order.offset)
-    if order.reference is None:
+def _offset_end(motion: seam.LinRel, origin: Pose) -> Pose:
+    """Where a relative line from a pose ends."""
+    offset = pose_of(motion.offset)
+    if motion.axes is None:
         return origin @ offset
-    axes = np.array(order.reference)
+    axes = np.array(motion.axes)
     back = axes * np.array([-1.0, -1.0, -1.0, 1.0])
     turn = multiply(multiply(axes, offset.quat), back)
     return Pose(origin.xyz + rotation(axes) @ offset.xyz, multiply(turn, origin.quat))
 
 
-def geometry_of(robot: RobotModel, order: Order, start: Array, origin: Pose) -> Geometry:
-    """Path of the tool frame of a lin, lin_rel or circ that begins at a pose.
+def _end(motion: PathMotion, origin: Pose) -> Pose:
+    if isinstance(motion, seam.LinRel):
+        return _offset_end(motion, origin)
+    return pose_of(motion.end if isinstance(motion, seam.Circ) else motion.target)
+
+
+def e1_of(motion: PathMotion) -> float:
+    """E1 at its end [rad]; NaN: as at the start."""
+    return nan if isinstance(motion, seam.LinRel) else motion.redundancy.e1
+
+
+def geometry_of(
+    robot: RobotModel, motion: PathMotion, start: Array, origin: Pose, tcp: Pose, *, is_other: bool = False
+) -> Geometry:
+    """Path of the motion frame that begins at a pose; `is_other`: see `Slerp`.
 
     Raises:
         PlanError: there is no such arc, or no joint position at its end.
     """
-    target, control = _target(order, origin), order.orientation
+    target, control = _end(motion, origin), orientation_of(motion.orientation)
     if control.type == "ignore":
         raise PlanError(
             "planning",
@@ -116,72 +114,97 @@ def geometry_of(robot: RobotModel, order: Order, start: Array, origin: Pose) -> 
         )
     turn: OrientationPath | None = None
     if control.type == "joint":
-        turn = _joint_orientation(robot, order, start, target)
-    if order.kind == "circ":
-        assert order.via is not None
-        arc = Arc(origin.xyz, _pose(order.via).xyz, target.xyz)
+        turn = _joint_orientation(robot, e1_of(motion), start, target, tcp)
+    if isinstance(motion, seam.Circ):
+        arc = Arc(origin.xyz, pose_of(motion.via).xyz, target.xyz)
         if turn is None:
-            return arc.oriented(origin.quat, target.quat, control)
+            return arc.oriented(origin.quat, target.quat, control, is_other=is_other)
         return arc.turning(turn, follows=False)
     if turn is None:
-        turn = Slerp(origin.quat, origin.quat if control.type == "constant" else target.quat)
+        end = origin.quat if control.type == "constant" else target.quat
+        turn = Slerp(origin.quat, end, is_other=is_other)
     return Straight(origin.xyz, target.xyz, turn)
 
 
-def _joint_orientation(robot: RobotModel, order: Order, start: Array, target: Pose) -> JointOrientation:
+def _joint_orientation(
+    robot: RobotModel, e1: float, start: Array, target: Pose, tcp: Pose
+) -> JointOrientation:
     """The orientation as a PTP to the target would turn it."""
-    tcp = _pose(order.tcp)
-    e1, _, _ = order.redundancy
     place = target @ tcp.inverse()
     try:
-        end = PathInverse(robot, Pose()).joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
+        inverse = PathInverse(robot, Pose.of((0.0, 0.0, 0.0)))
+        end = inverse.joints(place.xyz.tolist(), place.quat.tolist(), start, a3=e1)
     except Unreachable as error:
         raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
     return JointOrientation(robot, start, end, tcp.quat)
 
 
-def cartesian_path(robot: RobotModel, order: Order, start: Array) -> CartesianPath:
-    """Path of a lin, lin_rel or circ.
+def cartesian_path(robot: RobotModel, motion: PathMotion, start: Array, tcp: Pose) -> CartesianPath:
+    """Path of a motion of the motion frame; half a turn goes in the direction in which the arm can follow.
 
     Raises:
         PlanError: see `geometry_of`.
     """
-    tcp = _pose(order.tcp)
-    geometry = geometry_of(robot, order, start, Pose.from_matrix(forward(robot, start)) @ tcp)
-    return CartesianPath(
-        robot, start, geometry, tcp, None if isnan(order.redundancy[0]) else order.redundancy[0]
+    origin = Pose.from_matrix(forward(robot, start)) @ tcp
+    e1 = None if isnan(e1_of(motion)) else e1_of(motion)
+    path, other = (
+        CartesianPath(
+            robot, start, geometry_of(robot, motion, start, origin, tcp, is_other=is_other), tcp, e1
+        )
+        for is_other in (False, True)
     )
+    middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))
+    is_free = abs(float(middle @ middle_of_other)) < _SAME_TURN
+    return other if is_free and not _leads_on(robot, path, start) and _leads_on(robot, other, start) else path
 
 
-def or_default(value: float, default: float) -> float:
-    """A value of a command; the default where it is NaN."""
-    return default if isnan(value) else value
+def _leads_on(robot: RobotModel, path: CartesianPath, start: Array) -> bool:
+    """Whether the arm can follow a path within its joint limits, by samples."""
+    near = start
+    for s in np.linspace(0.0, 1.0, _LOOKS)[1:].tolist():
+        try:
+            q = path.at(s, near)
+        except Unreachable:
+            return False
+        if float(np.abs(q - near).max()) > LARGEST_STEP or not inside(robot, q.tolist()):
+            return False
+        near = q
+    return True
 
 
-def programmed_speed(order: Order, path: CartesianPath) -> float:
-    """Largest ds/dt that an order allows along its path; infinite where only the elbow moves."""
+def programmed_speed(dynamics: seam.CartesianDynamics, path: CartesianPath) -> float:
+    """Largest ds/dt that a motion allows along its path; infinite where only the elbow moves."""
     speeds = (
-        (or_default(order.cart_velocity, CARTESIAN_DEFAULT[0]), path.length),
-        (or_default(order.ori_velocity, ORIENTATION_DEFAULT[0]), path.angle),
+        (or_default(dynamics.velocity, CARTESIAN_DEFAULT[0]), path.length),
+        (or_default(dynamics.orientation_velocity, ORIENTATION_DEFAULT[0]), path.angle),
     )
     fastest = min((speed / size for speed, size in speeds if size > STILL), default=inf)
     if isinstance(path.geometry, Arc):
-        acceleration = or_default(order.cart_acceleration, CARTESIAN_DEFAULT[1])
+        acceleration = or_default(dynamics.acceleration, CARTESIAN_DEFAULT[1])
         fastest = min(fastest, sqrt(acceleration * path.geometry.radius) / path.length)
     return fastest
 
 
-def segment_limits(order: Order) -> SegmentLimits:
-    """What an order allows, beside its speed along the path."""
-    joints = SegmentLimits(
-        np.array(order.joint_velocity), np.array(order.joint_acceleration), np.array(order.joint_jerk)
-    )
-    if order.kind not in (*LINES, "spl"):
-        return joints
+def segment_limits(motion: JointMotion | PathMotion | SplineSegment) -> SegmentLimits:
+    """What a motion allows, beside its speed along the path."""
+    if isinstance(motion, JointMotion):
+        return _joint_limits(motion.dynamics)
     _, *line = CARTESIAN_DEFAULT
     _, *turn = ORIENTATION_DEFAULT
+    given = motion.dynamics
     return replace(
-        joints,
-        line=(or_default(order.cart_acceleration, line[0]), or_default(order.cart_jerk, line[1])),
-        turn=(or_default(order.ori_acceleration, turn[0]), or_default(order.ori_jerk, turn[1])),
+        _joint_limits(motion.joints),
+        line=(or_default(given.acceleration, line[0]), or_default(given.jerk, line[1])),
+        turn=(
+            or_default(given.orientation_acceleration, turn[0]),
+            or_default(given.orientation_jerk, turn[1]),
+        ),
+    )
+
+
+def _joint_limits(given: seam.JointDynamics) -> SegmentLimits:
+    return SegmentLimits(
+        np.array(fractions(given.velocity)),
+        np.array(fractions(given.acceleration)),
+        np.array(fractions(given.jerk)),
     )

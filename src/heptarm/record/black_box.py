@@ -21,6 +21,7 @@ from pathlib import Path
 
 from heptarm.errors import HeptarmError, MissingExtra
 from heptarm.fri.loop.telemetry import Reader
+from heptarm.io.folders import private_folder, state_folder
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.recorder import CycleTap, RecordSource, chunk_size, epoch_of
 
@@ -48,8 +49,7 @@ def folder() -> Path | None:
         return None
     if given:
         return Path(given).expanduser()
-    base = os.environ.get("XDG_STATE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.local/state"
-    return Path(base).expanduser() / "heptarm" / "black-box"
+    return state_folder() / "black-box"
 
 
 class BlackBoxFile:
@@ -164,6 +164,8 @@ class BlackBox:
         begin = at - round(BEFORE * 1e9)
         samples = [one for one in source.kept_samples() if one.received >= begin]
         entries = source.journal.since(begin)
+        if state_folder() in path.parents:
+            private_folder(path.parent)
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         _make_room(path.parent)
         unfinished = path.with_suffix(".part")

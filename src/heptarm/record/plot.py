@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.record.recording import FRI, Recording
+from heptarm.record.recorded import FRI, RecordedData
 from heptarm.record.samples import labels
 from heptarm.values.arrays import flag
 from heptarm.values.files import path_of, refuse_existing
@@ -67,7 +67,7 @@ _QUANTITIES = {
 }
 
 
-def figure_of(recording: Recording, signals: Sequence[str] = ()) -> Figure:
+def figure_of(recording: RecordedData, signals: Sequence[str] = ()) -> Figure:
     """A figure of signals over time, one below the other, with motions as bands and events as lines.
 
     Limits are drawn as fractions of the way to them where a signal has one for each joint: 1 is the limit.
@@ -93,7 +93,7 @@ def figure_of(recording: Recording, signals: Sequence[str] = ()) -> Figure:
     return figure
 
 
-def compare(first: Recording, second: Recording, signals: Sequence[str] = ()) -> Figure:
+def compare(first: RecordedData, second: RecordedData, signals: Sequence[str] = ()) -> Figure:
     """Two recordings on each other, from the beginning of their first motions on; the second one is drawn broken.
 
     Raises:
@@ -165,7 +165,7 @@ def _page(figure: Figure) -> str:
 # --------------------------------------------------------------------------------------------------- parts
 
 
-def _chosen(recordings: Sequence[Recording], signals: Sequence[str]) -> list[str]:
+def _chosen(recordings: Sequence[RecordedData], signals: Sequence[str]) -> list[str]:
     """Names to draw, checked."""
     if signals:
         for name in signals:
@@ -190,7 +190,7 @@ def _chosen(recordings: Sequence[Recording], signals: Sequence[str]) -> list[str
     return found
 
 
-def _has_numbers(recording: Recording, name: str) -> bool:
+def _has_numbers(recording: RecordedData, name: str) -> bool:
     return name in recording and len(recording[name]) > 1 and not bool(np.isnan(recording[name]).all())
 
 
@@ -211,20 +211,20 @@ def _rows(names: Sequence[str]) -> tuple[Figure, list[Any]]:
     return figure, axes
 
 
-def _title(recording: Recording) -> str:
+def _title(recording: RecordedData) -> str:
     facts = recording.facts
     where = facts.get("title", "") + (" (virtual)" if facts.get("virtual") == "true" else "")
     reason = f", black box: {facts['black_box']}" if "black_box" in facts else ""
     return f"{recording.path.name}: {where}, {recording.duration:.1f} s{reason}"
 
 
-def _start(recording: Recording) -> float:
+def _start(recording: RecordedData) -> float:
     return recording.motions[0].begin if recording.motions else 0.0
 
 
 def _draw_signal(
     axes: Axes,
-    recording: Recording,
+    recording: RecordedData,
     name: str,
     *,
     style: str = "-",
@@ -282,7 +282,7 @@ def _limits(
     return (-upper if low.startswith("-") else getattr(robot, low)), upper
 
 
-def _draw_bands(axes: Axes, recording: Recording, *, is_first: bool) -> None:
+def _draw_bands(axes: Axes, recording: RecordedData, *, is_first: bool) -> None:
     """Motions as bands, notes and important events as lines; their names above the first row."""
     first, last = _span(recording)
     top = axes.get_xaxis_transform()
@@ -320,13 +320,13 @@ def _draw_bands(axes: Axes, recording: Recording, *, is_first: bool) -> None:
                 )
 
 
-def _span(recording: Recording) -> tuple[float, float]:
+def _span(recording: RecordedData) -> tuple[float, float]:
     """First and last time that is drawn [s]."""
     times = [t for t in (recording.t, recording.signals.get(f"{FRI}t")) if t is not None and len(t)]
     return min((float(t[0]) for t in times), default=0.0), max((float(t[-1]) for t in times), default=0.0)
 
 
-def _draw_path(axes: Any, recording: Recording, colour: str, style: str) -> None:
+def _draw_path(axes: Any, recording: RecordedData, colour: str, style: str) -> None:
     points = recording["xyz"] * 1e3
     points = points[~np.isnan(points).any(axis=1)]
     points = points[:: max(1, len(points) // _POINTS)]

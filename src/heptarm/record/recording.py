@@ -1,4 +1,4 @@
-"""A recording read back: arrays by signal name, motions, events; parts of it, tables and figures of it."""
+"""A recording read back from its file, and figures of it."""
 
 from __future__ import annotations
 
@@ -13,23 +13,18 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.record.journal import NOTE
 from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout, image_data
 from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.pictures import Pictures
-from heptarm.record.samples import signals_of, to_frame
-from heptarm.values.arrays import Array, finite, flag, frozen, instance, shown
+from heptarm.record.plot import figure_of
+from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
+from heptarm.record.samples import signals_of
+from heptarm.values.arrays import Array, flag, frozen, instance, shown
 from heptarm.values.files import open_regular, path_of
-from heptarm.values.motion.trajectory import Trajectory
-from heptarm.values.notebook import as_html
-from heptarm.values.robot import RobotModel, known_robot
-from heptarm.values.text import lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Before the names of signals of FRI cycles, which have their own times: "fri.t".
-FRI = "fri."
 _MAGIC = b"\x89MCAP0\r\n"
 #: Largest chunk that is unpacked [bytes]; heptarm writes chunks of up to some megabytes.
 _LARGEST_CHUNK = 2**28
@@ -37,59 +32,8 @@ _LARGEST_CHUNK = 2**28
 _HIDDEN = ("received",)
 
 
-@dataclass(frozen=True)
-class RecordedEvent:
-    """Something that happened.
-
-    Attributes:
-        t: when, on the time line of the recording [s].
-        kind: "request", "refusal", "event", "error", "note", "fri" or "signals".
-        name: of the message, such as "MotionFinished".
-        text: one line for people.
-        content: everything, as plain data.
-        id: of the program that a request began; 0 elsewhere.
-    """
-
-    t: float
-    kind: str
-    name: str
-    text: str
-    content: Mapping[str, Any] = field(default_factory=dict, compare=False)
-    id: int = 0
-
-    def __str__(self) -> str:
-        """One line."""
-        return f"{self.t:9.3f} s  {self.kind:8}  {self.text}"
-
-
-@dataclass(frozen=True)
-class RecordedMotion:
-    """A program of motions.
-
-    Attributes:
-        id: the cabinet's number of it.
-        text: its motions in a few words; that of another client is described by its number only.
-        begin: when it began [s].
-        end: when it ended [s]; NaN: it did not in this recording.
-        cause: why it ended, such as "finished"; empty: unknown.
-        detail: the cabinet's explanation.
-    """
-
-    id: int
-    text: str
-    begin: float
-    end: float
-    cause: str = ""
-    detail: str = ""
-
-    def __str__(self) -> str:
-        """One line."""
-        why = f"{self.cause}{': ' + self.detail if self.detail else ''}"
-        return f"{self.begin:9.3f} to {self.end:9.3f} s  motion {self.id}: {self.text}  {why}".rstrip()
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(RecordedData):
     """A recording in memory; made by `load`.
 
     `run["q"]` is the array of a signal, `run.names` lists them. Time zero is the first pushed state; times are the
@@ -108,152 +52,6 @@ class Recording:
         pictures: of a simulated camera, if there was one.
     """
 
-    path: Path
-    facts: Mapping[str, str]
-    signals: Mapping[str, npt.NDArray[Any]]
-    motions: tuple[RecordedMotion, ...]
-    events: tuple[RecordedEvent, ...]
-    complete: bool
-    lost: int = 0
-    pictures: Pictures = field(default_factory=Pictures)
-    damage: str = ""
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """Array of a signal, such as "q", "fri.tau" or "t".
-
-        Raises:
-            CommandRejected: there is none of that name; the text lists them.
-        """
-        found = self.signals.get(name)
-        if found is None:
-            known = ", ".join(self.signals)
-            raise CommandRejected(
-                f"name must be one of {known}, got {shown(name)}",
-                parameter="name",
-                value=name,
-                allowed=known,
-            )
-        return found
-
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a signal of that name."""
-        return name in self.signals
-
-    def __len__(self) -> int:
-        """Number of pushed states."""
-        return len(self.t)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the signals."""
-        return tuple(self.signals)
-
-    @property
-    def t(self) -> Array:
-        """Times of the pushed states, shape (n,) [s]."""
-        return self.signals["t"]
-
-    @property
-    def duration(self) -> float:
-        """From the first to the last pushed state, or FRI cycle if there are no states [s]."""
-        t = self.t if len(self.t) else self.signals.get(f"{FRI}t", self.t)
-        return float(t[-1] - t[0]) if len(t) else 0.0
-
-    @property
-    def robot(self) -> RobotModel | None:
-        """The robot, with its limits; None: unknown to this version."""
-        return known_robot(self.facts.get("robot", ""))
-
-    @property
-    def notes(self) -> tuple[RecordedEvent, ...]:
-        """The marks that `Recorder.note` has put."""
-        return tuple(one for one in self.events if one.kind == NOTE)
-
-    def between(self, begin: float | str, end: float | str) -> Recording:
-        """A part of the recording; its times stay those of the whole.
-
-        Args:
-            begin: time [s], text of a note, or "begin".
-            end: likewise, or "end".
-
-        Raises:
-            CommandRejected: there is no note with that text, or the end is before the beginning.
-        """
-        first, last = self._moment(begin, "begin"), self._moment(end, "end")
-        if last < first:
-            raise CommandRejected(
-                f"end must not be before begin at {first:.3f} s, got {last:.3f} s",
-                parameter="end",
-                value=end,
-                allowed=f"from {first:.3f} s on",
-                hint="exchange them; of notes with the same text the first one counts",
-            )
-        masks = {prefix: _within(self.signals.get(f"{prefix}t"), first, last) for prefix in ("", FRI)}
-        signals = {
-            name: values[masks[FRI if name.startswith(FRI) else ""]] for name, values in self.signals.items()
-        }
-        return replace(
-            self,
-            signals=signals,
-            motions=tuple(one for one in self.motions if one.begin <= last and not one.end < first),
-            events=tuple(one for one in self.events if first <= one.t <= last),
-            pictures=self.pictures.between(first, last),
-        )
-
-    def _moment(self, when: float | str, name: str) -> float:
-        """Time of a mark [s]."""
-        if not isinstance(when, str):
-            return finite(when, name, unit="s")
-        for one in self.notes:
-            if one.text == when:
-                return one.t
-        if when in ("begin", "end"):
-            return -np.inf if when == "begin" else np.inf
-        known = ", ".join(repr(one.text) for one in self.notes) or "none"
-        raise CommandRejected(
-            f"there is no note {shown(when)}; there are {known}", parameter=name, value=when, allowed=known
-        )
-
-    def trajectory(self) -> Trajectory:
-        """The measured joint positions over time, to be trimmed, thinned and replayed; see `Arm.replay`.
-
-        Without pushed states those of the FRI cycles.
-
-        Raises:
-            CommandRejected: fewer than two positions were recorded.
-        """
-        for prefix in ("", FRI):
-            t, q = self.signals.get(f"{prefix}t"), self.signals.get(f"{prefix}q")
-            if t is None or q is None:
-                continue
-            known = ~np.isnan(q).any(axis=1)
-            times, rows = np.unique(t[known], return_index=True)
-            if len(times) > 1:
-                return Trajectory.of(times, q[known][rows], robot=self.facts.get("robot", ""))
-        raise CommandRejected(
-            f"{self.path.name} has fewer than 2 joint positions, so that there is no trajectory",
-            parameter="path",
-            value=str(self.path),
-            hint='record the state group "joints", and while the arm moves',
-        )
-
-    def to_pandas(self, *, fri: bool = False) -> Any:
-        """The signals of the pushed states as a `pandas.DataFrame` over `t`, a column per number, such as "q.A1".
-
-        Args:
-            fri: those of the FRI cycles instead.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
-        prefix = FRI if flag(fri, "fri") else ""
-        chosen = {
-            name.removeprefix(prefix): values
-            for name, values in self.signals.items()
-            if name.startswith(FRI) == fri
-        }
-        return to_frame(chosen, require("pandas", extra="record").DataFrame)
-
     def plot(self, *signals: str) -> Figure:
         """A figure of signals over time, with motions and events; without names the usual ones. See `heptarm plot`.
 
@@ -261,39 +59,7 @@ class Recording:
             CommandRejected: no such signal.
             MissingExtra: matplotlib is not installed.
         """
-        from heptarm.record.plot import figure_of
-
         return figure_of(self, signals)
-
-    def __str__(self) -> str:
-        """A few lines: what is in it."""
-        rate = (len(self) - 1) / self.duration if self.duration else 0.0
-        ending = (
-            f", damaged {self.damage}" if self.damage else "" if self.complete else ", cut off at its end"
-        )
-        title = f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}"
-        rows = {
-            "states": f"{len(self)} at {rate:.0f} Hz, {self.lost} lost",
-            "FRI": f"{len(self.signals[f'{FRI}t'])} cycles" if f"{FRI}t" in self.signals else "",
-            "pictures": f"{len(self.pictures)}, {self.pictures.dropped} dropped"
-            if len(self.pictures)
-            else "",
-            "motions": str(len(self.motions)),
-            "events": f"{len(self.events)}, {len(self.notes)} notes",
-        }
-        return lines(title, rows)
-
-    def _repr_html_(self) -> str:
-        """The same as a table for a notebook."""
-        return as_html(str(self))
-
-    def __repr__(self) -> str:
-        """Short form."""
-        return f"<Recording {self.path.name}, {len(self)} states, {self.duration:.2f} s>"
-
-
-def _within(t: npt.NDArray[Any] | None, first: float, last: float) -> npt.NDArray[np.bool_]:
-    return np.zeros(0, bool) if t is None else (t >= first) & (t <= last)
 
 
 # ------------------------------------------------------------------------------------------------ reading

@@ -5,21 +5,17 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, TypeAlias
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.arm.verbs import ArmVerbs, guards_in_force
 from heptarm.errors import CollisionDetected, HeptarmError, ModeConflict, NotReady, StaleState, Timeout
 from heptarm.values.arrays import Array, callback, instance, within
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.result import Result
 from heptarm.values.state import State
-
-if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
 
 #: Default of the allowed deviation of a joint's external torque from its baseline [Nm].
 THRESHOLD = 20.0
@@ -30,18 +26,9 @@ _WINDOWS = 5
 #: Longest sleep of the watching thread without a state [s].
 _NAP = 0.2
 
-_OnCollision: TypeAlias = "Callable[[Collision], None] | None"
-#: Arms with a guard in force, with what is called: two guards would contradict each other.
-_guarded: WeakKeyDictionary[Arm, tuple[CollisionGuard, _OnCollision]] = WeakKeyDictionary()
-
-
-def in_force(arm: Arm) -> tuple[CollisionGuard, _OnCollision] | None:
-    """The guard of the block that `guarded` has begun, and what is called at a collision; None: there is no block."""
-    return _guarded.get(arm)
-
 
 def collision_guard(
-    arm: Arm, threshold: npt.ArrayLike = THRESHOLD, *, margin: npt.ArrayLike = 0.0, seconds: float = 0.2
+    arm: ArmVerbs, threshold: npt.ArrayLike = THRESHOLD, *, margin: npt.ArrayLike = 0.0, seconds: float = 0.2
 ) -> CollisionGuard:
     """Make a guard around the present external torques, while the arm rests and nobody touches it.
 
@@ -71,7 +58,7 @@ def collision_guard(
     return CollisionGuard.of(threshold, baseline=np.mean(torques, axis=0), margin=margin)
 
 
-def _torques_at_rest(arm: Arm, seconds: float) -> list[Array]:
+def _torques_at_rest(arm: ArmVerbs, seconds: float) -> list[Array]:
     """External torques of the states of a time [s]; none if no state came."""
     torques = []
     for state in arm.states(duration=seconds):
@@ -84,14 +71,13 @@ def _torques_at_rest(arm: Arm, seconds: float) -> list[Array]:
     return torques
 
 
-@contextlib.contextmanager
 def guarded(
-    arm: Arm,
+    arm: ArmVerbs,
     guard: CollisionGuard | None = None,
     *,
     on_collision: Callable[[Collision], None] | None = None,
     then: Reaction = "relax",
-) -> Iterator[CollisionGuard]:
+) -> contextlib.AbstractContextManager[CollisionGuard]:
     """A block whose motions, servo motions and FRI sessions end at a collision.
 
     The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path and relaxes. A
@@ -109,13 +95,23 @@ def guarded(
         CollisionDetected: from `move`, `wait` or the end of the block; names the joint and its torque.
         ModeConflict: the block is inside another one.
     """
-    if arm in _guarded:
+    return _block(arm, guard, on_collision, then)
+
+
+@contextlib.contextmanager
+def _block(
+    arm: ArmVerbs,
+    guard: CollisionGuard | None,
+    on_collision: Callable[[Collision], None] | None,
+    then: Reaction,
+) -> Iterator[CollisionGuard]:
+    if arm in guards_in_force:
         raise ModeConflict("a collision guard is in force already", hint="leave its block first")
     if on_collision is not None:
         callback(on_collision, "on_collision")
     reaction = check_reaction(then)
     bands = collision_guard(arm) if guard is None else instance(guard, CollisionGuard, "guard")
-    _guarded[arm] = (bands, on_collision)
+    guards_in_force[arm] = (bands, on_collision)
     try:
         with (
             _watched(arm, bands, on_collision)
@@ -124,12 +120,12 @@ def guarded(
         ):
             yield bands
     finally:
-        del _guarded[arm]
+        del guards_in_force[arm]
 
 
 @contextlib.contextmanager
 def _broken_off(
-    arm: Arm, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None, then: Reaction
+    arm: ArmVerbs, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None, then: Reaction
 ) -> Iterator[None]:
     """A block whose motions the cabinet ends at a collision."""
 
@@ -146,7 +142,7 @@ def _broken_off(
 
 @contextlib.contextmanager
 def _watched(
-    arm: Arm, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None
+    arm: ArmVerbs, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None
 ) -> Iterator[None]:
     """A block whose motions this program stops at a collision."""
     watch = _Watch(arm, guard, on_collision)
@@ -170,7 +166,7 @@ class _Watch:
     """
 
     def __init__(
-        self, arm: Arm, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None
+        self, arm: ArmVerbs, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None
     ) -> None:
         self.found: Collision | None = None
         self._arm, self._guard, self._on_collision = arm, guard, on_collision

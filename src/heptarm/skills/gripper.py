@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.io import SignalValues, find_signal
 from heptarm.values.sealed import Sealed
-
-if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
 
 #: Default of the longest time for opening or closing [s].
 PATIENCE = 2.0
@@ -40,7 +38,7 @@ class Gripper(Protocol):
         """Whether something is between its closed fingers."""
 
 
-def _wired(arm: Arm, role: str, name: str, others: Mapping[str, str]) -> str:
+def _wired(arm: ArmVerbs, role: str, name: str, others: Mapping[str, str]) -> str:
     """The full name of a signal of a gripper, checked.
 
     Args:
@@ -102,7 +100,7 @@ class TwoSignalGripper(Sealed):
 
     def __init__(
         self,
-        arm: Arm,
+        arm: ArmVerbs,
         *,
         open: str,
         close: str,

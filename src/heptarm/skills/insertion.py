@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import InsertionFailed, MotionAborted, Timeout
 from heptarm.values.arrays import Array, Value, instance, within
 from heptarm.values.condition.contact import axis_of
@@ -24,7 +25,6 @@ from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
 
 if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
     from heptarm.arm.motion.handle import MotionHandle
     from heptarm.values.mode.impedance import CartesianImpedance
 
@@ -79,7 +79,7 @@ class Insertion(Value):
 
 
 def insert(
-    arm: Arm,
+    arm: ArmVerbs,
     direction: str = "z",
     *,
     depth: float,
@@ -144,7 +144,7 @@ class _Insertion:
         timeout: of the search, and of pushing [s].
     """
 
-    arm: Arm
+    arm: ArmVerbs
     direction: str
     axis: Array
     frame: str

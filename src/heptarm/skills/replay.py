@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isnan
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.arm.watchdog import REPLAY
 from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
 from heptarm.values.arrays import Array, Value, callback, instance, within, word
@@ -19,9 +20,6 @@ from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.result import Cause, Result
 from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.text import degrees, fixed, lines
-
-if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
 
 #: Longest time that the arm may need to settle at the end of a trajectory after its last target [s].
 _SETTLE = 2.0
@@ -59,7 +57,7 @@ class Replay(Value):
 
 
 def replay(
-    arm: Arm,
+    arm: ArmVerbs,
     trajectory: Trajectory,
     *,
     by: Literal["servo", "spline"] = "servo",
@@ -118,7 +116,7 @@ def replay(
 class _Run:
     """A replay that starts at the first position of its trajectory; see `replay` for the attributes."""
 
-    arm: Arm
+    arm: ArmVerbs
     trajectory: Trajectory
     speed_scaling: float
     mode: Mode | None

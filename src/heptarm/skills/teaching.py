@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, StaleState
 from heptarm.values.arrays import Array, within
 from heptarm.values.condition.condition import Condition
@@ -20,9 +20,6 @@ from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.result import Result
 from heptarm.values.state import State
 
-if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
-
 #: Default of the longest time for teaching [s].
 PATIENCE = 300.0
 #: Longest time from cancelling the motion to its end [s].
@@ -30,7 +27,7 @@ _END_TIMEOUT = 30.0
 
 
 def guide_precisely(
-    arm: Arm,
+    arm: ArmVerbs,
     free: str,
     *,
     frame: str = TOOL,
@@ -55,7 +52,7 @@ def guide_precisely(
 
 
 def teach(
-    arm: Arm,
+    arm: ArmVerbs,
     motion: Motion | None = None,
     *,
     mode: Mode | None = None,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.devices.device import DeviceInput, InputDevice
 from heptarm.errors import OutsideWorkspace, ShapeError
 from heptarm.skills.gripper import Gripper
@@ -15,7 +16,6 @@ from heptarm.values.frames import BASE
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from heptarm.arm.arm import Arm
     from heptarm.arm.motion.servo import ServoStats
     from heptarm.values.clearance import ClearanceModel
     from heptarm.values.pose import Pose
@@ -29,7 +29,7 @@ _JOINT_SPEED, _DIAGONAL = 0.5, 3.0**0.5
 
 
 def teleoperate(
-    arm: Arm,
+    arm: ArmVerbs,
     device: InputDevice,
     *,
     gripper: Gripper | None = None,

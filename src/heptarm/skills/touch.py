@@ -6,11 +6,12 @@ import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import HeptarmError, LimitError, MotionAborted, NoContact, Timeout
 from heptarm.skills.taps import TapWatch
 from heptarm.values.arrays import Array, integer, optional, within, word
@@ -25,9 +26,6 @@ from heptarm.values.motion.line import lin_rel
 from heptarm.values.result import Cause, Result
 from heptarm.values.state import State
 
-if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
-
 #: States averaged for the baseline, and the longest time that they may take to arrive [s].
 _SAMPLES = 8
 _PATIENCE = 5.0
@@ -36,7 +34,7 @@ _FASTEST = 10.0
 
 
 def touch(
-    arm: Arm,
+    arm: ArmVerbs,
     direction: str | npt.ArrayLike = "z",
     *,
     distance: float,
@@ -99,7 +97,7 @@ def touch(
 
 
 def touch_twice(
-    arm: Arm,
+    arm: ArmVerbs,
     direction: str | npt.ArrayLike = "z",
     *,
     distance: float,
@@ -176,7 +174,7 @@ def touch_twice(
 
 
 def wait_for_taps(
-    arm: Arm, count: int = 2, *, force: float = 8.0, gap: float = 1.0, timeout: float = 60.0
+    arm: ArmVerbs, count: int = 2, *, force: float = 8.0, gap: float = 1.0, timeout: float = 60.0
 ) -> State:
     """Wait until somebody taps the resting arm; checked by this program, not by the cabinet.
 
@@ -205,7 +203,7 @@ def wait_for_taps(
 
 
 def on_taps(
-    arm: Arm,
+    arm: ArmVerbs,
     callback: Callable[[State], object],
     count: int = 2,
     *,
@@ -268,7 +266,7 @@ class _Approach:
         frame: name of the frame.
     """
 
-    arm: Arm
+    arm: ArmVerbs
     direction: Array
     distance: float
     force: float

@@ -32,17 +32,18 @@ _TURN = 2.0 * math.pi + 1e-9
 
 #: E1 that is not given. A NaN of a computation is not this one, and is refused.
 NOT_GIVEN = float("nan")
-#: Largest arm angle that is accepted [rad].
+#: Largest E1 that is accepted [rad].
 _LARGEST = 1000.0
+#: Gimbal lock: so near to it one of the angles a and c is free.
+_LOCKED = 1e-13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Redundancy(Value):
-    """Arm angle E1, Status and Turn.
+    """E1, Status and Turn.
 
     Attributes:
-        e1: arm angle [rad]: that of the elbow about the shoulder-wrist line, from the arm with A3 = 0 in the
-            same Status. NaN, the default: not given.
+        e1: the angle of A3 [rad], as in Sunrise. NaN, the default: not given.
         status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0; bit 2, A6 <= 0. -1: not given.
         turn: bit i, A(i+1) < 0. -1: not given. An LBR does not need it: its joints turn less than once.
 
@@ -213,12 +214,19 @@ class Pose(Value):
 
     @property
     def abc(self) -> Array:
-        """KUKA's angles about z, y, x [rad], shape (3,): R = Rz(a) Ry(b) Rx(c)."""
-        r = self.rotation
-        b = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
-        if math.hypot(r[0, 0], r[1, 0]) < 1e-12:  # gimbal lock: c is taken as 0
-            return np.array([math.atan2(-r[0, 1], r[1, 1]), b, 0.0]) + 0.0
-        return np.array([math.atan2(r[1, 0], r[0, 0]), b, math.atan2(r[2, 1], r[2, 2])]) + 0.0
+        """KUKA's angles about z, y, x [rad], shape (3,): R = Rz(a) Ry(b) Rx(c); c is 0 in gimbal lock."""
+        x, y, z, w = self.quat.tolist()
+        # w + y, z - x = √2 cos(b/2 - π/4) (cos, sin)((a - c) / 2)
+        # w - y, z + x = √2 sin(π/4 - b/2) (cos, sin)((a + c) / 2)
+        upper, lower = math.hypot(w + y, z - x), math.hypot(w - y, z + x)
+        difference, total = math.atan2(z - x, w + y), math.atan2(z + x, w - y)
+        b = 0.5 * math.pi - 2.0 * math.atan2(lower, upper)
+        if lower < _LOCKED:
+            total = difference
+        elif upper < _LOCKED:
+            difference = total
+        a, c = total + difference, total - difference
+        return np.array([math.remainder(a, math.tau), b, math.remainder(c, math.tau)]) + 0.0
 
     @property
     def array(self) -> Array:

@@ -249,6 +249,11 @@ class RobotModel:
         """Its name without the media flange, as in targets: "iiwa14"."""
         return self.name.partition(_SEPARATOR)[0]
 
+    @property
+    def rated_load(self) -> float:
+        """KUKA's rated load [kg], which is in the name of the model."""
+        return float("".join(filter(str.isdigit, self.base_name)))
+
     def with_flange(self, flange: Flange) -> RobotModel:
         """The same robot with another flange: its kinematics and the mass of its last link follow."""
         if flange == self.flange:

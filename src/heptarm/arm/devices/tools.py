@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -27,6 +28,8 @@ from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
+
+_log = logging.getLogger("heptarm.arm")
 
 _ORIGIN = Pose.of((0.0, 0.0, 0.0))
 #: Longest wait for a state of the robot with what has just been attached [s].
@@ -158,6 +161,21 @@ class Tooling:
         self._workpiece = None
         self._commanded = Attachment(name, "", main) if main else None
         self._wait_until_shown(name, "")
+        self._warn_of_load()
+
+    def _warn_of_load(self) -> None:
+        """Log a warning if what is attached is heavier than the robot's rated load."""
+        tool, held, _ = self._carried()
+        mass = sum(one.mass for one in (tool, held) if one is not None)
+        robot = self._connection.robot
+        if mass > robot.rated_load:
+            _log.warning(
+                "the attached load is %.3g kg, and the rated load of the %s is %g kg: check the mass, or move slowly; "
+                "drives and brakes may fail, and collisions are detected late",
+                mass,
+                robot.title,
+                robot.rated_load,
+            )
 
     def detach(self) -> None:
         """Detach the tool and its workpiece; has no effect if nothing is attached."""
@@ -201,6 +219,7 @@ class Tooling:
         self._commanded = None if before is None else Attachment(before.tool, one.name, before.frame)
         if before is not None:
             self._wait_until_shown(before.tool, one.name)
+        self._warn_of_load()
 
     def detach_workpiece(self, workpiece: Workpiece | str) -> None:
         """Detach a workpiece; see `Arm.detach_workpiece`."""

@@ -116,6 +116,10 @@ def summary(client: Client, *, before: Mapping[str, int]) -> list[str]:
     ]
     if stats.filled:
         lines.append(f"policy    {stats.filled} answers without a fresh command")
+    if stats.stale:
+        lines.append(
+            f"stale     {stats.stale} commands older than the session, not executed: the arm was held"
+        )
     lines += [f"limited   {line}" for line in client.limited]
     return lines + [f"refused   {line}" for line in client.refused]
 

@@ -45,8 +45,8 @@ from heptarm.fri.loop.cycle import LAW_FAILED
 from heptarm.fri.loop.law_interface import LiveMemory
 from heptarm.fri.loop.user_api import Params, Stats
 from heptarm.fri.loop.user_api import State as FriState
-from heptarm.fri.protocol.messages import Quality, SessionState
-from heptarm.fri.session.session import Event, Kind
+from heptarm.fri.protocol.messages import Quality, Safety, SessionState
+from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
 from heptarm.record.journal import FRI
 from heptarm.values.arrays import within
@@ -188,11 +188,13 @@ class Fri(Block):
             MotionAborted: the cabinet ended the motion, by a safety stop for instance.
             StreamError: the law raised an error, or the cabinet closed a monitoring session.
             CollisionDetected: the external torque of a joint left its band.
+            SafetyStop: the block ends while a safety function stops the robot.
             ConnectionLost: the connection to the cabinet has ended.
         """
         if self._closed or self._client is None:
             return
         was_open = self._is_open
+        stop = self._safety_stop()
         hint = "" if was_open else advice(self.client, host=self._host)
         try:
             self._end()
@@ -207,8 +209,27 @@ class Fri(Block):
             raise self._collided(self._result)
         if self._law_error:
             raise StreamError(self._law_error, hint="the guard braked the arm within its limits")
+        if self.kind != "monitor" and (stop := stop or self._safety_stop()):
+            raise SafetyStop(
+                f"the FRI session ended in a safety stop: {stop}",
+                hint="remove its cause, then arm.recover(); arm.state.safety has the state",
+            )
         if self.kind == "monitor" and not was_open:
             raise self._connection.final_error() or self._early_end(None, hint)
+
+    def _safety_stop(self) -> str:
+        """The safety stop in which the robot is, as text; empty: none is known."""
+        newest = self._connection.newest()
+        safety = None if newest is None else newest.groups.safety
+        if safety is not None and (
+            safety.emergency_stop or safety.operator_safety_open or safety.protective_stop
+        ):
+            return ", ".join(safety.stops)
+        with contextlib.suppress(HeptarmError):  # no message has arrived
+            found = self.client.state.safety
+            if found is not None and found is not Safety.NORMAL_OPERATION:
+                return found.name.lower().replace("_", " ")
+        return ""
 
     def _end(self) -> None:
         client, self._closed = self.client, True

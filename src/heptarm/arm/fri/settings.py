@@ -5,31 +5,29 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import TypedDict
+from typing import TYPE_CHECKING
 
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConflict, ShapeError
-from heptarm.fri.guard.fallback import Policy
-from heptarm.fri.guard.joint_guard import Limits
-from heptarm.fri.guard.pose_guard import PoseLimits
-from heptarm.fri.loop.client import Client, check_settings
+from heptarm.fri.loop.client import Client
 from heptarm.fri.loop.compiled import CompiledLaw
-from heptarm.fri.loop.law_interface import Given, Initial, Memory
-from heptarm.fri.loop.parameters import merged
+from heptarm.fri.loop.law_interface import Memory
+from heptarm.fri.loop.settings import LoopKeywords, LoopSettings
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
 from heptarm.io.udp import UdpSocket
 from heptarm.values.arrays import instance, integer, scalar, shown, within, word
-from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.mode.sine import SineImpedance
-from heptarm.values.robot import Body
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 #: `law(state, out, params)` or `law(state, out, params, memory)`.
 Law = (
@@ -59,27 +57,15 @@ _MAX_ANSWER_TIME = {"position": 10, "torque": 5, "wrench": 10, "pose": 10, "moni
 _EXAMPLE_MODE = "CartesianImpedance(stiffness=(500, 500, 500, 50, 50, 50))"
 
 
-class FriKeywords(TypedDict, total=False):
-    """Keywords of `Arm.fri`, for type checkers; `request` has their defaults."""
+class FriKeywords(LoopKeywords, total=False):
+    """Keywords of `Arm.fri`, for type checkers: those of the session here, and the settings of its loop."""
 
     period_ms: int | None
     multiplier: int
     mode: Mode | None
-    law: Law | None
-    params: Mapping[str, Initial] | None
-    memory: Mapping[str, Given] | None
-    collision: CollisionGuard | None
-    policy: Policy | None
-    limits: Limits | None
-    pose_limits: PoseLimits | None
     io: Sequence[str]
-    version: str | None
     host: str
     port: int | None
-    realtime: bool
-    cpu: int | None
-    busy_poll: float
-    history: int
     timeout: float
 
 
@@ -104,33 +90,16 @@ def request(
     connection: Connection,
     kind: str,
     *,
-    load: Body | None = None,
     period_ms: int | None = None,
     multiplier: int = 1,
     mode: Mode | None = None,
-    law: Law | None = None,
-    params: Mapping[str, Initial] | None = None,
-    memory: Mapping[str, Given] | None = None,
-    collision: CollisionGuard | None = None,
-    policy: Policy | None = None,
-    limits: Limits | None = None,
-    pose_limits: PoseLimits | None = None,
     io: Sequence[str] = (),
-    version: str | None = None,
     host: str = "",
     port: int | None = None,
-    realtime: bool = True,
-    cpu: int | None = None,
-    busy_poll: float = 0.0,
-    history: int = 2048,
     timeout: float = 10.0,
+    **loop: Unpack[LoopKeywords],
 ) -> FriRequest:
-    """Check the keywords of `Arm.fri` and turn them into a request.
-
-    Args:
-        connection: to the cabinet.
-        kind: the commanded quantity, or "monitor".
-        load: on the flange, as far as it is known.
+    """Check the keywords of `Arm.fri`; turn them into a request.
 
     Raises:
         CommandRejected: this cabinet does not support such a session.
@@ -141,6 +110,7 @@ def request(
     _check_kind(kind, connection.welcome.capabilities)
     period = (PERIOD_MONITOR if kind == "monitor" else PERIOD) if period_ms is None else period_ms
     _check_period(kind, period, multiplier)
+    law = loop.get("law")
     if isinstance(law, CompiledLaw):
         _check_law(kind, law)
         mode = _FOR_LAWS.get(law.kind) if mode is None else mode
@@ -152,27 +122,13 @@ def request(
             parameter="law",
             hint='iterate over its states, or use arm.fri("position")',
         )
-    if params is not None and law is None:
+    if loop.get("params") is not None and law is None:
         raise ShapeError("params need a law, and none was given", parameter="params", hint="give law=...")
     if port is not None:
         integer(port, "port", 0, 65535)
     instance(host, str, "host")
-    check_settings(
-        version=version,
-        limits=limits,
-        pose_limits=pose_limits,
-        policy=policy,
-        law=law,
-        params=params,
-        memory=memory,
-        collision=collision,
-        history=history,
-        realtime=realtime,
-        cpu=cpu,
-        busy_poll=busy_poll,
-    )
-    if isinstance(law, CompiledLaw):
-        merged(law.parameters(connection.robot), params)  # raises for a value outside its range
+    loop["model"] = connection.robot
+    settings = LoopSettings(**loop)
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,
@@ -184,28 +140,7 @@ def request(
     )
 
     def make(address: str) -> Client:
-        return _listening(
-            port,
-            address,
-            lambda chosen: Client(
-                chosen,
-                host=address,
-                version=version,
-                model=connection.robot,
-                load=load,
-                limits=limits,
-                pose_limits=pose_limits,
-                policy=policy,
-                law=law,
-                params=params,
-                memory=memory,
-                collision=collision,
-                history=history,
-                realtime=realtime,
-                cpu=cpu,
-                busy_poll=busy_poll,
-            ),
-        )
+        return _listening(port, address, lambda chosen: Client(chosen, host=address, settings=settings))
 
     return FriRequest(kind, message, make, law is not None)
 

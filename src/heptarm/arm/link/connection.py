@@ -46,6 +46,7 @@ from heptarm.values.result import Result
 from heptarm.values.robot import FLANGES, Flange, RobotModel
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
 from heptarm.wire.messages import Message
 
 _log = logging.getLogger("heptarm.arm")
@@ -200,10 +201,6 @@ class Events:
             if message.id == number:  # type: ignore[union-attr]
                 self._deliver(program, message)
 
-    def is_running(self, program: SentProgram) -> bool:
-        """Whether no end of the program was received."""
-        return program.id in self._programs
-
     def pending(self) -> float:
         """Longest plausible duration of all accepted programs together [s]."""
         return sum(program.limit for program in list(self._programs.values()))
@@ -264,11 +261,50 @@ _CHECK_INTERVAL = 0.2
 _STOPPED = (
     wire.SafetyBits.EMERGENCY_STOP | wire.SafetyBits.PROTECTIVE_STOP | wire.SafetyBits.OPERATOR_SAFETY_OPEN
 )
+#: What holds a motion without ending it.
+_CONTINUES = ("paused", "enabling switch not held")
+#: Time in which a stop has ended a motion at rest, on the robot's clock [s].
+_STOP_TAKES = 1.0
 #: A state older than this many periods, and than this [s], is stale.
 _STALE_PERIODS, _STALE = 10.0, 1.0
 #: How long to wait for a newer state when the newest is stale [s]: after a standstill of this process or of its machine
 #: newer ones wait to be read.
 _CATCH_UP = 0.3
+
+
+class StopWatch:
+    """Ends a wait when a safety stop keeps the arm from what is waited for.
+
+    It leaves time for what a stop itself brings about, such as the end of a motion. A wait that begins during a stop
+    may be for its end, so it goes on.
+
+    Args:
+        waits_for_rest: the wait is for the arm, so that a stop before it counts as well.
+    """
+
+    def __init__(self, *, waits_for_rest: bool = False) -> None:
+        self._was_free = waits_for_rest
+        self._since: int | None = None
+
+    def check(self, state: State) -> None:
+        """Look at the next state that does not meet the condition.
+
+        Raises:
+            SafetyStop: a stop has been active for a second; the text names it.
+        """
+        safety = state.groups.safety
+        if safety is None:
+            return
+        stops = [stop for stop in safety.stops if stop not in _CONTINUES]
+        if not stops:
+            self._was_free, self._since = True, None
+        elif self._was_free:
+            self._since = safety.stamp if self._since is None else self._since
+            if (safety.stamp - self._since) * 1e-9 >= _STOP_TAKES:
+                raise SafetyStop(
+                    f"the wait ended at a safety stop: {', '.join(stops)}",
+                    hint="arm.recover() lists what a person has to do",
+                )
 
 
 class Connection:
@@ -603,8 +639,8 @@ class Connection:
             return
         try:
             self.request(wire.Cancel(id=program.id))
-        except CommandRejected:
-            if self.events.is_running(program) and not program.done:  # otherwise it has just ended by itself
+        except CommandRejected as error:
+            if error.code != Code.UNKNOWN_MOTION:  # otherwise it has just ended, and its end is under way
                 raise
 
     def stop(self, kind: wire.StopKind) -> None:
@@ -720,11 +756,19 @@ class Connection:
         self.check_may_wait("a loop over arm.states()")
         return self.final_error()
 
-    def wait_for(self, condition: Callable[[State], object], timeout: float) -> State:
+    def wait_for(
+        self, condition: Callable[[State], object], timeout: float, *, watch: StopWatch | None = None
+    ) -> State:
         """Wait until a pushed state meets a condition.
+
+        Args:
+            condition: called with each state.
+            timeout: longest wait [s].
+            watch: ends the wait at a safety stop; None: it goes on.
 
         Raises:
             Timeout: none did in time.
+            SafetyStop: by `watch`.
             ConnectionLost: the connection has ended.
             LocalProtocolError: called from a callback.
         """
@@ -739,14 +783,21 @@ class Connection:
                 state = self.build(sample)
                 if condition(state):
                     return state
+                if watch is not None:
+                    watch.check(state)
             else:
                 error = self.final_error()
                 if error is not None:
                     raise error
             if rest <= 0:
+                newest = self.newest()
+                safety = None if newest is None else newest.groups.safety
+                stops = ", ".join(() if safety is None else safety.stops)
                 raise Timeout(
-                    f"the condition was not met within {timeout:g} s",
-                    hint="give a longer timeout, or check arm.state",
+                    f"the condition was not met within {timeout:g} s{': ' + stops if stops else ''}",
+                    hint="arm.recover() lists what a person has to do"
+                    if stops
+                    else "give a longer timeout, or check arm.state",
                 )
 
     def history(self) -> tuple[State, ...]:

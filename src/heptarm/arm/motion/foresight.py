@@ -6,8 +6,7 @@ Both plan with the planner of the virtual cabinet, which needs `pip install 'hep
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
-from math import isinf
+from itertools import pairwise, takewhile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,23 +14,20 @@ import numpy as np
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
-from heptarm.arm.motion.program import checked, resolved
+from heptarm.arm.motion.program import CheckedProgram, ProgramTerms, checked
 from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, TouchOnPath
-from heptarm.values.condition.condition import Condition
-from heptarm.values.condition.reaction import Reaction
 from heptarm.values.frames import TOOL
-from heptarm.values.mode.mode import Mode
-from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.motion import Hold, Motion, hold
+from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import quaternion
 from heptarm.values.state import State
 from heptarm.values.tool import unknown
 from heptarm.values.workspace import Workspace
+from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
     from heptarm.planning.lookahead import PlannedProgram
@@ -44,7 +40,8 @@ _TURN = 0.02
 _MOST_TORQUES = 600
 #: Longest wait for the state after the end of a motion [s].
 _SOON = 0.5
-_BRIEF = hold(0.01)
+#: Stands for a hold, which may have no end.
+_BRIEF = wire.Item(motion=wire.Hold(duration=0.01), frame="", until=wire.Condition())
 
 
 class Foresight:
@@ -80,15 +77,13 @@ class Foresight:
             raise unknown(workspace.frame, "frame", ("base", *self._tooling.taught))
         return Boundary(workspace, self._connection.robot, frame, self._tooling.on_flange(TOOL))
 
-    def examine(self, motions: Sequence[Motion], when: str, ceiling: float) -> None:
-        """Check the paths of motions that are about to be sent.
+    def examine(self, program: CheckedProgram) -> None:
+        """Check the paths of a program that is about to be sent.
 
         A hold needs no check, and what follows hand guiding cannot be checked.
 
         Args:
-            motions: in their order.
-            when: while another program runs: "queue", "replace" or "reject"; a queued one starts where that one ends.
-            ceiling: no joint is faster than this fraction of its maximum, (0, 1].
+            program: a queued one starts where the one before ends.
 
         Raises:
             CollisionForeseen: bodies would touch.
@@ -101,23 +96,22 @@ class Foresight:
         if self.check is None and boundary is None:
             return
         state = self._connection.fresh()
-        start = self._end if _is_busy(state) and when == "queue" and self._end is not None else state.q
-        guided = next((k for k, one in enumerate(motions) if isinstance(one, HandGuide)), len(motions))
+        queues = program.terms.when == "queue"
+        start = self._end if _is_busy(state) and queues and self._end is not None else state.q
+        items = list(takewhile(lambda one: not isinstance(one.motion, wire.HandGuide), program.items))
         self._end = None
-        if guided == 0:
+        if not items:
             return
-        finite = [
-            _BRIEF if isinstance(one, Hold) and isinf(one.duration) else one for one in motions[:guided]
-        ]
-        program = self._planned(finite, np.asarray(start), ceiling, _STEP)
+        finite = [_BRIEF if isinstance(one.motion, wire.Hold) else one for one in items]
+        ahead = self._planned(finite, np.asarray(start), _STEP)
         check = None if self.check is None else self._tooling.loaded(self.check)
-        for index, path in enumerate(_paths(program)):
-            name = f"motions[{index}]" if len(motions) > 1 else "motion"
+        for index, path in enumerate(_paths(ahead)):
+            name = f"motions[{index}]" if len(program.items) > 1 else "motion"
             if boundary is not None:
                 _check_inside(path, boundary, name)
             touch = None if check is None else check.first_on(path)
             if touch is not None:
-                of = f"motions[{index}]: " if len(motions) > 1 else ""
+                of = f"motions[{index}]: " if len(program.items) > 1 else ""
                 raise CollisionForeseen(
                     f"{of}{touch.clearance} after {touch.at:.0%} of the path",
                     touch=touch,
@@ -126,16 +120,13 @@ class Foresight:
                     value=round(touch.clearance.distance, 4),
                     hint="choose another path; or arm.collision_check = None, if the model of the scene is wrong",
                 )
-        self._end = program.q[-1] if guided == len(motions) else None
+        self._end = ahead.q[-1] if len(items) == len(program.items) else None
 
     def preview(
         self,
-        motions: Sequence[Motion],
+        motions: tuple[Motion, ...],
+        terms: ProgramTerms,
         *,
-        ceiling: float,
-        mode: Mode | None,
-        until: Condition | None,
-        then: Reaction,
         start: Array | None,
         step: float,
         check: CollisionCheck | None,
@@ -146,45 +137,41 @@ class Foresight:
             start = self._rest()
         else:
             robot.check(start, "start")
-        motions = resolved(self._connection, tooling, tuple(motions), start)
-        checked(self._connection, tooling, motions, ceiling=ceiling, mode=mode, until=until, then=then)
-        program = self._planned(motions, start, ceiling, step)
+        program = checked(self._connection, tooling, motions, terms, start=start)
+        ahead = self._planned(program.items, start, step)
         boundary = self.boundary()
         if boundary is not None:
-            for index, path in enumerate(_paths(program)):
+            for index, path in enumerate(_paths(ahead)):
                 _check_inside(path, boundary, f"motions[{index}]" if len(motions) > 1 else "motion")
         load = tooling.load
-        every = max(1, -(-len(program.t) // _MOST_TORQUES))
-        kept = np.unique(np.append(np.arange(0, len(program.t), every), len(program.t) - 1))
-        rows = ((program.q[k], program.dq[k], program.ddq[k]) for k in kept.tolist())
+        every = max(1, -(-len(ahead.t) // _MOST_TORQUES))
+        kept = np.unique(np.append(np.arange(0, len(ahead.t), every), len(ahead.t) - 1))
+        rows = ((ahead.q[k], ahead.dq[k], ahead.ddq[k]) for k in kept.tolist())
         torques = np.array([inverse_dynamics(robot, *row, load=load) for row in rows])
-        tau = np.array([np.interp(program.t, program.t[kept], column) for column in torques.T]).T
+        tau = np.array([np.interp(ahead.t, ahead.t[kept], column) for column in torques.T]).T
         used = self.check if check is None else check
         used = None if used is None else tooling.loaded(used)
         return ProgramPreview(
             robot,
-            program.t,
-            program.q,
-            program.dq,
-            program.ddq,
+            ahead.t,
+            ahead.q,
+            ahead.dq,
+            ahead.ddq,
             frozen(tau),
-            self._poses(program.q),
-            tuple(_listed(motions, program)),
-            () if used is None else tuple(_collisions(program, used)),
+            self._poses(ahead.q),
+            tuple(_listed(motions, ahead)),
+            () if used is None else tuple(_collisions(ahead, used)),
             used is not None,
-            until,
+            terms.until,
         )
 
-    def _planned(
-        self, motions: Sequence[Motion], start: Array, ceiling: float, step: float
-    ) -> PlannedProgram:
+    def _planned(self, items: Sequence[wire.Item], start: Array, step: float) -> PlannedProgram:
         """The program as the controller would plan it."""
         require("ruckig", extra="sim")
         from heptarm.planning.lookahead import FramesOfArm, look_ahead
 
         frames = FramesOfArm(self._tooling.on_flange, self._tooling.in_base)
-        limited = [one.limited_to(ceiling) for one in motions]
-        return look_ahead(self._connection.robot, start, limited, frames, step=step)
+        return look_ahead(self._connection.robot, start, items, frames, step=step)
 
     def _rest(self) -> Array:
         """Where the arm rests: the commanded position, from which the controller plans."""

@@ -544,7 +544,9 @@ class MotionHandle(Sealed):
             return None
         meaning = MEANINGS.get(message.code)
         what = without_java(message.text) or ("" if meaning is None else meaning.title)
-        text = f"motion {message.id} {_ABORTED[result.cause]}{': ' + what if what else ''}"
+        author = what.removeprefix("stopped ") if result.cause is Cause.STOPPED else what
+        joint = ": " if author == what else " "  # "was stopped by panel at 10.0.0.5"
+        text = f"motion {message.id} {_ABORTED[result.cause]}{joint + author if what else ''}"
         hint = "" if meaning is None else meaning.advice
         if result.cause is Cause.LOST:
             return ConnectionLost(text, code=message.code, hint=hint)

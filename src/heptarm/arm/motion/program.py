@@ -13,13 +13,13 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import BreakRule, MotionHandle
 from heptarm.arm.translate.conditions import condition_message, reaction_message
 from heptarm.arm.translate.modes import mode_message
-from heptarm.arm.translate.motions import in_base, items
+from heptarm.arm.translate.motions import in_base, item
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.errors import CommandRejected, ShapeError, inside
-from heptarm.values.arrays import Array
-from heptarm.values.condition.condition import Condition, condition_nodes
-from heptarm.values.condition.reaction import Reaction
-from heptarm.values.mode.mode import Mode
+from heptarm.values.arrays import Array, within
+from heptarm.values.condition.condition import Condition, check_condition, condition_nodes
+from heptarm.values.condition.reaction import Reaction, check_reaction
+from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.circle import Circ, circle_through
 from heptarm.values.motion.line import Lin
 from heptarm.values.motion.motion import Hold, Motion, triggers_of
@@ -174,15 +174,60 @@ def _text(value: object) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class CheckedProgram:
-    """Motions that were checked as the cabinet checks them, as far as this side can.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramTerms:
+    """Under what terms a program is carried out: for every motion of it the same.
 
     Attributes:
+        speed: no joint is faster than this fraction of its maximum, (0, 1].
+        mode: control mode; None: position.
+        until: condition that ends a motion, those of the enclosing blocks among them; None: none.
+        then: reaction when `until` has ended a motion.
+        when: while another program runs: "queue", "replace" or "reject".
+        breaks: rules of the enclosing blocks, whose conditions are part of `until`.
+
+    Raises:
+        ShapeError: a wrong type, or no such word.
+        LimitError: a speed outside its range.
+    """
+
+    speed: float = 1.0
+    mode: Mode | None = None
+    until: Condition | None = None
+    then: Reaction = "stay"
+    when: str = "queue"
+    breaks: tuple[BreakRule, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "speed", within(self.speed, "speed", 0.0, 1.0, above=True))
+        if self.mode is not None:
+            check_mode(self.mode)
+        if self.until is not None:
+            check_condition(self.until)
+        check_reaction(self.then)
+        if self.when not in _WHEN:
+            allowed = ", ".join(map(repr, _WHEN))
+            raise ShapeError(
+                f"when must be one of {allowed}, got {self.when!r}",
+                parameter="when",
+                value=self.when,
+                allowed=allowed,
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedProgram:
+    """Motions that were checked as the cabinet checks them, as far as this side can; made by `checked`.
+
+    Attributes:
+        motions: with numbers for what depends on the arm.
+        terms: under which they are carried out.
         items: of the message.
         until: for each node of the break condition the part of the condition that the user wrote.
     """
 
+    motions: tuple[Motion, ...]
+    terms: ProgramTerms
     items: tuple[wire.Item, ...]
     until: tuple[Condition, ...]
 
@@ -191,11 +236,9 @@ def checked(
     connection: Connection,
     tooling: Tooling,
     motions: tuple[Motion, ...],
+    terms: ProgramTerms,
     *,
-    ceiling: float,
-    mode: Mode | None,
-    until: Condition | None,
-    then: Reaction = "stay",
+    start: Array | None = None,
 ) -> CheckedProgram:
     """Check motions, their triggers, mode and break condition; nothing is sent.
 
@@ -203,68 +246,47 @@ def checked(
         connection: to the cabinet.
         tooling: the attached tool and its frames.
         motions: in their order.
-        ceiling: no joint is faster than this fraction of its maximum, (0, 1].
-        mode: control mode of all of them; None: position.
-        until: condition that ends them.
-        then: reaction when `until` has ended one of them.
+        terms: under which they are carried out.
+        start: set-point when the first one starts, shape (7,) [rad]; None: the present one.
 
     Raises:
         CommandRejected: one of them is not possible; LimitError and others name the value and the range.
     """
-    message_of_mode = mode_message(mode)
-    tooling.check(motions, mode)
-    break_condition, parts = condition_message(until, connection.signals)
+    motions = resolved(connection, tooling, motions, start)
+    mode = mode_message(terms.mode)
+    tooling.check(motions, terms.mode)
+    until, parts = condition_message(terms.until, connection.signals)
     tooling.check_until(parts)
-    reaction = None if until is None else reaction_message(then)
-    made = items(
-        motions, connection.robot, ceiling, mode=message_of_mode, until=break_condition, reaction=reaction
-    )
-    made = tuple(
-        replace(item, triggers=_triggers(index, motion, connection, tooling))
-        for index, (item, motion) in enumerate(zip(made, motions, strict=True))
-    )
-    return CheckedProgram(made, parts)
+    reaction = None if terms.until is None else reaction_message(terms.then)
+    items = []
+    for index, motion in enumerate(motions):
+        triggers = _triggers(index, motion, connection, tooling)
+        with inside(f"motions[{index}]" if len(motions) > 1 else ""):
+            items.append(
+                item(
+                    motion,
+                    connection.robot,
+                    speed=terms.speed,
+                    mode=mode,
+                    until=until,
+                    reaction=reaction,
+                    triggers=triggers,
+                )
+            )
+    return CheckedProgram(motions, terms, tuple(items), parts)
 
 
-def send(
-    connection: Connection,
-    tooling: Tooling,
-    motions: tuple[Motion, ...],
-    *,
-    ceiling: float,
-    mode: Mode | None,
-    until: Condition | None,
-    when: str,
-    then: Reaction = "stay",
-    breaks: tuple[BreakRule, ...] = (),
-) -> MotionHandle:
-    """Check motions and send them as one program; see `checked` and `Arm.start`.
-
-    Args:
-        connection: to the cabinet.
-        tooling: the attached tool and its frames.
-        motions: in their order.
-        ceiling: no joint is faster than this fraction of its maximum, (0, 1].
-        mode: control mode of all of them; None: position.
-        until: condition that ends them.
-        when: while another program runs: "queue", "replace" or "reject".
-        then: reaction when `until` has ended one of them.
-        breaks: rules whose conditions are part of `until`.
-    """
-    if when not in _WHEN:
-        allowed = ", ".join(map(repr, _WHEN))
-        raise ShapeError(
-            f"when must be one of {allowed}, got {when!r}", parameter="when", value=when, allowed=allowed
-        )
-    found = checked(connection, tooling, motions, ceiling=ceiling, mode=mode, until=until, then=then)
+def send(connection: Connection, program: CheckedProgram) -> MotionHandle:
+    """Send a checked program; see `Arm.start`."""
+    motions, terms = program.motions, program.terms
     return MotionHandle.send(
         connection,
-        wire.Run(items=found.items, when=_WHEN[when]),
+        wire.Run(items=program.items, when=_WHEN[terms.when]),
         count=len(motions),
-        limit=_limit(connection, motions, ceiling),
-        until=found.until,
+        limit=_limit(connection, motions, terms.speed),
+        until=program.until,
         triggers=tuple(map(triggers_of, motions)),
-        breaks=breaks,
+        breaks=terms.breaks,
     )
 
 
@@ -280,12 +302,12 @@ def _triggers(
     return messages
 
 
-def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) -> float:
+def _limit(connection: Connection, motions: tuple[Motion, ...], speed: float) -> float:
     """Time after which waiting for them makes no sense [s], with what is before them in the queue."""
     newest = connection.newest()
     override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
     own = (
-        longest(motions, connection.robot, ceiling)
+        longest(motions, connection.robot, speed)
         / max(override, 0.01)
         / min(connection.real_time_factor, 1.0)
     )
@@ -293,11 +315,9 @@ def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) 
     return total if total < _DAY else _DAY
 
 
-def longest(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> float:
+def longest(motions: Sequence[Motion], robot: RobotModel, speed: float) -> float:
     """Upper bound of the duration of a healthy program [s]; infinite if it holds until it is cancelled."""
-    return _AND_MORE + _GENEROUS * sum(
-        motion.limited_to(ceiling).longest_duration(robot) for motion in motions
-    )
+    return _AND_MORE + _GENEROUS * sum(motion.limited_to(speed).longest_duration(robot) for motion in motions)
 
 
 def is_endless(motions: Sequence[Motion], robot: RobotModel) -> bool:

@@ -6,7 +6,7 @@ motion type; a new motion type whose fields are those of its message needs none.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import singledispatch
 from math import isinf, nan
@@ -31,49 +31,21 @@ from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
 
-def items(
-    motions: Sequence[Motion],
-    robot: RobotModel,
-    speed: float,
-    *,
-    mode: wire.Mode | None = None,
-    until: wire.Condition | None = None,
-    reaction: wire.Reaction | None = None,
-) -> tuple[wire.Item, ...]:
-    """The items of a program.
+def item(motion: Motion, robot: RobotModel, *, speed: float = 1.0, **terms: Any) -> wire.Item:
+    """The item of a motion.
 
     Args:
-        motions: in their order.
+        motion: the motion.
         robot: the connected robot.
         speed: no joint is faster than this fraction of its maximum, (0, 1].
-        mode: control mode of all of them; None: position.
-        until: break condition of all of them.
-        reaction: to that condition; None: stay.
+        **terms: the other fields of the item, such as mode, until, reaction and triggers.
 
     Raises:
-        LimitError: a target is outside the robot's limits; the text names motion, joint, value and range.
+        LimitError: a target is outside the robot's limits; the text names joint, value and range.
     """
-    return tuple(
-        replace(
-            _item(motion, index if len(motions) > 1 else None, robot, speed, mode, until or wire.Condition()),
-            reaction=reaction,
-        )
-        for index, motion in enumerate(motions)
-    )
-
-
-def _item(
-    motion: Motion,
-    index: int | None,
-    robot: RobotModel,
-    speed: float,
-    mode: wire.Mode | None,
-    until: wire.Condition,
-) -> wire.Item:
-    with inside("" if index is None else f"motions[{index}]"):
-        message = _message(type(motion).__name__, motion.limited_to(speed), robot)
-    frame = frame_message(getattr(motion, "moving", ""))
-    return wire.Item(motion=message, frame=frame, mode=mode, until=until)
+    message = _message(type(motion).__name__, motion.limited_to(speed), robot)
+    terms.setdefault("until", wire.Condition())
+    return wire.Item(motion=message, frame=frame_message(getattr(motion, "moving", "")), **terms)
 
 
 def in_base(motion: Motion, frames: Mapping[str, Pose]) -> Motion:

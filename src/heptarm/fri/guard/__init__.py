@@ -1,5 +1,4 @@
-"""Limits of the commands of an FRI client, and behaviour when commands or messages are missing.
+"""Limits of what an FRI client commands, their reports, and the policy for missing commands, as values.
 
-`joint_guard` and `pose_guard` limit commands, `fallback` replaces missing commands, `gap_recovery` estimates the
-setpoint after lost messages.
+They act in native/fri_guard.c and native/fri_commands.c.
 """

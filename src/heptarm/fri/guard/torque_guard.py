@@ -41,8 +41,8 @@ BITS = {Limited.VELOCITY: 0, Limited.POSITION: 8, Limited.TORQUE: 16}
 def _functions() -> ctypes.CDLL:
     made = library(holds_gil=True)
     pointer = ctypes.c_void_p
-    made.hf_start_torque_guard.argtypes = (pointer,)
-    made.hf_guard_torques.argtypes = (pointer, pointer, pointer, ctypes.c_double, ctypes.c_int, pointer)
+    made.fri_start_torque_guard.argtypes = (pointer,)
+    made.fri_guard_torques.argtypes = (pointer, pointer, pointer, ctypes.c_double, ctypes.c_int, pointer)
     return made
 
 
@@ -56,7 +56,7 @@ class TorqueGuard:
         report: receives what was limited; None creates one.
 
     Attributes:
-        words: `struct torque_guard`, shared with the native loop.
+        words: `struct torque_guard`, shared with the loop in C.
         was_limited: whether the last torques were limited.
 
     Raises:
@@ -86,7 +86,7 @@ class TorqueGuard:
 
     def start(self) -> None:
         """Forget the motion so far: commands become effective."""
-        self._functions.hf_start_torque_guard(self.words.ctypes.data)
+        self._functions.fri_start_torque_guard(self.words.ctypes.data)
 
     def limit(
         self,
@@ -112,7 +112,7 @@ class TorqueGuard:
         call = self._call
         call[0], call[1], call[2] = q, dq, tau
         q_at, dq_at, tau_at = self._at
-        found = self._functions.hf_guard_torques(
+        found = self._functions.fri_guard_torques(
             self.words.ctypes.data, q_at, dq_at, period, is_braking, tau_at
         )
         self.was_limited = found != 0

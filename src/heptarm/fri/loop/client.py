@@ -5,111 +5,41 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import replace
 from types import TracebackType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import (
-    CommandRejected,
-    ConnectFailed,
-    ConnectionLost,
-    ShapeError,
-    refuse_windows,
-)
-from heptarm.fri.guard.collision_watch import as_numbers
-from heptarm.fri.guard.fallback import Policy
-from heptarm.fri.guard.joint_guard import Limits
-from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, refuse_windows
 from heptarm.fri.loop import process
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
-from heptarm.fri.loop.cycle import Law
-from heptarm.fri.loop.law_interface import Given, Initial, LiveMemory, flat
+from heptarm.fri.loop.compiled import CompiledLaw
+from heptarm.fri.loop.law_interface import LiveMemory
 from heptarm.fri.loop.law_limit import LawWatch
-from heptarm.fri.loop.parameters import merged, rates
+from heptarm.fri.loop.native import library
+from heptarm.fri.loop.settings import LoopKeywords, LoopSettings
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
-from heptarm.fri.loop.wrench import chain_of
-from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
-from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
-from heptarm.values.condition.collision import CollisionGuard
+from heptarm.values.arrays import array, finite, instance, integer, within
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
-from heptarm.values.robot import Body, RobotModel, robot
+from heptarm.values.robot import RobotModel
 from heptarm.values.sealed import Sealed
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 #: Default UDP port of FRI.
 PORT = 30200
-#: Longest `busy_poll` [s]. It counts before and after the moment at which a message is due: half of the shortest period
-#: in all, so that Linux does not hold up the loop as a runaway realtime thread.
-BUSY_POLL = 0.25e-3
 #: Longest time limit [s].
 LONGEST = 1e9
 #: Further time for the start of the loop's process if it has to compile a law [s].
 COMPILING = 120.0
-
-
-def check_settings(
-    *,
-    version: str | None,
-    limits: Limits | None,
-    pose_limits: PoseLimits | None,
-    policy: Policy | None,
-    law: Law | CompiledLaw | None,
-    params: Mapping[str, Initial] | None,
-    memory: Mapping[str, Given] | None,
-    collision: CollisionGuard | None,
-    history: int,
-    realtime: bool,
-    cpu: int | None,
-    busy_poll: float,
-) -> None:
-    """Check the settings of a loop; see `Client`.
-
-    Raises:
-        ShapeError: one is of another type.
-        CommandRejected: one is outside its range.
-    """
-    if version is not None:
-        try:
-            Version.of(instance(version, str, "version"))
-        except ValueError as error:
-            if isinstance(error, CommandRejected):
-                raise
-            raise CommandRejected(str(error), parameter="version", value=version) from None
-    for value, kind, name in (
-        (limits, Limits, "limits"),
-        (pose_limits, PoseLimits, "pose_limits"),
-        (policy, Policy, "policy"),
-        (collision, CollisionGuard, "collision"),
-    ):
-        if value is not None:
-            instance(value, kind, name)
-    if law is not None and not isinstance(law, CompiledLaw):
-        callback(law, "law")
-    if params is not None:
-        Params.flat(params)
-    if memory is not None:
-        flat(memory, "memory")
-        if not isinstance(law, CompiledLaw) and (law is None or arity(law) < WITH_MEMORY):
-            raise ShapeError(
-                "memory needs a law with four arguments",
-                parameter="memory",
-                hint="write it as law(s, out, p, m): m has what memory= names",
-            )
-    integer(history, "history", 16, 1 << 20)
-    flag(realtime, "realtime")
-    if cpu is not None:
-        integer(cpu, "cpu", 0, 65535)
-    within(busy_poll, "busy_poll", 0.0, BUSY_POLL, unit="s")
 
 
 class Client(Sealed, Reader):
@@ -121,42 +51,28 @@ class Client(Sealed, Reader):
         port: UDP port to bind.
         host: own address to bind; "0.0.0.0" for all. None: that of the interface to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
-        version: FRI release such as "1.15"; None recognises it from the first datagram.
-        model: robot, for the limits.
-        load: on the flange, for the guard of torques, which computes with the robot's inertia; None: none.
-        limits: limits of joint commands; None for limits slightly inside the robot's.
-        pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
-        policy: behaviour without fresh commands.
-        law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in every cycle
-            of COMMANDING_ACTIVE; the guard limits its output. With `heptarm.law` or `heptarm.law_from` the native loop
-            calls it. None: commands come from `command`.
-        params: parameters of the law, numbers and arrays by name, or declarations with `heptarm.param`.
-        memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
-        collision: bands of the external torques; at a torque outside its band the arm brakes at once, and the client
-            commands nothing more: `collision` names the joint. None: no such bands.
-        history: number of states that are kept.
-        realtime: request real-time priority and locked memory.
-        cpu: processor of the loop; None for any.
-        busy_poll: how long before a message is due the loop polls for it instead of sleeping [s], at most 0.25 ms;
-            0.2 ms is longer than most machines take to wake a thread. The answer then waits for no thread to wake, and
-            a processor is busy meanwhile. 0: never.
         timeout: time limit for the start of the loop's process [s], beside the compilation of a law.
+        settings: settings of the loop; None for the defaults.
+        **keywords: fields of `LoopSettings`, in place of those of `settings`.
 
     Attributes:
         params: parameters of the law; assign to change them while it runs.
         memory: memory of the law; read it and assign to it while it runs.
         port: bound UDP port.
         model: the robot.
+        settings: settings of the loop.
 
     Raises:
         ConnectFailed: the port cannot be bound, or the loop did not start.
         CommandRejected: an argument is outside its range, or the law cannot be compiled or loaded.
+        Unavailable: the compiled part of heptarm is missing.
     """
 
     params: Final[Params]
     memory: Final[LiveMemory]
     port: Final[int]
     model: Final[RobotModel]
+    settings: Final[LoopSettings]
 
     def __init__(
         self,
@@ -164,94 +80,36 @@ class Client(Sealed, Reader):
         *,
         host: str | None = None,
         remote: str | None = None,
-        version: str | None = None,
-        model: str | RobotModel = "iiwa14",
-        load: Body | None = None,
-        limits: Limits | None = None,
-        pose_limits: PoseLimits | None = None,
-        policy: Policy | None = None,
-        law: Law | CompiledLaw | None = None,
-        params: Mapping[str, Initial] | None = None,
-        memory: Mapping[str, Given] | None = None,
-        collision: CollisionGuard | None = None,
-        history: int = 2048,
-        realtime: bool = True,
-        cpu: int | None = None,
-        busy_poll: float = 0.0,
         timeout: float = 30.0,
+        settings: LoopSettings | None = None,
+        **keywords: Unpack[LoopKeywords],
     ) -> None:
         refuse_windows("FRI")
-        check_settings(
-            version=version,
-            limits=limits,
-            pose_limits=pose_limits,
-            policy=policy,
-            law=law,
-            params=params,
-            memory=memory,
-            collision=collision,
-            history=history,
-            realtime=realtime,
-            cpu=cpu,
-            busy_poll=busy_poll,
-        )
+        library()
+        self.settings = LoopSettings(**keywords) if settings is None else replace(settings, **keywords)
         integer(port, "port", 0, 65535)
         for address, what in ((host, "host"), (remote, "remote")):
             if address is not None:
                 instance(address, str, what)
         within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
-        arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
-        if load is not None:
-            instance(load, Body, "load")
-        self.model = arm
-        self._limits = limits or Limits.of(arm)
-        name = process.importable(law)
-        sent = b"" if law is None or name else process.by_value(law)
-        declared = merged(law.parameters(arm) if isinstance(law, CompiledLaw) else {}, params)
-        values, schema = Params.flat(declared)
-        known: Mapping[str, Given] = law.memory if isinstance(law, CompiledLaw) else {}
-        remembered, kept = flat({**known, **(memory or {})}, "memory")
-        wire = None if version is None else Version.of(version).value
+        self.model, law = self.settings.arm, self.settings.law
+        place = process.Place(port, _own(remote) if host is None else host, remote, os.getpid())
+        sent = process.packed(self.settings, place)
+        values, schema = self.settings.law_params
+        remembered, kept = self.settings.law_memory
         self._values = values
-        sizes = {"history": history, "params": values.size, "memory": remembered.size}
-        block = MemoryBlock(at.Layout.words(**sizes))
-        super().__init__(at.Layout(block, **sizes))
-        self._header[at.HISTORY], self._header[at.SIZE] = history, values.size
-        self._header[at.MEMORY_SIZE] = remembered.size
-        self._layout.config.write(
-            json.dumps(
-                {
-                    "port": port,
-                    "host": _own(remote) if host is None else host,
-                    "remote": remote,
-                    "version": wire,
-                    "limits": asdict(self._limits),
-                    "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
-                    "chain": chain_of(arm),
-                    "links": rigid_bodies(arm, load, rotor=ROTOR).tolist(),
-                    "pose_limits": asdict(pose_limits or PoseLimits()),
-                    "policy": _plain(policy or Policy()),
-                    "collision": None if collision is None else as_numbers(collision),
-                    "law": name,
-                    "params": schema,
-                    "rates": rates(declared).tolist(),
-                    "memory": kept,
-                    "remembered": remembered.tolist(),
-                    "size": values.size,
-                    "parent": os.getpid(),
-                    "realtime": realtime,
-                    "cpu": cpu,
-                    "busy_poll": busy_poll,
-                }
-            )
-        )
-        self.params = Params(values, schema, changed=self._send_params, declared=declared)
+        block = MemoryBlock(at.Layout.words(**self.settings.sizes))
+        super().__init__(at.Layout(block, **self.settings.sizes))
+        self._header[at.HISTORY] = self.settings.history
+        self._header[at.SIZE], self._header[at.MEMORY_SIZE] = values.size, remembered.size
+        self.params = Params(values, schema, changed=self._send_params, declared=self.settings.declared)
         self._send_params()
         self.memory = LiveMemory(
             remembered, kept, newest=self._newest_memory, write=self._layout.memory_set.write
         )
         self._outputs: dict[str, tuple[int, int | float]] = {}
         self._frames: dict[str, list[float]] = {}
+        self._writes = 0
         self._closed = False
         try:
             self._worker = process.Worker(block.path, sent)
@@ -318,6 +176,10 @@ class Client(Sealed, Reader):
     ) -> None:
         """Send a command to the loop; it is valid until the next one, or until the policy's patience ends.
 
+        A command is for the session of the state that was read last from this client (`state`, `session`, `next`,
+        `wait`). In a session of which no state was read it is not executed, `events` says so and `stats.stale` counts
+        it: a place that was computed in an older session may be far from where the arm now is.
+
         The guard limits it. NaN entries keep the last target of their axis or coordinate, or of the rotation. Arguments
         that are None keep their last values.
 
@@ -351,7 +213,7 @@ class Client(Sealed, Reader):
             given |= at.GIVEN_E1
         self._check()
         ints = parts.view(np.int64)
-        ints[at.C_AT], ints[at.C_GIVEN] = time.monotonic_ns(), given
+        ints[at.C_AT], ints[at.C_GIVEN], ints[at.C_EPOCH] = time.monotonic_ns(), given, self._epoch
         self._layout.commands.write(parts[1:])
 
     def _newest_memory(self) -> npt.NDArray[np.float64] | None:
@@ -373,12 +235,11 @@ class Client(Sealed, Reader):
             LimitError: the value is outside the range of the output.
             ConnectionLost: the client is closed, or its loop has ended.
         """
-        full, number = self._signals.output(name, value)
-        count = 1 + max((one[0] for one in self._outputs.values()), default=0)
-        self._outputs[full] = (
-            count,
-            number,
-        )  # with a count, because the loop may read several writes at once
+        signals = self._signals
+        full, number = signals.output(name, value)
+        self._writes += 1  # with a count, because the loop may read several writes at once
+        outputs = {one: write for one, write in self._outputs.items() if one in signals.names}
+        self._outputs = {**outputs, full: (self._writes, number)}
         self._send_outputs()
 
     def frame(self, name: str, pose: Pose | npt.ArrayLike) -> None:
@@ -404,14 +265,14 @@ class Client(Sealed, Reader):
                 hint="the application of the cabinet has to register it with registerTransformationProvider",
             )
         given = pose if isinstance(pose, Pose) else array(pose, 7, "pose")
-        self._frames[name] = (
-            given if isinstance(given, Pose) else Pose.of(given[:3], given[3:])
-        ).array.tolist()
+        placed = given if isinstance(given, Pose) else Pose.of(given[:3], given[3:])
+        frames = {one: numbers for one, numbers in self._frames.items() if one in requested}
+        self._frames = {**frames, name: placed.array.tolist()}
         self._send_outputs()
 
     def _send_outputs(self) -> None:
         self._check()
-        self._layout.outputs.write(json.dumps({"io": self._outputs, "frames": self._frames}))
+        self._layout.outputs.write(self._outputs, self._frames)
 
     # --------------------------------------------------------------------------------------------------- end
 
@@ -457,7 +318,3 @@ def _seven(pose: Pose | npt.ArrayLike) -> npt.NDArray[np.float64]:
 def _own(remote: str | None) -> str:
     """Address to bind: datagrams of the controller arrive there."""
     return ALL_INTERFACES if remote is None else own_address(remote)
-
-
-def _plain(policy: Policy) -> dict[str, Any]:
-    return {"missing": policy.missing.value, "patience": policy.patience, "over": policy.over}

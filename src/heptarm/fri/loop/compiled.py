@@ -20,7 +20,7 @@ from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop import parameters
 from heptarm.fri.loop.user_api import Params
-from heptarm.fri.loop.wrench import WrenchEstimator, chain_of
+from heptarm.fri.loop.wrench import external_wrench
 from heptarm.values.arrays import callback, instance, within
 from heptarm.values.robot import RobotModel, robot
 from heptarm.values.sealed import Sealed
@@ -61,11 +61,6 @@ class CompiledLaw(Sealed):
     def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
         """Parameters and their initial values for a robot."""
         return self.params
-
-    @property
-    def python(self) -> Callable[..., object] | None:
-        """The same law in Python, for a loop without a native part; None if there is none."""
-        return None
 
     def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
         """Compile or load the law in this process.
@@ -123,11 +118,6 @@ class NumbaLaw(CompiledLaw):
     def __call__(self, *arguments: object) -> object:
         """Run it in Python, for a test."""
         return self._function(*arguments)
-
-    @property
-    def python(self) -> Callable[..., object] | None:
-        """The function itself."""
-        return self._function
 
     def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
         """Compile it with Numba; see `CompiledLaw.load`."""
@@ -295,7 +285,7 @@ class LawTrial(Sealed):
         CommandRejected: the law cannot be compiled or loaded.
     """
 
-    params: Final[interface.Memory]
+    params: Final[Params]
     memory: Final[interface.Memory]
     t: float
 
@@ -322,7 +312,7 @@ class LawTrial(Sealed):
         self.params = Params(self._follower.target, schema, changed=lambda: None, declared=declared)
         self.memory = interface.Memory(self._memory, remembered)
         self._state = np.full(_words(interface.STATE), np.nan)
-        self._estimator = WrenchEstimator(chain_of(arm))
+        self._arm = arm
         self._command = np.zeros(_words(interface.COMMAND))
         self._shown = interface.Memory(self._state, _places(interface.STATE))
         self._made = interface.Memory(self._command, _places(interface.COMMAND))
@@ -355,7 +345,7 @@ class LawTrial(Sealed):
         shown.tau_ext, shown.wrench = np.zeros(7), np.zeros(6)
         if tau_ext is not None:
             shown.tau_ext = tau_ext
-            shown.wrench = self._estimator.wrench(np.asarray(q).tolist(), np.asarray(tau_ext).tolist())
+            shown.wrench = external_wrench(self._arm, q, tau_ext)
         if q_ipo is not None or self.t == 0.0:
             shown.q_ipo = q if q_ipo is None else q_ipo
         shown.t, shown.dt = self.t, self._dt

@@ -1,858 +1,212 @@
-"""One cycle of the loop: process a datagram, make its answer, publish the result in shared memory.
+"""The cycle of the loop as Python sees it: it is made of the settings, calls laws in Python, and words what went wrong.
 
-There is no socket or clock here; `heptarm.fri.loop.process` has both. A cycle also handles poses, signals and frames.
+Everything else a cycle does is C: see native/fri_cycle.c. There is no socket here; `heptarm.fri.loop.process` has it.
 """
 
 from __future__ import annotations
 
-import json
-import math
+import ctypes
+import signal
 import time
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.fri.guard.collision_watch import CollisionWatch
-from heptarm.fri.guard.fallback import CommandFallback, Policy
-from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
-from heptarm.fri.guard.joint_guard import JointGuard, Limits
-from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
+from heptarm.fri.guard.fallback import Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
 from heptarm.fri.loop.law_interface import Memory
 from heptarm.fri.loop.law_limit import EndlessLaw, LawLimit
+from heptarm.fri.loop.native import (
+    LAW,
+    LAW_CUT,
+    LAW_FRACTION,
+    LAW_PATIENCE,
+    MISSING,
+    LawStatus,
+    Seam,
+    library,
+)
 from heptarm.fri.loop.parameters import Follower
-from heptarm.fri.loop.telemetry import NAN6, NAN7, NOTHING_SENT, Record, Sent
-from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
-from heptarm.fri.loop.wrench import WrenchEstimator, posture
-from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import Sample
+from heptarm.fri.loop.settings import LoopSettings
+from heptarm.fri.loop.user_api import Output, Outputs, Params, Signals, State
+from heptarm.fri.loop.wrench import chain_of
 from heptarm.fri.protocol.version import Version
-from heptarm.fri.session.answers import NOTHING, Setpoint
-from heptarm.fri.session.session import Positions, Session
-from heptarm.fri.session.statistics import Histogram
-from heptarm.values.pose import Pose
+from heptarm.fri.session.events import Kind
 
-#: `law(state, out, params)`, or `law(state, out, params, memory)`.
-Law = Callable[..., object]
-
-#: A gap in the messages of more command periods than this is bridged by an estimate of the setpoint.
-GAP_PERIODS = 5
-#: A gap has at least this duration [ns]; skipped cycles of a shorter one are done evenly towards the target.
-MIN_GAP = 25_000_000
-#: A command given up to this long before commanding starts counts [ns].
-GRACE = 50_000_000
-#: Time budget of a law, as a fraction of the command period.
-LAW_FRACTION = 0.5
 #: Beginning of the text of the event after a failure of the law.
 LAW_FAILED = "the law failed, the arm brakes: "
-#: Beginning of the text of the event after a collision.
-COLLIDED = "collision, the arm brakes: "
-#: Beginning of the text of the event after a failure of the loop itself.
-LOOP_FAILED = "the loop failed, the arm brakes: "
-#: Largest number of answers that repeat an output until the cabinet shows it.
-REPEATS = 50
-#: Number of answers that repeat an analog output, which the cabinet may round; an answer may be lost.
-REPEATS_ANALOG = 10
-#: Largest number of skipped cycles that are done after a short gap.
-_MAX_SKIPPED = 25
-#: A larger jump of the counter is a change of the counter, not lost messages.
-_MAX_LOST = 1000
-_ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
-_JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)
-
-
-class LawFailure(HeptarmError):
-    """A compiled law has failed; the text gives the cause."""
-
-
-def from_wire(values: Sequence[float]) -> tuple[float, ...]:
-    """Convert FRI's x y z [mm], quaternion w x y z to x y z [m], x y z w."""
-    x, y, z, qw, qx, qy, qz = values
-    return (1e-3 * x, 1e-3 * y, 1e-3 * z, qx, qy, qz, qw)
-
-
-def to_wire(pose: Sequence[float]) -> tuple[float, ...]:
-    """Convert x y z [m], quaternion x y z w to FRI's x y z [mm], w x y z."""
-    x, y, z, qx, qy, qz, qw = pose
-    return (1e3 * x, 1e3 * y, 1e3 * z, qw, qx, qy, qz)
-
-
-class PoseCommander:
-    """Pose commands of a session: interpolator's pose, guard, start and recovery.
-
-    Args:
-        limits: limits of the guard.
-
-    Attributes:
-        guard: limits the poses.
-        ipo: interpolator's pose, shape (7,) [m, x y z w]; NaN before the first one.
-        ipo_e1: its redundancy angle [rad]; NaN if it has none.
-    """
-
-    def __init__(self, limits: PoseLimits) -> None:
-        self.guard = PoseGuard(limits)
-        self.forget()
-
-    def forget(self) -> None:
-        """Reset: the session commands no pose."""
-        self._frame: m.Transformation | None = None
-        self._redundancy: m.Redundancy | None = None
-        self.ipo: Sequence[float] = NAN7
-        self.ipo_e1 = math.nan
-        self._mirrored: tuple[Sequence[float], float, int] | None = None
-        self._twist: Sequence[float] = _ZEROS6
-        self._e1_rate = 0.0  # [rad/s]
-
-    @property
-    def has_pose(self) -> bool:
-        """Whether the interpolator has sent a pose."""
-        return self._frame is not None
-
-    @property
-    def ipo_on_wire(self) -> tuple[float, ...]:
-        """Interpolator's pose in FRI's numbers; NaN before the first one."""
-        return self._frame.values if self._frame is not None else NAN7
-
-    def update(self, message: m.Monitoring) -> None:
-        """Read pose and redundancy of the interpolator from a message."""
-        if message.ipo is not None and message.ipo.pose is not None:
-            self._frame, self._redundancy = message.ipo.pose, message.ipo.redundancy
-            self.ipo = from_wire(self._frame.values)
-            has_angle = self._redundancy is not None and self._redundancy.strategy is m.RedundancyStrategy.E1
-            self.ipo_e1 = self._redundancy.value if self._redundancy is not None and has_angle else math.nan
-
-    def mirror(self, sequence: int, period: int) -> None:
-        """Note that this pose is mirrored; update the velocity of the interpolator.
-
-        Args:
-            sequence: counter of the message.
-            period: send period [ns].
-        """
-        if self._frame is None:
-            return
-        last, self._mirrored = self._mirrored, (self.ipo, self.ipo_e1, sequence)
-        self._twist, self._e1_rate = _ZEROS6, 0.0
-        if last is not None and period and sequence > last[2]:
-            gap = (sequence - last[2]) * period * 1e-9
-            self._twist = tuple(value / gap for value in between(last[0], self.ipo))
-            rate = (self.ipo_e1 - last[1]) / gap
-            self._e1_rate = rate if math.isfinite(rate) else 0.0
-
-    def begin(self, period: float, *, again: bool) -> None:
-        """Start the guard when commands become effective; do nothing without a pose of the interpolator.
-
-        Args:
-            period: command period [s].
-            again: whether the session is a new one.
-        """
-        if self._mirrored is not None and not again:
-            pose, e1, _ = self._mirrored
-            self.guard.start(pose, self._twist, period=period, e1=e1, e1_speed=self._e1_rate)
-        elif self._frame is not None:  # the client connected after commanding had started
-            self.guard.start(self.ipo, period=period, e1=self.ipo_e1)
-        self._mirrored = None
-
-    def resume(self, message: m.Monitoring, last: Floats | None, *, time: float, period: float) -> None:
-        """Restart the guard after a gap, from the estimated pose and velocity.
-
-        Args:
-            message: first message after the gap.
-            last: words of the state before the gap.
-            time: duration of the gap [s].
-            period: command period [s].
-        """
-        guard, monitor = self.guard, message.monitor
-        displacement: Sequence[float] = _ZEROS6
-        e1_change = 0.0
-        if last is not None and monitor is not None and monitor.pose is not None:
-            then = State(last)
-            displacement = between(then.pose.array.tolist(), from_wire(monitor.pose.values))
-            if monitor.redundancy is not None and math.isfinite(then.e1):
-                e1_change = monitor.redundancy.value - then.e1
-        translation, velocity = vector_in_gap([value / period for value in guard.v], displacement[:3], time)
-        rotation, angular_velocity = vector_in_gap(
-            [value / period for value in guard.w], displacement[3:], time
-        )
-        e1_change, e1_rate = motion_in_gap(guard.u / period, e1_change, time)
-        before = moved(guard.sent, [-value for value in (*guard.v, *guard.w)])
-        guard.start(
-            moved(before, (*translation, *rotation)),
-            (*velocity, *angular_velocity),
-            period=period,
-            e1=guard.e1 - guard.u + e1_change,
-            e1_speed=e1_rate,
-        )
-
-    def command(self, target: Sequence[float] | None, skipped: int) -> m.Transformation:
-        """Limit a target pose and convert it to FRI's numbers.
-
-        Args:
-            target: shape (7,) [m, x y z w]; None brakes.
-            skipped: cycles without a message; they are done evenly towards the target.
-        """
-        guard, limited = self.guard, False
-        reach = self.ipo if guard.limits.reach < math.inf else None
-        if skipped:
-            start = (*guard.goal[0], *guard.goal[1])
-            displacement = target and between(start, target)
-            for k in range(1, skipped + 1):
-                fraction = k / (skipped + 1)
-                step = displacement and moved(start, [fraction * value for value in displacement])
-                guard.pose(step, reach)
-                limited |= guard.was_limited
-        pose = guard.pose(target, reach)
-        guard.was_limited |= limited
-        assert self._frame is not None
-        return replace(self._frame, values=to_wire(pose))
-
-    def command_elbow(self, target: float | None) -> m.Redundancy | None:
-        """Limit the target redundancy angle of a pose, after `command`; None if the interpolator has none.
-
-        Args:
-            target: angle [rad]; None brakes.
-        """
-        if self._redundancy is None or math.isnan(self.guard.e1):
-            return self._redundancy
-        return m.Redundancy(m.RedundancyStrategy.E1, self.guard.elbow(target))
-
-
-class SignalExchange:
-    """Signals and frames of a session, exchanged with the user's process.
-
-    Args:
-        layout: the shared memory.
-
-    Attributes:
-        signals: signals of the session.
-        numbers: their values in the last message.
-        outputs: outputs that a law writes.
-        outputs_seen: tick of the last outputs and frames read from the user's process.
-        pending: outputs that are not shown yet, by full name: value, number of answers that may still repeat it.
-    """
-
-    def __init__(self, layout: at.Layout) -> None:
-        self._layout = layout
-        self.signals = Signals()
-        self.numbers: Sequence[float] = ()
-        self.outputs = Outputs()
-        self.outputs_seen = layout.outputs.tick
-        self._known: dict[str, m.IoValue] = {}
-        self._asked: tuple[m.Transformation, ...] = ()
-        self.pending: dict[str, tuple[int | float, int]] = {}
-        self._taken: dict[str, int] = {}  # by output, count of the last write
-        self._frames: dict[str, tuple[tuple[float, ...], m.TimeStamp | None]] = {}
-        self._published: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-        layout.offered.write(json.dumps({"signals": self.signals.text, "frames": []}))
-
-    @property
-    def is_idle(self) -> bool:
-        """Whether the session has no signals, requests no frames, and no output is pending."""
-        return not self._known and not self._asked and not self.pending
-
-    def update(self, sample: Sample) -> None:
-        """Read signals and requested frames of a message."""
-        if not sample.is_full:
-            if not self.is_idle:
-                self._known, self._asked, self.numbers = {}, (), ()
-                self._publish(())
-            return
-        full = sample.message
-        io = full.monitor.io if full.monitor is not None else ()
-        self._known = {one.name: one for one in io}
-        self._asked = full.requested
-        self.numbers = [float(one.value) for one in io]
-        self._publish(io)
-
-    @property
-    def known(self) -> tuple[m.IoValue, ...]:
-        """Signals in the last message, each name once."""
-        return tuple(self._known.values())
-
-    def show(self, values: Sequence[int | float]) -> None:
-        """Note the values in a message that only the native part has read, in the order of `known`."""
-        signals = zip(self.known, values, strict=True)
-        self._known = {one.name: replace(one, value=value) for one, value in signals}
-
-    def _publish(self, io: tuple[m.IoValue, ...]) -> None:
-        """Publish the names of signals and frames for the user's process when they change."""
-        names = tuple(self._known), tuple(one.name for one in self._asked)
-        if names == self._published:
-            return
-        self._published = names
-        self.signals = self.outputs.signals = Signals.of(io)
-        self.pending = {name: one for name, one in self.pending.items() if name in self._known}
-        self._layout.offered.write(json.dumps({"signals": self.signals.text, "frames": names[1]}))
-
-    def take(self) -> None:
-        """Read new outputs and frames of the user's process."""
-        note = self._layout.outputs
-        if note.tick == self.outputs_seen:
-            return
-        text = note.read()
-        if text is None:  # being written: read it in the next cycle
-            return
-        self.outputs_seen = note.tick
-        given = json.loads(text)
-        for name, (count, value) in given["io"].items():
-            if count > self._taken.get(name, 0):
-                self._taken[name] = count
-                self._request(name, value)
-        stamp = next((one.stamp for one in self._asked), None)
-        for name, numbers in given["frames"].items():
-            if name not in self._frames or self._frames[name][0] != tuple(numbers):
-                self._frames[name] = (tuple(numbers), stamp)
-
-    def write(self) -> None:
-        """Request the outputs that the law has written and the cabinet does not show yet."""
-        for name, value in self.outputs.written.items():
-            known, pending = self._known.get(name), self.pending.get(name)
-            if (pending is None or pending[0] != value) and (known is None or known.value != value):
-                self._request(name, value)
-        self.outputs.written.clear()
-
-    def _request(self, name: str, value: int | float) -> None:
-        known = self._known.get(name)
-        is_analog = known is not None and known.type is m.IoType.ANALOG
-        self.pending[name] = (value, REPEATS_ANALOG if is_analog else REPEATS)
-
-    def add(self, setpoint: Setpoint, version: Version, report: Callable[[str], None]) -> Setpoint:
-        """Add pending outputs and frames to a setpoint.
-
-        Args:
-            setpoint: setpoint without them.
-            version: wire format.
-            report: called with a text for an output that the cabinet does not accept.
-        """
-        if not self.pending and not (self._frames and self._asked):
-            return setpoint
-        io = []
-        for name, (value, left) in list(self.pending.items()):
-            known = self._known.get(name)
-            if known is None:  # the session has changed since the output was checked
-                del self.pending[name]
-                report(f"this FRI session no longer has an output {name!r}")
-                continue
-            shown = known.value == value and left < REPEATS
-            if shown or not left:
-                del self.pending[name]
-                if not shown and known.type is not m.IoType.ANALOG:
-                    report(f"the cabinet does not accept {name} = {value}: it shows {known.value}")
-                continue
-            self.pending[name] = (value, left - 1)
-            io.append(m.IoValue(name, known.type, m.IoDirection.OUTPUT, value))
-        return replace(setpoint, io=tuple(io), transformations=self.frames(version))
-
-    def frames(self, version: Version) -> tuple[m.Transformation, ...]:
-        """Frames for the next answer: those that are requested and given."""
-        names = [one.name for one in self._asked]
-        return tuple(
-            m.Transformation(name, frame_to_wire(numbers, version), stamp)
-            for name, (numbers, stamp) in self._frames.items()
-            if name in names
-        )
-
-    def forget(self) -> None:
-        """Drop all pending outputs."""
-        self.pending.clear()
-
-
-def frame_to_wire(pose: Sequence[float], version: Version) -> tuple[float, ...]:
-    """Convert a frame to the numbers of a version.
-
-    Args:
-        pose: x y z [m], quaternion x y z w.
-        version: wire format.
-
-    Returns:
-        12 numbers (3x4 row by row, translation in mm) in 1.x; x y z [mm], w x y z in 2.x.
-    """
-    if version.traits.quaternions:
-        return to_wire(pose)
-    x, y, z, qx, qy, qz, qw = pose
-    matrix = Pose.of((1e3 * x, 1e3 * y, 1e3 * z), np.array((qx, qy, qz, qw))).matrix
-    return tuple(matrix[:3].reshape(-1).tolist())
+_KINDS = list(Kind)
 
 
 class Cycle:
-    """Processing of one message per call: session, guard, law, and publication.
+    """A loop in C on the shared memory of its client.
 
     Args:
         layout: the shared memory.
-        version: wire format; None takes it from the first datagram.
-        limits: limits of the joint guard.
-        pose_limits: limits of the pose guard; None for the defaults.
-        policy: behaviour without fresh commands.
-        law: called in every cycle of COMMANDING_ACTIVE; None uses the commands of the user's process.
-        params: parameters of the law.
-        memory: its memory, on `memory_values`; None: the law takes none.
-        memory_values: words of its memory, initially those of its first call.
-        positions: position limits of the robot [rad], see `Session`.
-        estimator: estimates the external wrench where the controller sends none; None: it stays NaN.
-        watch: detects collisions, at which the arm brakes; None: nothing does.
-        rates: largest changes of the parameters in a second; None: they change at once.
-        links: `rigid_bodies` of the robot, for the guard of torques; None: torques are limited in size and rate only.
+        settings: settings of the loop.
 
     Attributes:
-        memory_values: words of the law's memory.
-        is_compiled: whether the native part calls the law.
+        seam: what it shares with Python, `struct fri_seam`.
+        reference: the loop, for its functions.
         limit: interrupts a law in Python that does not return; None: nothing does.
-        q_before: measured positions of the last message; None if it had none.
-        layout, session, guard, torque_guard, pose_commander, fallback, exchange, record, law, estimator, watch: its parts.
-        failure: why the loop has to end, in one line; empty as long as nothing failed in it.
-        is_ending: whether it brakes to end, regardless of commands.
-        mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
-        slope: velocity of the interpolator at that time [rad/s].
-        started: time at which commands became effective [ns].
-        commands_seen: number of commands read from the user's process.
+        raised: texts of the errors that a law compiled by Numba has raised.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing.
+        CommandRejected: the law cannot be compiled or loaded.
     """
 
-    def __init__(
-        self,
-        layout: at.Layout,
-        *,
-        version: Version | None,
-        limits: Limits,
-        pose_limits: PoseLimits | None = None,
-        policy: Policy,
-        law: Law | None = None,
-        params: Params | None = None,
-        memory: Memory | None = None,
-        memory_values: Floats | None = None,
-        positions: Positions | None = None,
-        estimator: WrenchEstimator | None = None,
-        watch: CollisionWatch | None = None,
-        rates: Floats | None = None,
-        links: Sequence[float] | None = None,
-    ) -> None:
-        self.layout = layout
-        self.failure = ""
-        self.session = Session(
-            version,
-            latency=Histogram(layout.latency),
-            jitter=Histogram(layout.jitter),
-            positions=positions,
-        )
-        self.guard = JointGuard(limits)
-        self.torque_guard: TorqueGuard | None = None
-        if links is not None:
-            self.torque_guard = TorqueGuard(limits, links, report=self.guard.report)
-        self.pose_commander = PoseCommander(pose_limits or PoseLimits())
-        self.fallback = CommandFallback(policy)
-        self.is_ending = False
-        self.law = law
-        self._params = params
-        self._follower: Follower | None = None
-        if params is not None:
-            most = np.full(len(params.words), np.inf) if rates is None else rates
-            self._follower = Follower(params.words, most)
-        self._param_tick = -1
-        self._memory = memory
-        self.memory_values: Floats = np.zeros(0) if memory_values is None else memory_values
-        self._memory_written = np.zeros(len(self.memory_values))
-        self._memory_tick = 0
-        self.is_compiled = False
+    def __init__(self, layout: at.Layout, settings: LoopSettings) -> None:
+        self.library = library()
+        self.layout, self.settings = layout, settings
+        self.seam: Any = Seam()
         self.limit: LawLimit | None = None
-        self.q_before: m.Joints | None = None
-        self.exchange = SignalExchange(layout)
-        self.record = Record(layout, self.session)
-        self.estimator, self.watch = estimator, watch
-        self._out = Output(self.exchange.outputs)
-        self.commands_seen = layout.commands.count
-        self._restarts = 0
-        self._skipped = 0  # cycles without a message since the last setpoint
-        self.mirrored: tuple[m.Joints, int] | None = None  # position, counter
-        self.slope: Sequence[float] = NAN7
-        self.started = 0
-        self._answered = False
-        self._fresh: Sample | None = None
+        self.raised: list[str] = []
+        self._set(layout, settings)
+        self.reference = self.library.fri_new(ctypes.byref(self.seam))
+        self._set_law(layout, settings)
 
-    # --------------------------------------------------------------------------------------------- one message
+    def _set(self, layout: at.Layout, settings: LoopSettings) -> None:
+        """Fill the seam with places in the shared memory and settings."""
+        seam, base, arm = self.seam, layout.block.ints.ctypes.data, settings.arm
+        seam.header = base
+        for name in ("states", "commands", "events", "trouble", "offered", "outputs"):
+            setattr(seam, name, base + 8 * getattr(layout, f"{name}_at"))
+        seam.history = settings.history
+        wire, policy = settings.wire, settings.policy or Policy()
+        seam.version = at.ABSENT if wire is None else list(Version).index(wire)
+        seam.busy_poll = round(settings.busy_poll * 1e9)
+        _fill(seam.joint_limits, settings.limits or Limits.of(arm))
+        _fill(seam.pose_limits, settings.pose_limits or PoseLimits())
+        seam.lowest[:], seam.highest[:], seam.fastest[:] = arm.q_min, arm.q_max, arm.dq_max
+        seam.missing, seam.patience, seam.over = MISSING.index(policy.missing), policy.patience, policy.over
+        seam.has_chain, seam.chain[:] = 1, chain_of(arm)
+        self._torques = TorqueGuard(settings.limits or Limits.of(arm), settings.bodies)
+        seam.torque_guard = self._torques.words.ctypes.data
+        if settings.collision is not None:
+            seam.has_watch = 1
+            for name in ("threshold", "baseline", "margin"):
+                getattr(seam, f"watch_{name}")[:] = getattr(settings.collision, name)
+
+    def _set_law(self, layout: at.Layout, settings: LoopSettings) -> None:
+        """Load a compiled law, or prepare the call of one in Python."""
+        law, seam = settings.law, self.seam
+        values, schema = settings.law_params
+        memory, kept = settings.law_memory
+        self._law, self._kept = law, None
+        self._memory_values = memory
+        seam.has_law = law is not None
+        if isinstance(law, CompiledLaw):
+            seam.law, self._kept = law.load(schema, kept)
+            seam.law_success = law.success
+            self._words = {
+                name: np.zeros(size + 1)
+                for name, size in (
+                    ("params", values.size),
+                    ("params_target", values.size),
+                    ("params_rates", values.size),
+                    ("memory", memory.size),
+                    ("memory_written", memory.size),
+                    ("law_buffer", max(values.size, 2 * memory.size)),
+                )
+            }
+            self._words["params_rates"][:-1] = settings.law_rates
+            self._words["memory"][:-1] = memory
+            for name, words in self._words.items():
+                setattr(seam, name, words.ctypes.data)
+            base = layout.block.ints.ctypes.data
+            for name in ("params", "memory", "memory_set"):
+                setattr(seam, f"{name}_ring", base + 8 * getattr(layout, f"{name}_at"))
+            seam.params_size, seam.memory_size = values.size, memory.size
+            self.library.fri_protect()
+            return
+        self._params = Params(np.zeros(values.size), schema)
+        self._follower = Follower(self._params.words, settings.law_rates)
+        self._memory = Memory(memory, kept) if law is not None and arity(law) >= WITH_MEMORY else None
+        self._param_tick, self._memory_tick, self._offer_tick = -1, 0, -1
+        self._memory_written = np.zeros(memory.size)
+        self._outputs, self._signals = Outputs(), Signals()
+        self._out = Output.on(np.frombuffer(seam.out, dtype=np.float64), self._outputs)
+        self._dq = np.frombuffer(seam.dq, dtype=np.float64)
+
+    def __del__(self) -> None:
+        if getattr(self, "reference", None):
+            self.library.fri_free(self.reference)
+            self.reference = None
+
+    # ------------------------------------------------------------------------------- one cycle without a socket
 
     def turn(self, datagram: bytes, received: int) -> bytes | None:
-        """Process a datagram and make its answer; call `finish` next.
-
-        An error never gets out: it is reported, the arm brakes from then on, and the loop ends with its cause.
+        """Process a datagram and make its answer, None for none; call `finish` next.
 
         Args:
             datagram: the datagram.
             received: time of receipt, monotonic clock [ns].
         """
-        kept = self.guard.sent, self.pose_commander.guard.motion
-        try:
-            return self._turn(datagram, received)
-        except Exception as error:
-            self._fail(error, received)
-        self.guard.sent, self.pose_commander.guard.motion = kept
-        try:
-            return self._safe_answer()
-        except Exception:  # the controller stops the arm itself when no answer arrives
-            return None
-
-    def forget_controller(self) -> None:
-        """Reset for another controller: its counter, version and interpolator are not those of the last one."""
-        self.session.restart()
-        self.guard.stop()
-        self.pose_commander.guard.stop()
-        self.pose_commander.forget()
-        self.mirrored = self.q_before = None
-
-    def _fail(self, error: Exception, now: int) -> None:
-        """Report an error of the loop, and end the loop once the arm is at rest."""
-        if not self.failure:
-            self.failure = LOOP_FAILED + describe(error)
-            self.record.report(now, self.failure)
-        self.end()
-        self.layout.header[at.STOP] = 1
-
-    def _safe_answer(self) -> bytes | None:
-        """Answer that brakes where commands are effective, and mirrors the interpolator elsewhere."""
-        session, self.record.sent = self.session, NOTHING_SENT
-        setpoint = NOTHING
-        if session.is_commanding and session.mode in _JOINT_MODES and self.guard.is_started:
-            setpoint = Setpoint(q=tuple(self.guard.position(None)))
-        elif session.is_commanding and self.pose_commander.guard.is_started:
-            setpoint = Setpoint(pose=self.pose_commander.command(None, 0))
-        answer = session.answer(setpoint)
-        self._answered = answer is not None
-        return answer
-
-    def _turn(self, datagram: bytes, received: int) -> bytes | None:
-        session, record, exchange = self.session, self.record, self.exchange
-        record.flags, record.sent, self._answered, before = 0, NOTHING_SENT, False, session.received
-        last = session.sample
-        previous = last.sequence if last is not None else 0
-        self._fresh = sample = session.receive(datagram, received)
-        if sample is None:
-            return None
-        self._find_wrench(sample)
-        self._differentiate(sample, sample.sequence - previous)
-        exchange.update(sample)
-        record.signals, record.state.signals = exchange.numbers, exchange.signals
-        self._detect_collision(sample, received)
-        self._follow(sample, received, before, sample.sequence - previous)
-        record.ipo, record.ipo_e1 = self.pose_commander.ipo_on_wire, self.pose_commander.ipo_e1
-        if not session.is_due or session.version is None:
-            return None
-        exchange.take()
-        if session.is_commanding and session.mode in _JOINT_MODES and sample.q_ipo is not None:
-            setpoint = self._joint_setpoint(sample, received)
-            self._count(limited=self.guard.was_limited)
-        elif (
-            session.is_commanding
-            and session.mode not in _JOINT_MODES
-            and self.pose_commander.guard.is_started
-        ):
-            setpoint = self._pose_setpoint(sample, received)
-            self._count(limited=self.pose_commander.guard.was_limited)
-        else:
-            setpoint = NOTHING
-        if not exchange.is_idle:
-            exchange.write()
-            setpoint = exchange.add(setpoint, session.version, lambda text: record.report(received, text))
-        try:
-            answer = session.answer(setpoint)
-        except (CommandRejected, ValueError) as refusal:  # unknown names, or too many for one datagram
-            exchange.forget()
-            record.report(received, str(refusal))
-            answer = session.answer(replace(setpoint, io=(), transformations=()))
-        self._answered = answer is not None
-        return answer
-
-    def _differentiate(self, sample: Sample, leap: int) -> None:
-        """Update the velocity by the difference to the previous message; `leap` is the increment of the counter."""
-        before, self.q_before = self.q_before, sample.q
-        gap = leap * self.session.period * 1e-9
-        if sample.q is None:
-            self.record.dq[:] = math.nan
-        elif before is None or not 0 < leap <= _MAX_LOST or gap <= 0.0:
-            self.record.dq[:] = 0.0
-        else:
-            self.record.dq[:] = [(new - old) / gap for new, old in zip(sample.q, before, strict=True)]
-
-    def _find_wrench(self, sample: Sample) -> None:
-        """Take the external wrench of a message, or estimate it from the torques."""
-        monitor = sample.message.monitor if sample.is_full else None
-        sent = monitor.wrench if monitor is not None else None
-        if sent is not None and not math.isnan(sent[0]):
-            self.record.wrench = sent
-        elif self.estimator is None or sample.q is None or sample.tau_ext is None:
-            self.record.wrench = NAN6
-        else:
-            self.record.wrench = self.estimator.wrench(posture(sample.q, self.q_before), sample.tau_ext)
-            self.record.flags |= at.ESTIMATED
-
-    def _detect_collision(self, sample: Sample, now: int) -> None:
-        """Brake from now on if the external torque of a joint is outside its band while commands are effective."""
-        if self.watch is None or self.is_ending or not self.session.is_commanding:
-            return
-        found = self.watch.collision(sample.tau_ext, self.record.dq.tolist())
-        if found is not None:
-            at.write_collision(self.layout, found)
-            text = str(found) if sample.tau_ext is not None else "the controller sends no external torques"
-            self.record.report(now, COLLIDED + text)
-            self.end()
-
-    def _count(self, *, limited: bool) -> None:
-        """Count limited and filled setpoints."""
-        self.record.flags |= at.LIMITED if limited else 0
-        self.session.counters.limited += limited
-        self.session.counters.filled += bool(self.record.flags & at.FILLED)
+        size = self.library.fri_turn(self.reference, datagram, len(datagram), received)
+        if size == LAW:
+            self.call_law()
+            size = self.library.fri_answer(self.reference)
+        return ctypes.string_at(self.seam.reply, size) if size else None
 
     def finish(self, now: int) -> None:
-        """Publish the cycle, after its answer was sent at `now` [ns]; an error ends the loop as in `turn`."""
-        try:
-            self._publish(now)
-        except Exception as error:
-            self._fail(error, now)
-
-    def _publish(self, now: int) -> None:
-        session, header = self.session, self.layout.header
-        if self._answered:
-            session.answered(now)
-            self.record.flags |= at.ANSWERED
-        self.record.report_all()
-        if self._fresh is not None:
-            self.record.publish(self._fresh, now - session.received if self._answered else 0)
-        session.counters.save(header, at.COUNTS)
-        if self.guard.was_limited:
-            at.write_report(self.layout, self.guard.report)
-        if self.pose_commander.guard.was_limited:
-            at.write_report(self.layout, self.pose_commander.guard.report)
-        header[at.BEAT] = now
-
-    def idle(self, now: int) -> None:
-        """Publish that the loop runs although no message arrives."""
-        self.layout.header[at.BEAT] = now
-        self.record.report_all()
+        """Publish the cycle, after its answer was sent at `now` [ns]."""
+        self.library.fri_finish(self.reference, now)
+        if self.has_failed:
+            self.report_failure()
 
     def end(self) -> None:
         """Brake from now on, regardless of commands."""
-        self.is_ending = True
+        self.library.fri_end(self.reference)
 
     @property
     def may_end(self) -> bool:
         """Whether no axis moves by commands of this client."""
-        return all(one.is_still or not one.is_started for one in (self.guard, self.pose_commander.guard))
+        return bool(self.library.fri_may_end(self.reference))
 
-    # ----------------------------------------------------------------------------------------- setpoints
+    def report(self, now: int, text: str) -> None:
+        """Publish an event."""
+        self.library.fri_note(self.reference, _KINDS.index(Kind.CLIENT), now, text.encode())
 
-    def _follow(self, sample: Sample, received: int, before: int, leap: int) -> None:
-        """Update guards and fallback for the session's state; `leap` is the increment of the controller's counter."""
-        step = leap if 0 < leap <= _MAX_LOST else 1
-        session, guard, pose_commander, record = self.session, self.guard, self.pose_commander, self.record
-        by_pose = session.mode is m.CommandMode.CARTESIAN_POSE
-        if by_pose:
-            pose_commander.update(sample.message)
-        elif pose_commander.has_pose:
-            pose_commander.guard.stop()
-            pose_commander.forget()
-        again = session.counters.restarts != self._restarts
-        self._restarts = session.counters.restarts
-        self._skipped = 0
-        if again or not session.is_commanding:
-            guard.stop()
-            pose_commander.guard.stop()
-        if session.is_commanding:
-            period = session.period * session.multiplier * 1e-9 or 1e-3
-            if not (pose_commander.guard if by_pose else guard).is_started:
-                if by_pose:
-                    pose_commander.begin(period, again=again)
-                elif self.mirrored is not None and not again:
-                    guard.start(self.mirrored[0], self.slope, period=period)
-                elif sample.q_ipo is not None:  # the client connected after commanding had started
-                    guard.start(sample.q_ipo, _ZEROS7, period=period)
-                if self.torque_guard is not None:
-                    self.torque_guard.start()
-                self.fallback.start()
-                record.ticks = -1
-                # a command given just before the start counts, an older one does not
-                self.commands_seen = max(0, self.layout.commands.count - 1)
-                self.started = received
-                step = 1
-            elif (gap := self._gap(leap, received - before, period)) > 0.0:
-                if by_pose:
-                    pose_commander.resume(
-                        sample.message, self.layout.states.newest(), time=gap, period=period
-                    )
-                else:
-                    self._resume(sample, time=gap, period=period)
-            else:
-                self._skipped = (step - 1) // session.multiplier
-            record.ticks += step  # the controller's time advances while messages are lost
-            self.mirrored = None
-        elif session.state is m.SessionState.COMMANDING_WAIT and by_pose:
-            pose_commander.mirror(sample.sequence, session.period)
-        elif session.state is m.SessionState.COMMANDING_WAIT and sample.q_ipo is not None:
-            last, self.mirrored = self.mirrored, (sample.q_ipo, sample.sequence)
-            self.slope = _ZEROS7
-            if last is not None and session.period and sample.sequence > last[1]:
-                gap = (sample.sequence - last[1]) * session.period * 1e-9
-                self.slope = tuple((new - old) / gap for new, old in zip(sample.q_ipo, last[0], strict=True))
-        else:
-            self.mirrored = None
-            pose_commander.forget()
+    # -------------------------------------------------------------------------------------------------- the law
 
-    def _gap(self, leap: int, elapsed: int, period: float) -> float:
-        """Duration of a gap in the messages, by the controller's counter [s]; 0.0 if it is short."""
-        time = leap * self.session.period if 0 < leap <= _MAX_LOST else elapsed
-        return time * 1e-9 if time > max(GAP_PERIODS * period * 1e9, MIN_GAP) else 0.0
-
-    def _resume(self, sample: Sample, *, time: float, period: float) -> None:
-        """Restart the joint guard after a gap, from the estimated positions and velocities."""
-        guard, words = self.guard, self.layout.states.newest()
-        assert words is not None and sample.q is not None
-        then, now, is_exact = State(words).q, sample.q, True
-        if sample.q_cmd is not None:
-            then, now = State(words).q_cmd, sample.q_cmd
-        else:  # a compliant arm may deviate permanently from its setpoint
-            is_exact = sample.robot is not None and sample.robot.control_mode is m.ControlMode.POSITION
-        commanded = [q - v for q, v in zip(guard.q, guard.v, strict=True)]
-        speeds = [v / period for v in guard.v]
-        positions, velocities = joints_after_gap(
-            commanded, speeds, then.tolist(), now, time=time, period=period, is_exact=is_exact
-        )
-        guard.start(positions, velocities, period=period)
-
-    def _joint_setpoint(self, sample: Sample, now: int) -> Setpoint:
-        guard, ipo = self.guard, sample.q_ipo
-        assert ipo is not None
-        tau: Sequence[float] | None = None
-        wrench: Sequence[float] | None = None
-        target: Sequence[float] | None
-        if self.is_ending:
-            target = None
-            tau, wrench = _ZEROS7, _ZEROS6
-        elif self.law is not None:
-            out = self._run_law(sample, now)
-            if out is None:
-                target, tau, wrench = None, _ZEROS7, _ZEROS6
-            else:
-                target, tau, wrench = out.q.tolist(), out.tau.tolist(), out.wrench.tolist()
-        else:
-            self._read_command()
-            target = self.fallback.position_target(now, ipo)
-            tau, wrench = self.fallback.efforts(now)
-            self.record.flags |= at.FILLED if self.fallback.is_filled else 0
-        if target is None:
-            self.record.flags |= at.BRAKING
-        reach = ipo if guard.limits.reach < math.inf else None
-        limited = self._catch_up(target, reach)
-        q = tuple(guard.position(target, reach))
-        mode = self.session.mode
-        limited |= guard.was_limited
-        sent_tau = self._torques(sample, tau or _ZEROS7) if mode is m.CommandMode.TORQUE else None
-        sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
-        guard.was_limited |= limited
-        self.record.sent = Sent(q, sent_tau or NAN7, sent_wrench or NAN6)
-        return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
-
-    def _torques(self, sample: Sample, target: Sequence[float]) -> tuple[float, ...]:
-        """Limit target torques; while the arm brakes, they bring it to rest."""
-        guard, by_motion = self.guard, self.torque_guard
-        tau: Sequence[float] = guard.torque(target)
-        if by_motion is not None:
-            is_braking = bool(self.record.flags & at.BRAKING)
-            dq = self.record.dq
-            tau = by_motion.limit(tau, q=sample.q or NAN7, dq=dq, period=guard.period, is_braking=is_braking)
-            guard.was_limited |= by_motion.was_limited
-        return tuple(tau)
-
-    def _pose_setpoint(self, sample: Sample, now: int) -> Setpoint:
-        """Make the setpoint of a session that commands poses."""
-        target: Sequence[float] | None = None
-        elbow: float | None = None
-        if not self.is_ending and self.law is not None:
-            out = self._run_law(sample, now)
-            target, elbow = (None, None) if out is None else (out.pose.tolist(), float(out.e1))
-        elif not self.is_ending:
-            self._read_command()
-            target = self.fallback.pose_target(now, self.pose_commander.ipo)
-            elbow = self.fallback.elbow_target(now, self.pose_commander.ipo_e1)
-            self.record.flags |= at.FILLED if self.fallback.is_filled else 0
-        if target is None:
-            self.record.flags |= at.BRAKING
-        pose = self.pose_commander.command(target, min(self._skipped, _MAX_SKIPPED))
-        redundancy = self.pose_commander.command_elbow(elbow)
-        self.record.sent = Sent(pose=pose.values, e1=math.nan if redundancy is None else redundancy.value)
-        return Setpoint(pose=pose, redundancy=redundancy)
-
-    def _catch_up(self, target: Sequence[float] | None, reach: Sequence[float] | None) -> bool:
-        """Do the skipped cycles, evenly towards the target; return whether one of them was limited.
-
-        The cabinet has moved on in the meantime: otherwise the next setpoint would lie behind the arm.
-        """
-        guard, steps, limited = self.guard, min(self._skipped, _MAX_SKIPPED) + 1, False
-        before = tuple(guard.r)
-        for k in range(1, steps):
-            step = target and [old + (new - old) * k / steps for old, new in zip(before, target, strict=True)]
-            guard.position(step, reach)
-            limited |= guard.was_limited
-        return limited
-
-    def _read_command(self) -> None:
-        """Read the newest command of the user's process, if there is a new one."""
-        ring = self.layout.commands
-        if ring.count == self.commands_seen:
-            return
-        words = ring.read(ring.count - 1)
-        if words is None:  # being written: read it in the next cycle
-            return
-        self.commands_seen = ring.count
-        ints = words.view("int64")
-        given, numbers = int(ints[at.C_GIVEN]), words.tolist()
-        when = int(ints[at.C_AT])
-        if when + GRACE < self.started:
-            return
-        self.fallback.command(
-            when,
-            q=numbers[at.C_Q : at.C_Q + 7] if given & at.GIVEN_Q else None,
-            tau=numbers[at.C_TAU : at.C_TAU + 7] if given & at.GIVEN_TAU else None,
-            wrench=numbers[at.C_WRENCH : at.C_WRENCH + 6] if given & at.GIVEN_WRENCH else None,
-            pose=numbers[at.C_POSE : at.C_POSE + 7] if given & at.GIVEN_POSE else None,
-            e1=numbers[at.C_E1] if given & at.GIVEN_E1 else None,
-        )
-
-    def _run_law(self, sample: Sample, now: int) -> Output | None:
-        """Call the law with a prepared output; None if it failed, and brake from then on."""
-        out, pose_commander, record = self._out, self.pose_commander, self.record
-        out.q[:], out.tau[:], out.wrench[:] = sample.q_ipo or NAN7, 0.0, 0.0
-        out.pose[:], out.e1 = pose_commander.ipo, pose_commander.ipo_e1
-        record.fill(sample, 0)
-        self.call_law(record.state, out, now)
-        return None if self.is_ending else out
-
-    def call_law(self, state: State, out: Output, now: int) -> None:
-        """Call the law with its newest parameters; brake from now on if it fails."""
-        assert self.law is not None and self._params is not None and self._follower is not None
-        if not self.is_compiled:  # the native part takes those of a compiled law
-            self._take_params(self._follower, state.dt)
+    def call_law(self) -> None:
+        """Call the law in Python on the state of this cycle; brake from now on if it fails."""
+        law, layout = self._law, self.layout
+        assert law is not None and not isinstance(law, CompiledLaw)
+        if layout.offered.tick != self._offer_tick and (offer := layout.offered.read()) is not None:
+            self._offer_tick = layout.offered.tick
+            self._signals = self._outputs.signals = Signals.of(offer[0])
+        states = layout.states
+        state = State(states.floats[states.count % len(states.ints)], self._signals, self._dq)
+        self._take_params(state.dt)
         began = time.monotonic_ns()
         try:
             if self.limit is not None:
                 self.limit.begin(began)
             if self._memory is None:
-                self.law(state, out, self._params)
+                law(state, self._out, self._params)
             else:
                 self._take_memory()
-                self.law(state, out, self._params, self._memory)
-                self.layout.memory.write(self.memory_values)
+                law(state, self._out, self._params, self._memory)
+                layout.memory.write(self._memory_values)
             if self.limit is not None:
                 self.limit.end()
+            self._write_outputs()
         except BaseException as error:  # sys.exit() as well: the arm has to brake first
             if self.limit is not None:
                 self.limit.end()
-            is_clear = isinstance(error, (LawFailure, EndlessLaw))
-            self.law_failed(str(error) if is_clear else describe(error), now)
-        if not self.is_compiled:  # the native part counts those of a compiled law
-            self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
+            self._fail(str(error) if isinstance(error, EndlessLaw) else describe(error))
+        layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
 
-    def _take_params(self, follower: Follower, dt: float) -> None:
+    def _take_params(self, dt: float) -> None:
         """Let the parameters follow what the user's process has set."""
-        ring = self.layout.params
+        ring, follower = self.layout.params, self._follower
         if ring.count != self._param_tick and (words := ring.read(ring.count - 1)) is not None:
             if self._param_tick < 0:
                 follower.begin(words[1:])
@@ -860,24 +214,76 @@ class Cycle:
             self._param_tick = ring.count
         follower.step(dt)
 
+    def _write_outputs(self) -> None:
+        """Hand on the outputs that the law has written in this cycle."""
+        seam, written = self.seam, self._outputs.written
+        for place, (name, value) in enumerate(written.items()):
+            is_analog = isinstance(value, float)
+            bits = np.array([value], dtype=np.float64 if is_analog else np.uint64).view(np.int64)
+            seam.written_signal[place], seam.written_value[place] = (
+                self._signals.names.index(name),
+                int(bits[0]),
+            )
+        seam.written = len(written)
+        written.clear()
+
     def _take_memory(self) -> None:
         """Take over what the user's process has written to the memory of the law."""
-        ring, size = self.layout.memory_set, len(self.memory_values)
-        if ring.count == self._memory_tick:
-            return
-        words = ring.read(ring.count - 1)
-        if words is None:  # being written: read it in the next cycle
+        ring, size = self.layout.memory_set, len(self._memory_values)
+        if ring.count == self._memory_tick or (words := ring.read(ring.count - 1)) is None:
             return
         self._memory_tick = ring.count
         values, written = words[1 : 1 + size], words[1 + size :]
         newer = written > self._memory_written
-        self.memory_values[newer] = values[newer]
+        self._memory_values[newer] = values[newer]
         self._memory_written[:] = written
 
-    def law_failed(self, text: str, now: int) -> None:
-        """Report that the law has failed; brake from now on."""
-        self.record.report(now, LAW_FAILED + text)
+    def note_error(self, error: Any) -> None:
+        """Note the error that a law compiled by Numba has raised; for `sys.unraisablehook`."""
+        self.raised.append(f"{type(error.exc_value).__name__}: {error.exc_value}")
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the compiled law has failed, and that was not reported yet."""
+        return bool(self.seam.law_status != LawStatus.OK and not self.seam.law_reported)
+
+    def report_failure(self) -> None:
+        """Report why the compiled law has failed."""
+        self.seam.law_reported = 1
+        self._fail(self._failure)
+
+    def _fail(self, text: str) -> None:
+        self.report(self.seam.received, LAW_FAILED + text)
         self.end()
+
+    @property
+    def _failure(self) -> str:
+        """Why the compiled law has failed, in words."""
+        status, code = LawStatus(self.seam.law_status), int(self.seam.law_code)
+        if status is LawStatus.CRASHED:
+            return f"it crashed with {signal.Signals(code).name} ({signal.strsignal(code)})"
+        if status is LawStatus.ENDLESS:
+            return f"a call did not return within {LAW_CUT * 1e-6:g} ms: look for an endless loop"
+        if status is LawStatus.NOT_FINITE:
+            return f"it commanded numbers that are not finite {LAW_PATIENCE} times in a row"
+        if status is LawStatus.SLOW:
+            return (
+                f"it took longer than its time budget, {LAW_FRACTION:g} of the command period, {LAW_PATIENCE} times in "
+                f"a row; the last call took {code * 1e-3:.0f} us"
+            )
+        if self.raised:
+            return self.raised.pop()
+        return f"it returned {code}"
+
+
+def _fill(structure: Any, limits: Limits | PoseLimits) -> None:
+    """Copy limits to their structure."""
+    for name in limits.__dataclass_fields__:
+        value = getattr(limits, name)
+        if isinstance(value, tuple):
+            getattr(structure, name)[:] = value
+        else:
+            setattr(structure, name, value)
 
 
 def describe(error: BaseException) -> str:

@@ -77,7 +77,7 @@ def main(count: int, cpu: int | None) -> None:
     sock = UdpSocket(0, host=_HERE, patience=_PATIENCE)
     sys.stdout.write(f"{sock.port}\n")
     sys.stdout.flush()
-    found = library().hf_echo(sock.sock.fileno(), count, took.ctypes.data)
+    found = library().fri_echo(sock.sock.fileno(), count, took.ctypes.data)
     sys.stdout.write(json.dumps(took[:found].tolist()))
 
 

@@ -84,7 +84,11 @@ def flat(values: Mapping[str, Initial], what: str) -> tuple[Floats, dict[str, tu
     schema: dict[str, tuple[tuple[int, ...], int]] = {}
     start = 0
     for name, value in values.items():
-        given = value.value if isinstance(value, Param) else _numbers(value, name, "a number or an array of numbers")
+        given = (
+            value.value
+            if isinstance(value, Param)
+            else _numbers(value, name, "a number or an array of numbers")
+        )
         schema[name] = (given.shape, start)
         parts.append(given.reshape(-1))
         start += given.size

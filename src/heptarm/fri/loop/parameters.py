@@ -1,7 +1,7 @@
 """Declaration of a law's parameter: its range, its unit, and how fast it follows what a program sets.
 
 Every setter checks against it: making a law, opening its session, `rt.params`. The loop moves a parameter towards its
-new value at its rate before each call of the law (`hf_follow` of native/fri_loop.c), so a law in Python, Numba or C
+new value at its rate before each call of the law (`fri_follow` of native/fri_law.c), so a law in Python, Numba or C
 sees the same values.
 """
 
@@ -12,7 +12,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +35,7 @@ class Param(Value):
         low: smallest value, of the same shape; -inf: none.
         high: largest value, of the same shape; inf: none.
         above: `low` itself is not allowed.
-        unit: for errors.
+        unit: for errors, such as "Nm/rad".
         rate: largest change in a second, of the same shape; inf: a new value acts at once.
         nan: NaN is allowed.
         live: a running law's parameter can be changed.
@@ -66,7 +66,7 @@ class Param(Value):
         check: Check | None = None,
         name: str = "value",
     ) -> None:
-        made = _numbers(value, name)
+        made = _numbers(value, instance(name, str, "name"))
         bounds = {
             part: _like(given, made, f"{part} of {name}")
             for part, given in (("low", low), ("high", high), ("rate", rate))
@@ -218,7 +218,7 @@ def declared(values: Mapping[str, object]) -> dict[str, Param]:
     return found
 
 
-def merged(known: Mapping[str, object], given: Mapping[str, object] | None) -> dict[str, Param]:
+def merged(known: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Param]:
     """Declarations of a law's parameters with other initial values, which have to fit them.
 
     Args:
@@ -246,7 +246,7 @@ def rates(declared: Mapping[str, Param]) -> Array:
 
 @functools.cache
 def _follow() -> Callable[..., None]:
-    function = library(holds_gil=True).hf_follow
+    function = library(holds_gil=True).fri_follow
     pointer = ctypes.c_void_p
     function.argtypes = (pointer, pointer, pointer, ctypes.c_int64, ctypes.c_double)
     function.restype = None

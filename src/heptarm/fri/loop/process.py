@@ -10,69 +10,39 @@ import contextlib
 import ctypes
 import gc
 import importlib
+import io
 import json
 import os
 import pickle
 import signal
-import struct
+import socket
 import subprocess
 import sys
 import threading
-import time
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.machinery import PathFinder
 from typing import Any
 
 import cloudpickle
-import numpy as np
 
-from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError
-from heptarm.fri.guard.collision_watch import watch_of
-from heptarm.fri.guard.fallback import Missing, Policy
-from heptarm.fri.guard.joint_guard import Limits
-from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.compiled import WITH_MEMORY, CompiledLaw, arity
-from heptarm.fri.loop.cycle import LOOP_FAILED, Cycle, Law, describe
-from heptarm.fri.loop.law_interface import Memory
+from heptarm.fri.loop.compiled import CompiledLaw
+from heptarm.fri.loop.cycle import Cycle, describe
 from heptarm.fri.loop.law_limit import LawLimit
-from heptarm.fri.loop.native import (
-    CALL_LAW,
-    CHECK,
-    HANDED_BACK,
-    LAW_FAILED,
-    SOCKET_ERROR,
-    TIMEOUT,
-    Native,
-    library,
-)
-from heptarm.fri.loop.user_api import Output, Params, State
-from heptarm.fri.loop.wrench import WrenchEstimator
-from heptarm.fri.protocol.messages import SessionState
-from heptarm.fri.protocol.version import Version, spoken_version
+from heptarm.fri.loop.native import CALL_LAW, ENDED, LAW_FAILED, SOCKET_ERROR
+from heptarm.fri.loop.settings import Law, LoopSettings
 from heptarm.io.shared import MemoryBlock
-from heptarm.io.udp import Address, UdpSocket
+from heptarm.io.udp import UdpSocket
 
 PRIORITY = 60
 #: Longest wait for a datagram before the loop checks whether it has to end [s].
 PATIENCE = 0.05
-#: The loop accepts a sender with another address after this long without a message of the previous one [ns].
-SILENT = 1_000_000_000
-#: It accepts another port of the same address, that of a restarted controller, after so many periods without a message,
-#: and after at least this long [ns]: not at once, so that another program there cannot interrupt a running session.
-SILENT_PERIODS, SILENT_PORT = 3, 100_000_000
-#: Longest wait for the arm to come to rest before the loop ends [s].
-BRAKING = 3.0
-#: Largest superposed torque where nothing guards the motion that torques lead to [Nm]: none in effect.
-NO_TORQUE = 1e-9
-#: The loop checks every so many datagrams whether the user's process is alive.
-_CHECK_EVERY = 256
+#: Beginning of the trouble after a failure of the loop itself.
+LOOP_FAILED = "the loop failed: "
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT_FUTURE = 3
-#: Size of a law by value, ahead of it.
-_SIZE = struct.Struct("<q")
 
 
 def request_realtime(*, cpu: int | None = None, priority: int = PRIORITY) -> list[str]:
@@ -134,32 +104,74 @@ def importable(law: Law | CompiledLaw | None) -> str | None:
     return f"{module}:{name}" if found is law else None
 
 
-def by_value(law: Law | CompiledLaw) -> bytes:
-    """Serialise a law that a new process cannot import, with the values that it uses.
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a loop listens, and to whom.
+
+    Attributes:
+        port: UDP port to bind.
+        host: own address to bind.
+        remote: address of the controller; None accepts any.
+        parent: process that uses the loop.
+    """
+
+    port: int
+    host: str
+    remote: str | None
+    parent: int
+
+
+class _Pickler(cloudpickle.Pickler):  # type: ignore[misc]
+    """Pickles settings; a law that the new process can import by its name, any other by value."""
+
+    def __init__(self, file: io.BytesIO, law: Law | CompiledLaw | None) -> None:
+        super().__init__(file)
+        self._law, self._name = law, None if law is None else importable(law)
+
+    def reducer_override(self, obj: Any) -> Any:
+        if obj is self._law and self._name is not None:
+            return imported, (self._name,)
+        return super().reducer_override(obj)
+
+
+def packed(settings: LoopSettings, place: Place) -> bytes:
+    """Serialise what a loop's process needs.
 
     Raises:
-        CommandRejected: it uses a value that belongs to this process, such as an arm, a lock or a file.
+        CommandRejected: the law uses a value that belongs to this process, such as an arm, a lock or a file.
     """
+    law = settings.law
     module = sys.modules.get(getattr(law, "__module__", None) or "")
     foreign = (
         module is not None
         and module.__name__ != "__main__"
         and PathFinder.find_spec(module.__name__.partition(".")[0]) is None
     )
+    into = io.BytesIO()
     try:
-        if not foreign:
-            return bytes(cloudpickle.dumps(law))
-        cloudpickle.register_pickle_by_value(module)
+        if foreign:
+            cloudpickle.register_pickle_by_value(module)
         try:
-            return bytes(cloudpickle.dumps(law))
+            _Pickler(into, law).dump((settings, place))
         finally:
-            cloudpickle.unregister_pickle_by_value(module)
+            if foreign:
+                cloudpickle.unregister_pickle_by_value(module)
     except Exception as error:  # whatever the objects that it uses raise
         raise CommandRejected(
             f"the law {getattr(law, '__qualname__', law)!r} cannot be sent to the loop's process: {error}",
             parameter="law",
             hint="a law runs in a process of its own: let it use plain values and `params`, not arms, locks or files",
         ) from error
+    return into.getvalue()
+
+
+def imported(name: str) -> Any:
+    """Import "module:function"."""
+    module, _, function = name.partition(":")
+    found: Any = importlib.import_module(module)
+    for part in function.split("."):
+        found = getattr(found, part)
+    return found
 
 
 class Worker:
@@ -167,10 +179,10 @@ class Worker:
 
     Args:
         path: file of the shared memory.
-        law: law by value; empty: the configuration names the law, or there is none.
+        sent: what it needs, see `packed`.
     """
 
-    def __init__(self, path: str, law: bytes = b"") -> None:
+    def __init__(self, path: str, sent: bytes) -> None:
         folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "heptarm.fri.loop.process", path],
@@ -183,7 +195,7 @@ class Worker:
         self._reader.start()
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError), self._process.stdin as pipe:  # it may have ended already
-            pipe.write(_SIZE.pack(len(law)) + law)
+            pipe.write(sent)
 
     def _pass_on(self) -> None:
         """Pass on what the process prints to its standard error, and keep the last lines."""
@@ -236,257 +248,66 @@ class Loop:
 
     Args:
         layout: the shared memory.
-        config: configuration that `heptarm.fri.loop.client` wrote.
-        law: overrides the law of the configuration.
+        settings: settings of the loop.
+        place: where it listens.
 
     Attributes:
-        layout, config, socket, cycle: its parts.
+        layout, settings, socket, cycle: its parts.
         refused: a text for each setting that has no effect here.
 
     Raises:
         CommandRejected: the law cannot be compiled or loaded.
         ConnectFailed: the port cannot be bound.
+        Unavailable: the compiled part of heptarm is missing.
     """
 
-    def __init__(
-        self, layout: at.Layout, config: dict[str, Any], *, law: Law | CompiledLaw | None = None
-    ) -> None:
-        self.layout, self.config = layout, config
-        self.socket = UdpSocket(config["port"], host=config["host"], patience=PATIENCE)
-        layout.header[at.PORT] = self.socket.port
-        schema, memory = (
-            {name: (tuple(shape), start) for name, (shape, start) in config[what].items()}
-            for what in ("params", "memory")
-        )
-        self._why_python = ""
-        try:
-            library()
-        except Unavailable as reason:
-            self._why_python = str(reason)
-        law = law or _imported(config["law"])
-        compiled: CompiledLaw | None = None
-        in_python: Law | None
-        if not isinstance(law, CompiledLaw):
-            in_python = law
-        elif self._why_python:
-            in_python = _without_native(law, self._why_python)
-        else:
-            compiled, in_python = law, None
-        values = np.array(config["remembered"], dtype=np.float64)
-        version, limits = config["version"], _limits(config["limits"])
-        self.cycle = Cycle(
-            layout,
-            version=None if version is None else Version(version),
-            limits=limits if not self._why_python else replace(limits, tau_max=(NO_TORQUE,) * 7),
-            pose_limits=PoseLimits(**config["pose_limits"]),
-            policy=Policy(
-                Missing(config["policy"]["missing"]), config["policy"]["patience"], config["policy"]["over"]
-            ),
-            law=in_python,
-            params=Params(np.zeros(config["size"]), schema),
-            memory=Memory(values, memory) if in_python and arity(in_python) >= WITH_MEMORY else None,
-            memory_values=values,
-            positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
-            estimator=WrenchEstimator(config["chain"]),
-            watch=watch_of(config["collision"]),
-            rates=np.array(config["rates"]),
-            links=None if self._why_python else config["links"],
-        )
-        if in_python is not None:
-            self.cycle.limit = LawLimit(layout.header)
-        polls, self.refused = config["busy_poll"], list[str]()
-        if polls and (self._why_python or os.cpu_count() == 1):
-            why = self._why_python or "this machine has one processor, which the sender needs meanwhile"
+    def __init__(self, layout: at.Layout, settings: LoopSettings, place: Place) -> None:
+        self.layout, self.settings, self.refused = layout, settings, list[str]()
+        if settings.busy_poll and os.cpu_count() == 1:
+            why = "this machine has one processor, which the sender needs meanwhile"
             self.refused.append(f"no busy polling: {why}")
-            polls = 0.0
-        self._native = None if self._why_python else Native(self.cycle, busy_poll=round(polls * 1e9))
-        layout.header[at.NATIVE] = self._native is not None
-        if compiled is not None and self._native is not None:
-            address, kept = compiled.load(schema, memory)
-            self._native.set_law(address, kept, success=compiled.success, rates=config["rates"])
-        self._parent: int = config["parent"]
-        self._peer: Address | None = None
-        self._deadline = 0
-        self._last = b""
+            settings = replace(settings, busy_poll=0.0)
+        self.socket = UdpSocket(place.port, host=place.host, patience=PATIENCE)
+        layout.header[at.PORT] = self.socket.port
+        self.cycle = Cycle(layout, settings)
+        seam = self.cycle.seam
+        seam.sock, seam.parent = self.socket.sock.fileno(), place.parent
+        if place.remote is not None:
+            seam.remote = int.from_bytes(socket.inet_aton(place.remote), sys.byteorder)
+        if settings.law is not None and not isinstance(settings.law, CompiledLaw):
+            self.cycle.limit = LawLimit(layout.header)
 
     def run(self) -> None:
         """Answer until the user's process stops the loop or has ended, and the arm is at rest.
 
         Raises:
-            ConnectionLost: the port or the loop itself has failed; the text gives the cause.
+            ConnectionLost: the port has failed; the text gives the cause.
         """
-        if self._native is None:
-            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python and commands no torques: {self._why_python}")
-            self._run_in_python()
-        else:
-            self._run_native(self._native)
-        if self.cycle.failure:
-            raise ConnectionLost(self.cycle.failure)
-
-    def _run_native(self, native: Native) -> None:
-        """Run the native part, which answers frequent messages; handle here what it hands back."""
-        header, cycle, states = self.layout.header, self.cycle, self.layout.states
-        run, send, now_ns = native.library.hf_run, native.library.hf_send, time.monotonic_ns
-        memory, reference = native.memory, native.reference
-        out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench, cycle.exchange.outputs)
-        dq = np.frombuffer(memory.dq, dtype=np.float64)
-        sys.unraisablehook = native.note_error
-        native.listen(self.socket.sock, None)
-        history = len(states.ints)
-        while True:
-            code = run(reference, _CHECK_EVERY, native.sender)
+        cycle, run, reference = self.cycle, self.cycle.library.fri_run, self.cycle.reference
+        sys.unraisablehook = cycle.note_error
+        code = run(reference, 0)
+        while code != ENDED:
             if code == CALL_LAW:
-                state = State(states.floats[header[at.STATES] % history], cycle.exchange.signals, dq)
-                cycle.call_law(state, out, memory.received)
-                native.write_outputs()
-                memory.is_ending = cycle.is_ending
-                send(reference)
-                code = CHECK if header[at.STOP] else CALL_LAW
+                cycle.call_law()
             elif code == LAW_FAILED:
-                memory.law_reported = 1
-                native.sync_to_python()
-                cycle.law_failed(native.law_failure, memory.received)
-                native.sync_from_python(self._last)
-                code = CHECK if header[at.STOP] else LAW_FAILED
-            elif code == HANDED_BACK:
-                native.sync_to_python()
-                datagram, sender = native.datagram, native.sender_address
-                received = memory.t_received
-                if sender != self._peer and not self._accept(sender, datagram, received):
-                    native.sync_from_python(self._last)
-                    continue
-                native.listen(self.socket.sock, sender)
-                answer = cycle.turn(datagram, received)
-                if answer is not None:
-                    self.socket.send(answer, sender)
-                cycle.finish(now_ns())
-                if cycle.session.sample is not None and cycle.session.received == received:
-                    self._last = datagram
-                if self._last:
-                    native.sync_from_python(self._last)
-                code = CHECK if header[at.STOP] else HANDED_BACK
+                cycle.report_failure()
             elif code == SOCKET_ERROR:
-                raise ConnectionLost(
-                    f"UDP port {self.socket.port} fails: {os.strerror(memory.t_size).lower()}"
-                )
-            if code == TIMEOUT:
-                cycle.idle(now_ns())
+                why = os.strerror(cycle.seam.error).lower()
+                raise ConnectionLost(f"UDP port {self.socket.port} fails: {why}")
+            else:  # nothing arrives
                 gc.collect()
-            if code in (TIMEOUT, CHECK) and (
-                self._deadline or header[at.STOP] or os.getppid() != self._parent
-            ):
-                native.sync_to_python()
-                if self._is_over(now_ns()):
-                    return
-                if self._last:
-                    native.sync_from_python(self._last)
-
-    def _run_in_python(self) -> None:
-        header, cycle, receive, send = self.layout.header, self.cycle, self.socket.receive, self.socket.send
-        now_ns, turns = time.monotonic_ns, 0
-        while True:
-            got = receive()
-            if got is None:
-                now = now_ns()
-                cycle.idle(now)
-                gc.collect()
-                if self._is_over(now):
-                    return
-                continue
-            datagram, received, sender = got
-            if sender != self._peer and not self._accept(sender, datagram, received):
-                continue
-            answer = cycle.turn(datagram, received)
-            if answer is not None:
-                send(answer, sender)
-            now = now_ns()
-            cycle.finish(now)
-            turns += 1
-            if (header[at.STOP] or turns % _CHECK_EVERY == 0) and self._is_over(now):
-                return
-
-    def _accept(self, sender: Address, datagram: bytes, now: int) -> bool:
-        """Whether to accept another sender: only if the session of the previous one has ended or it is silent.
-
-        Args:
-            sender: address and port.
-            datagram: its datagram.
-            now: time of receipt [ns].
-        """
-        remote = self.config["remote"]
-        if remote is not None and sender[0] != remote:
-            return False
-        session = self.cycle.session
-        if self._peer is not None:
-            patience = SILENT
-            if sender[0] == self._peer[0] and spoken_version(datagram) is not None:
-                patience = max(SILENT_PERIODS * session.period, SILENT_PORT)
-            if session.state is not SessionState.IDLE and now - session.received < patience:
-                return False
-            self.cycle.forget_controller()
-        self._peer = sender
-        self.cycle.record.report(now, f"listening to {sender[0]}:{sender[1]}")
-        return True
-
-    def _is_over(self, now: int) -> bool:
-        """Whether the loop has ended; make the cycle brake if it has to end."""
-        if not self._deadline:
-            if not self.layout.header[at.STOP] and os.getppid() == self._parent:
-                return False
-            self.cycle.end()
-            self._deadline = now + round(BRAKING * 1e9)
-        silent = now - self.cycle.session.received > 5 * PATIENCE * 1e9
-        return self.cycle.may_end or silent or now > self._deadline
+            code = run(reference, code == CALL_LAW)
 
     def close(self) -> None:
         """Close the port."""
         self.socket.close()
 
 
-def _without_native(law: CompiledLaw, reason: str) -> Law:
-    """The Python form of a compiled law, for a loop in pure Python.
-
-    Raises:
-        CommandRejected: it has none.
-    """
-    if law.python is None:
-        raise CommandRejected(
-            f"a law from a library needs the native part of the loop: {reason}",
-            parameter="law",
-            hint="install gcc, or write the law in Python",
-        )
-    return law.python
-
-
-def _imported(name: str | None) -> Law | CompiledLaw | None:
-    """Import the law "module:function"."""
-    if name is None:
-        return None
-    module, _, function = name.partition(":")
-    found: Any = importlib.import_module(module)
-    for part in function.split("."):
-        found = getattr(found, part)
-    law: Law | CompiledLaw = found
-    return law
-
-
-def _received_law() -> Law | CompiledLaw | None:
-    """Read the law that `Worker` sent by value; None if it sent none."""
-    (size,) = _SIZE.unpack(sys.stdin.buffer.read(_SIZE.size))
-    law: Law | CompiledLaw | None = pickle.loads(sys.stdin.buffer.read(size)) if size else None
-    return law
-
-
-def _limits(plain: dict[str, Any]) -> Limits:
-    made: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
-    return Limits(**made)
-
-
 def main(path: str) -> int:
-    """Run a loop, with the law that standard input has by value, or that of the configuration.
+    """Run a loop with the settings that standard input has.
 
     Args:
-        path: file of the shared memory, with the configuration.
+        path: file of the shared memory.
     """
     block = MemoryBlock(path=path)
     header = block.view(0, at.LATENCY)
@@ -499,10 +320,10 @@ def main(path: str) -> int:
     first = at.Layout(
         block, history=header[at.HISTORY], params=header[at.SIZE], memory=header[at.MEMORY_SIZE]
     )
-    config = json.loads(first.config.read() or "{}")
     header[at.PID] = os.getpid()
     try:
-        loop = Loop(first, config, law=_received_law())
+        settings, place = pickle.loads(sys.stdin.buffer.read())
+        loop = Loop(first, settings, place)
     except BaseException as error:  # also of the module of the law, which may do anything when it is imported
         if isinstance(error, CommandRejected) and error.parameter == "law":
             first.trouble.write(json.dumps([error.text, error.hint]))
@@ -512,7 +333,7 @@ def main(path: str) -> int:
         has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
         header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT
         return 1
-    refused = (request_realtime(cpu=config["cpu"]) if config["realtime"] else []) + loop.refused
+    refused = (request_realtime(cpu=settings.cpu) if settings.realtime else []) + loop.refused
     first.refused.write("\n".join(refused))
     header[at.STATUS] = at.Status.RUNNING
     try:

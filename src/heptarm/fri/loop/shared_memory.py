@@ -1,27 +1,34 @@
 """Layout of the shared memory of the loop and the user's process, and the guards' reports in it.
 
-schema/generate.py writes the same layout for the native loop.
+schema/generate.py writes the same layout for the loop in C.
 """
 
 from __future__ import annotations
 
 import enum
+import struct
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
 
 from heptarm.fri.guard.joint_guard import AXES, JointReport
 from heptarm.fri.guard.pose_guard import PARTS, PoseReport
-from heptarm.fri.protocol.messages import JOINTS, MAX_IO, MONITORED
+from heptarm.fri.protocol.messages import JOINTS, MAX_IO, MAX_TRANSFORMATIONS, MONITORED
 from heptarm.fri.session.statistics import BINS, COUNTERS
 from heptarm.io.shared import MemoryBlock, Note, Ring
 from heptarm.values.condition.collision import Collision
 
 # words of the header
-STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, NATIVE, HISTORY, SIZE = range(12)
+STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, _, HISTORY, SIZE = range(12)
 # of the law: number of words of its memory, heads of the rings of its memory, calls that took longer than their budget
 MEMORY_SIZE, MEMORY, MEMORY_SET, OVERRUNS = range(12, 16)
 COUNTS = 16
 LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED = 32, 81, 130
 #: Since when a law in Python runs, monotonic clock [ns]; 0: none runs.
 LAW_SINCE = 180
+#: Number of the session in which commands count, as of the newest state; commands of an older one, not executed.
+EPOCH, STALE = 181, 182
 LATENCY = 192
 JITTER = LATENCY + BINS + 1
 POSE_COUNTS = JITTER + BINS + 1
@@ -81,8 +88,9 @@ ABSENT = -1
 ANSWERED, FILLED, LIMITED, BRAKING, ESTIMATED = 1, 2, 4, 8, 16
 
 # words of a command: sequence, time [ns], bits of the parts that it has, then the numbers
-C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1 = 1, 2, 3, 10, 17, 23, 30
-COMMAND_WORDS, COMMAND_SLOTS = 31, 8
+# the last one is the number of the session that the sender had seen
+C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1, C_EPOCH = 1, 2, 3, 10, 17, 23, 30, 31
+COMMAND_WORDS, COMMAND_SLOTS = 32, 8
 GIVEN_Q, GIVEN_TAU, GIVEN_WRENCH, GIVEN_POSE, GIVEN_E1 = 1, 2, 4, 8, 16
 
 PARAM_SLOTS = MEMORY_SLOTS = 8
@@ -90,6 +98,9 @@ PARAM_SLOTS = MEMORY_SLOTS = 8
 EVENT_WORDS, EVENT_SLOTS = 48, 128
 EVENT_TEXT = 8 * (EVENT_WORDS - 3)
 NOTE_WORDS = 1024
+#: A name in a note: its size, then room for 63 characters in UTF-8.
+NAME_BYTES = 256
+NAME_WORDS = 1 + NAME_BYTES // 8
 
 
 class Status(enum.IntEnum):
@@ -101,6 +112,77 @@ class Status(enum.IntEnum):
     FAILED = 3
     NO_PORT = 4
     BAD_LAW = 5
+
+
+class Offer:
+    """Names of the signals and requested frames of a session; the loop writes them, the user's process reads them.
+
+    Args:
+        block: the memory.
+        start: first word.
+    """
+
+    def __init__(self, block: MemoryBlock, *, start: int) -> None:
+        self._words = block.ints[start : start + NOTE_WORDS]
+
+    @property
+    def tick(self) -> int:
+        """Counter that changes with every offer."""
+        return int(self._words[0])
+
+    def read(self) -> tuple[tuple[tuple[str, int, int], ...], tuple[str, ...]] | None:
+        """Name, type and direction of each signal, and names of the frames; None while they are being written."""
+        words = self._words.copy()
+        if words[0] & 1 or words[0] != self._words[0]:
+            return None
+        at, signals = 3, []
+        for _ in range(int(words[1])):
+            signals.append((_name(words[at + 2 :]), int(words[at]), int(words[at + 1])))
+            at += 2 + NAME_WORDS
+        frames = tuple(_name(words[at + k * NAME_WORDS :]) for k in range(int(words[2])))
+        return tuple(signals), frames
+
+
+class Writes:
+    """Outputs and frames that the user's process writes, and the loop reads.
+
+    Args:
+        block: the memory.
+        start: first word.
+    """
+
+    def __init__(self, block: MemoryBlock, *, start: int) -> None:
+        self._words = block.ints[start : start + NOTE_WORDS]
+
+    def write(
+        self, outputs: Mapping[str, tuple[int, int | float]], frames: Mapping[str, Sequence[float]]
+    ) -> None:
+        """Write them all; they replace the previous ones.
+
+        Args:
+            outputs: by full name the count of the write, which grows with each, and the value, a float if analog.
+            frames: by name x y z [m] and quaternion x y z w.
+        """
+        rows = [np.array([len(outputs), len(frames)])]
+        for name, (count, value) in list(outputs.items())[:MAX_IO]:
+            is_analog = isinstance(value, float)
+            bits = np.array([value], dtype=np.float64 if is_analog else np.uint64).view(np.int64)
+            rows += [np.array([count, is_analog]), bits, _named(name)]
+        for name, pose in list(frames.items())[:MAX_TRANSFORMATIONS]:
+            rows += [_named(name), np.array(pose, dtype=np.float64).view(np.int64)]
+        words = np.concatenate(rows).astype(np.int64)
+        self._words[0] |= 1
+        self._words[1 : 1 + len(words)] = words
+        self._words[0] += 1
+
+
+def _name(words: npt.NDArray[np.int64]) -> str:
+    return words[1:NAME_WORDS].tobytes()[: int(words[0])].decode()
+
+
+def _named(name: str) -> npt.NDArray[np.int64]:
+    encoded = name.encode()
+    return np.frombuffer(struct.pack("<q", len(encoded)) + encoded.ljust(NAME_BYTES, b"\0"), dtype=np.int64)
 
 
 class Layout:
@@ -132,14 +214,16 @@ class Layout:
         self.memory_set_at = at
         self.memory_set = Ring(block, head=MEMORY_SET, start=at, slots=MEMORY_SLOTS, width=1 + 2 * memory)
         at += MEMORY_SLOTS * (1 + 2 * memory)
+        self.events_at = at
         self.events = Ring(block, head=EVENTS, start=at, slots=EVENT_SLOTS, width=EVENT_WORDS)
         at += EVENT_SLOTS * EVENT_WORDS
-        notes = []
-        for _ in range(5):
-            notes.append(Note(block, start=at, words=NOTE_WORDS))
-            at += NOTE_WORDS
-        self.config, self.trouble, self.refused, self.offered, self.outputs = notes
-        self.outputs_at = at - NOTE_WORDS
+        self.trouble_at = at
+        self.trouble = Note(block, start=at, words=NOTE_WORDS)
+        self.refused = Note(block, start=at + NOTE_WORDS, words=NOTE_WORDS)
+        at += 2 * NOTE_WORDS
+        self.offered_at, self.outputs_at = at, at + NOTE_WORDS
+        self.offered = Offer(block, start=self.offered_at)
+        self.outputs = Writes(block, start=self.outputs_at)
         self.header = block.view(0, LATENCY)
         self.latency = block.view(LATENCY, BINS + 1)
         self.jitter = block.view(JITTER, BINS + 1)
@@ -149,25 +233,7 @@ class Layout:
         """Size of a block in words."""
         rings = history * STATE_WORDS + COMMAND_SLOTS * COMMAND_WORDS + PARAM_SLOTS * (1 + params)
         rings += MEMORY_SLOTS * (2 + 3 * memory)
-        return HEADER_WORDS + rings + EVENT_SLOTS * EVENT_WORDS + 5 * NOTE_WORDS
-
-
-def write_report(layout: Layout, report: JointReport | PoseReport) -> None:
-    """Write the report of a guard."""
-    ints, floats = layout.block.ints, layout.block.floats
-    size, (counts, worst, allowed) = _places(report)
-    for kind in range(len(report.counts)):
-        start, end = size * kind, size * (kind + 1)
-        ints[counts + start : counts + end] = report.counts[kind]
-        floats[worst + start : worst + end] = report.worst[kind]
-        floats[allowed + start : allowed + end] = report.allowed[kind]
-
-
-def write_collision(layout: Layout, found: Collision) -> None:
-    """Write the first collision."""
-    floats = layout.block.floats
-    floats[COLLISION_TORQUE], floats[COLLISION_ALLOWED] = found.torque, found.allowed
-    layout.block.ints[COLLIDED] = 1 + found.joint  # last: a reader then finds the others
+        return HEADER_WORDS + rings + EVENT_SLOTS * EVENT_WORDS + 4 * NOTE_WORDS
 
 
 def read_collision(layout: Layout) -> Collision | None:

@@ -1,182 +1,23 @@
-"""States, events and counts that the loop publishes for the user's process.
-
-`Record` writes them in the loop's process, `Reader` reads them in the user's.
-"""
+"""States, events and counts that the loop publishes, as the user's process reads them."""
 
 from __future__ import annotations
 
-import json
-import math
-import struct
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from operator import attrgetter
+from collections.abc import Iterator
 
 import numpy as np
 
 from heptarm.errors import ConnectionLost, NotReady, Timeout
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.user_api import Signals, State, Stats, information
-from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import Sample
+from heptarm.fri.loop.user_api import Signals, State, Stats
 from heptarm.fri.protocol.messages import Quality, SessionState
-from heptarm.fri.session.session import Event, Kind, Session
+from heptarm.fri.session.events import Event, Kind
 from heptarm.io.shared import Floats as Words
 from heptarm.values.arrays import instance, integer, within, word
 from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 
-NAN7, NAN6 = (math.nan,) * 7, (math.nan,) * 6
-_ROW = struct.Struct(f"={at.S_TRACKING - 1}q{at.STATE_WORDS - at.S_TRACKING}d")
-_ARRAYS = attrgetter(*at.ARRAYS)
 _KINDS = list(Kind)
-_NO_SIGNALS = (math.nan,) * m.MAX_IO
-
-
-@dataclass(slots=True)
-class Sent:
-    """Command that was sent in a cycle; NaN for quantities that were not commanded.
-
-    Attributes:
-        q: positions [rad].
-        tau: torques [Nm].
-        wrench: wrench [N, Nm].
-        pose: pose in FRI's numbers.
-        e1: redundancy angle of the pose [rad].
-    """
-
-    q: Sequence[float] = NAN7
-    tau: Sequence[float] = NAN7
-    wrench: Sequence[float] = NAN6
-    pose: Sequence[float] = NAN7
-    e1: float = math.nan
-
-
-NOTHING_SENT = Sent()
-
-
-class Record:
-    """Writer of states and events in the shared memory.
-
-    Args:
-        layout: the shared memory.
-        session: session of the messages.
-
-    Attributes:
-        info: robot and connection of the last message, and the values derived from them.
-        dq: velocities by differences, shape (7,) [rad/s].
-        state: state filled last, as a law sees it.
-        flags: flags of the cycle.
-        ticks: messages since commands became effective.
-        sent: command of the cycle.
-        ipo: interpolator's pose in FRI's numbers, in sessions that command poses.
-        ipo_e1: its redundancy angle [rad].
-        signals: values of the session's signals.
-        wrench: external wrench of the message, sent or estimated [N, Nm].
-    """
-
-    def __init__(self, layout: at.Layout, session: Session) -> None:
-        self._layout, self._session = layout, session
-        self._slot = memoryview(bytearray(8 * at.STATE_WORDS))
-        self.dq = np.zeros(7)
-        self.state = State(np.frombuffer(self._slot, dtype=np.float64), dq=self.dq)
-        self.info: tuple[object, object, tuple[int, ...]] = (None, None, ())
-        self.flags = 0
-        self.ticks = 0
-        self.sent = NOTHING_SENT
-        self.ipo: Sequence[float] = NAN7
-        self.ipo_e1 = math.nan
-        self.signals: Sequence[float] = ()
-        self.wrench: Sequence[float] = NAN6
-        self._trouble = session.trouble
-        layout.trouble.write(self._trouble)
-
-    def fill(self, sample: Sample, latency: int) -> None:
-        """Fill the state of a message.
-
-        Args:
-            sample: the message.
-            latency: time from receipt to answer [ns].
-        """
-        session = self._session
-        robot, link = sample.robot, sample.connection
-        if self.info[0] is not robot or self.info[1] is not link:
-            self.info = (robot, link, information(sample.message))
-        seconds, nanos = sample.stamp
-        pose: Sequence[float] = NAN7
-        e1, strategy = math.nan, at.ABSENT
-        if session.version is not None and session.version.traits.quaternions:
-            monitor = sample.message.monitor or m.MonitorData()
-            pose = monitor.pose.values if monitor.pose is not None else NAN7
-            if monitor.redundancy is not None:
-                e1, strategy = monitor.redundancy.value, monitor.redundancy.strategy
-        overlay, safety, operation, control, drive, multiplier = self.info[2]
-        sent, is_commanding = self.sent, session.is_commanding
-        _ROW.pack_into(
-            self._slot,
-            8,
-            session.received,
-            sample.sequence,
-            seconds * 1_000_000_000 + nanos,
-            session.state,
-            session.quality,
-            session.mode,
-            overlay,
-            safety,
-            operation,
-            control,
-            drive,
-            session.period,
-            multiplier,
-            latency,
-            self.flags,
-            session.reflected,
-            session.sent,
-            max(0, self.ticks) if is_commanding else 0,
-            strategy,
-            sample.tracking,
-            *(number for array in _ARRAYS(sample) for number in array or NAN7),
-            *self.wrench,
-            *pose,
-            e1,
-            *sent.q,
-            *sent.tau,
-            *sent.wrench,
-            *(self.ipo if is_commanding else NAN7),
-            *sent.pose,
-            self.ipo_e1 if is_commanding else math.nan,
-            sent.e1,
-            *self.signals,
-            *_NO_SIGNALS[len(self.signals) :],
-        )
-
-    def publish(self, sample: Sample, latency: int) -> None:
-        """Publish the state of a message at the end of its cycle."""
-        self.fill(sample, latency)
-        ring = self._layout.states
-        slot = ring.begin()
-        ring.ints[slot, 1:] = self._slot[8:].cast("q")
-        ring.end()
-
-    def report(self, now: int, text: str, kind: Kind = Kind.CLIENT) -> None:
-        """Publish an event."""
-        ring = self._layout.events
-        encoded = text.encode()[: at.EVENT_TEXT].ljust(at.EVENT_TEXT, b"\0")
-        slot = ring.begin()
-        ring.ints[slot, 1], ring.ints[slot, 2] = now, _KINDS.index(kind)
-        ring.ints[slot, 3:] = memoryview(encoded).cast("q")
-        ring.end()
-
-    def report_all(self) -> None:
-        """Publish the events of the session, and why there is no session."""
-        for event in self._session.events():
-            self.report(event.at, event.text, event.kind)
-        if self._session.trouble != self._trouble:
-            self._trouble = self._session.trouble
-            self._layout.trouble.write(self._trouble)
-
-
 #: Largest count of states.
 _LARGEST_COUNT = 1 << 62
 #: Polling period for a state that is due [s].
@@ -200,11 +41,21 @@ class Reader:
         self._layout = layout
         self._header = layout.header
         self._seen = self._events_seen = 0
+        #: Number of the session of which a state was read last: what a command is computed from.
+        self._epoch = 0
         self._offer: tuple[int, Signals, tuple[str, ...]] = (-1, Signals(), ())
 
     def follower(self) -> Reader:
         """Make another reader of the same loop, which counts the events and states that it has read by itself."""
         return Reader(self._layout)
+
+    def _newest(self) -> Words | None:
+        """Words of the newest state, of whose session commands are from now on; None: there is none."""
+        epoch = self._header[at.EPOCH]  # the loop writes it after a state of that session
+        words = self._layout.states.newest()
+        if words is not None:
+            self._epoch = epoch
+        return words
 
     @property
     def state(self) -> State:
@@ -213,7 +64,7 @@ class Reader:
         Raises:
             NotReady: no message received yet; the text names possible causes.
         """
-        words = self._layout.states.newest()
+        words = self._newest()
         if words is None:
             raise NotReady(self.trouble, hint=_NO_MESSAGES)
         return State(words, self._signals)
@@ -221,7 +72,7 @@ class Reader:
     @property
     def session(self) -> SessionState:
         """State of the session; IDLE before the first message."""
-        words = self._layout.states.newest()
+        words = self._newest()
         return SessionState.IDLE if words is None else State(words).session
 
     @property
@@ -239,11 +90,6 @@ class Reader:
     def refused(self) -> list[str]:
         """What the system refused the loop, with the remedies."""
         return (self._layout.refused.read() or "").splitlines()
-
-    @property
-    def is_native(self) -> bool:
-        """Whether the native part does the frequent cycles of the loop."""
-        return bool(self._header[at.NATIVE])
 
     @property
     def count(self) -> int:
@@ -344,10 +190,9 @@ class Reader:
         """Signals of the session."""
         note = self._layout.offered
         if note.tick != self._offer[0]:
-            tick, text = note.tick, note.read()
-            if text is not None:
-                offer = json.loads(text)
-                self._offer = (tick, Signals.read(offer["signals"]), tuple(offer["frames"]))
+            tick, offer = note.tick, note.read()
+            if offer is not None:
+                self._offer = (tick, Signals.of(offer[0]), offer[1])
         return self._offer[1]
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,13 +20,10 @@ from heptarm.fri.protocol.messages import (
     CommandMode,
     ControlMode,
     DriveState,
-    IpoData,
-    Monitoring,
     OperationMode,
     Overlay,
     Quality,
     RedundancyStrategy,
-    RobotInfo,
     Safety,
     SessionState,
 )
@@ -67,25 +63,15 @@ class Signals:
         self.names = tuple(one.name for one in self._signals)
 
     @classmethod
-    def of(cls, values: Iterable[m.IoValue]) -> Signals:
-        """Make the signals of a message."""
+    def of(cls, offer: Iterable[tuple[str, int, int]]) -> Signals:
+        """Make the signals of an offer: name, type and direction of each."""
         return cls(
-            _signal(one.name, _KINDS[one.type], is_output=one.direction is m.IoDirection.OUTPUT)
-            for one in values
+            _signal(name, _KINDS[m.IoType(kind)], is_output=direction == m.IoDirection.OUTPUT)
+            for name, kind, direction in offer
         )
 
     def __len__(self) -> int:
         return len(self._signals)
-
-    @property
-    def text(self) -> str:
-        """Text of the signals for the shared memory."""
-        return json.dumps([(one.name, one.kind, one.is_output) for one in self._signals])
-
-    @classmethod
-    def read(cls, text: str) -> Signals:
-        """Read the signals from their text."""
-        return cls(_signal(name, kind, is_output=is_output) for name, kind, is_output in json.loads(text))
 
     def values(self, numbers: Sequence[float], *, is_output: bool | None = None) -> dict[str, SignalValue]:
         """Map names to values.
@@ -193,7 +179,7 @@ class Output:
 
     def __init__(self, outputs: Outputs | None = None) -> None:
         self.io = Outputs() if outputs is None else instance(outputs, Outputs, "outputs")
-        self._e1 = math.nan
+        self._e1: Floats = np.full(1, np.nan)
         self._q: Floats = np.zeros(7)
         self._tau: Floats = np.zeros(7)
         self._wrench: Floats = np.zeros(6)
@@ -238,19 +224,17 @@ class Output:
     @property
     def e1(self) -> float:
         """Target redundancy angle of the pose [rad]."""
-        return self._e1
+        return float(self._e1[0])
 
     @e1.setter
     def e1(self, value: float) -> None:
-        self._e1 = value if isinstance(value, float) else scalar(value, "out.e1")
+        self._e1[0] = value if isinstance(value, float) else scalar(value, "out.e1")
 
     @classmethod
-    def on(cls, q: Any, tau: Any, wrench: Any, outputs: Outputs | None = None) -> Output:
-        """Make an output on existing memory."""
+    def on(cls, words: Floats, outputs: Outputs) -> Output:
+        """Make an output on the words of `struct heptarm_command`, shape (28,)."""
         made = cls(outputs)
-        made._q, made._tau, made._wrench = (
-            np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench)
-        )
+        made._q, made._tau, made._wrench, made._pose, made._e1 = np.split(words, (7, 14, 20, 27))
         return made
 
 
@@ -619,16 +603,6 @@ def _commanded(numbers: Floats) -> Pose:
     return _pose(numbers)
 
 
-def information(full: Monitoring) -> tuple[int, ...]:
-    """Numbers of overlay, safety, operation mode, control mode, drive and multiplier of a message."""
-    robot, ipo = full.robot or RobotInfo(), full.ipo or IpoData()
-    drives = set(robot.drives)
-    drive = None if not drives else drives.pop() if len(drives) == 1 else DriveState.TRANSITIONING
-    multiplier = full.connection.multiplier if full.connection is not None else None
-    values = (ipo.overlay, robot.safety, robot.operation_mode, robot.control_mode, drive, multiplier)
-    return tuple(at.ABSENT if value is None else int(value) for value in values)
-
-
 @dataclass(frozen=True, slots=True)
 class Stats:
     """Counts, latency and jitter over all sessions of the client.
@@ -646,6 +620,7 @@ class Stats:
         filled: of those, made by the policy without a fresh command.
         limited: of those, limited by the guard.
         overruns: calls of the law that took longer than its time budget.
+        stale: commands that were not executed, because their sender had not seen the session.
         quality: number of messages by their quality.
         latency: time from receipt to answer [s]: median, 99 %, 99.9 %, longest.
         jitter: deviation from the send period [s]: median, 99 %, 99.9 %, longest.
@@ -663,6 +638,7 @@ class Stats:
     filled: int
     limited: int
     overruns: int
+    stale: int
     quality: dict[str, int]
     latency: tuple[float, ...]
     jitter: tuple[float, ...]
@@ -676,7 +652,8 @@ class Stats:
             f"{self.reordered} late, {self.malformed} malformed, {self.restarts} restarts",
             "answers": f"{self.answered} sent, {self.missed} missed; {self.commanded} commanded, "
             f"{self.filled} filled by the policy, {self.limited} limited by the guard"
-            + (f", {self.overruns} calls of the law over its time budget" if self.overruns else ""),
+            + (f", {self.overruns} calls of the law over its time budget" if self.overruns else "")
+            + (f", {self.stale} commands older than the session, not executed" if self.stale else ""),
             "quality": ", ".join(f"{name} {count}" for name, count in self.quality.items() if count),
             "latency": spread[0],
             "jitter": spread[1],
@@ -707,6 +684,7 @@ class Stats:
             filled=counts.filled,
             limited=counts.limited,
             overruns=layout.header[at.OVERRUNS],
+            stale=layout.header[at.STALE],
             quality={name: getattr(counts, name) for name in ("poor", "fair", "good", "excellent")},
             latency=(*latency.percentiles(*fractions), latency.longest),
             jitter=(*jitter.percentiles(*fractions), jitter.longest),

@@ -1,4 +1,4 @@
 """Wire format of FRI, versions 1.11 to 2.7, as pure functions of bytes.
 
-`messages` has the values, `codec` the strict codec for all messages, `fast_codec` the templates of the 1 kHz path.
+`messages` has the values, `codec` the controller's side of the codec; the client's side is native/fri_message.c.
 """

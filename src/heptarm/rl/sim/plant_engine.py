@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from heptarm.planning.command import TICK, Order
+from heptarm.planning.motion import TICK
+from heptarm.planning.seam import JointDynamics, ServoSmart, ServoTiming
 from heptarm.rl.sim.batch import Index
 from heptarm.rl.sim.simulation import GRAVITY, IMPEDANCE_DAMPING
 from heptarm.rl.task import ReachTask
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
@@ -69,9 +71,10 @@ class PlantEngine:
             mode, fraction = None, (self.fraction,) * 7
             if self._stiffness is not None:
                 mode = JointImpedance(float(self._stiffness[index]), damping=IMPEDANCE_DAMPING)
-            plant.submit(
-                Order(_SERVO, "servo", joint_velocity=fraction, joint_acceleration=fraction, mode=mode)
+            motion = ServoSmart(
+                timing=ServoTiming(), dynamics=JointDynamics(velocity=fraction, acceleration=fraction)
             )
+            plant.submit(MotionCommand(_SERVO, motion, mode=mode))
             self.plants[index : index + 1] = [plant]
             self._time[index] = 0.0
             self.q[index], self.dq[index] = start, 0.0

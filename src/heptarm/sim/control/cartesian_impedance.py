@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import joints
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.sim.control.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
 from heptarm.values.arrays import Array
 from heptarm.values.frames import BASE, TOOL

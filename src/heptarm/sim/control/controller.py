@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from heptarm.planning.command import Order
+from heptarm.planning.seam import HandGuide
 from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
 from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
 from heptarm.sim.control.laws import ControlLaw, JointImpedanceLaw, MeasuredState, PositionLaw, Superposition
@@ -13,7 +13,6 @@ from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
 from heptarm.values.mode.sine import SineImpedance
-from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
 
@@ -68,25 +67,30 @@ class ActiveLaw:
             self._flange.update()
             torque += self._flange.jacobian.T @ action.wrench
 
-    def take(self, order: Order) -> bool:
+    def take(self, mode: Mode | None, *, tcp: tuple[float, ...], axes: tuple[float, ...] | None) -> bool:
         """Switch to the law of a command's control mode.
+
+        Args:
+            mode: the mode; None: position control.
+            tcp: flange to motion frame, x y z [m], quaternion.
+            axes: of the mode's frame as a quaternion in the base; None: as in the mode.
 
         Returns:
             Whether it replaces a law under which the arm was compliant: the set-points then have to be reset to the
             measured position, or the new law would pull the arm back with a jerk.
         """
-        mode, was_compliant = order.mode, not self._law.is_stiff
+        was_compliant = not self._law.is_stiff
         if isinstance(mode, JointImpedance):
             if self.retune(mode):
                 return False
             self._law, self._frames = JointImpedanceLaw(self._robot, mode.stiffness, mode.damping), None
         elif isinstance(mode, CartesianImpedance | SineImpedance):
             frame = mode.base.frame if isinstance(mode, SineImpedance) else mode.frame
-            frames = (order.tcp, frame, order.axes)
+            frames = (tcp, frame, axes)
             if frames == self._frames and self.retune(mode):
                 return False
-            axes = None if order.axes is None else rotation(np.array(order.axes))
-            self._law = CartesianImpedanceLaw(mode, self._robot, self._flange, tcp=order.tcp, axes=axes)
+            turned = None if axes is None else rotation(np.array(axes))
+            self._law = CartesianImpedanceLaw(mode, self._robot, self._flange, tcp=tcp, axes=turned)
             self._frames = frames
         else:
             return self.stiffen()

@@ -11,14 +11,16 @@ from math import isnan
 
 import numpy as np
 
+from heptarm.planning.seam import HandGuide
 from heptarm.sim.control.cartesian_impedance import FlangeKinematics
-from heptarm.sim.control.laws import BRAKING, GUIDED, GUIDED_AXIS, STRICT, MeasuredState
+from heptarm.sim.control.laws import BRAKING, GUIDED, GUIDED_AXIS, MeasuredState
 from heptarm.values.arrays import Array
-from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.robot import RobotModel
 
 #: Decay rate of allowed velocities, so that the arm does not drift [1/s].
 CALM = 5.0
+#: Decay rate of excess velocities [1/s].
+STRICT = 600.0
 #: Highest speed limit of an axis, as a fraction of its maximum.
 ROOM = 0.9
 #: Fraction of an axis' acceleration assumed for stopping before a limit.
@@ -72,12 +74,12 @@ class HandGuidingLaw:
         self._ceiling = BRAKING * min(GUIDED[0] if isnan(along) else along, ceiling)
         self._slowing = 2.0 * RESERVE * robot.ddq_max
         self._inside = (low < q) & (q < high)
-        pulls = guide.outside == "pull"
+        pulls = guide.pulls_back
         # the limits of an axis that begins beyond its limit and may stay there follow it inwards
         self._floor: Array = low if pulls else np.minimum(low, q)
         self._roof: Array = high if pulls else np.maximum(high, q)
         self._back = -np.where(self._inside, RETURN, PULL)
-        self._freezes = guide.at_limit == "all"
+        self._freezes = guide.freezes_all
         self.is_frozen = False
 
     def torque(self, sensed: MeasuredState) -> Array:

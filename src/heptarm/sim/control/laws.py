@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.robot import RobotModel
 
@@ -36,7 +36,7 @@ RAMP = 0.05
 #: its maximum. Sunrise's own bounds are unknown; see docs/explanation/fidelity.md.
 GUIDED, GUIDED_AXIS = (0.25, 1.0), 0.5
 #: Fraction of such a bound at which braking begins, and the decay rate of velocities above that [1/s].
-BRAKING, STRICT = 0.9, 600.0
+BRAKING, STRICT = 0.8, 1000.0
 #: A joint of less stiffness can be guided by hand [Nm/rad], and its velocity decays at this rate [1/s].
 LEAST_STIFFNESS, CALM = 5.0, 10.0
 

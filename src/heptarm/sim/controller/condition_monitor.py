@@ -12,7 +12,9 @@ import numpy as np
 from heptarm.model.kinematics import flange
 from heptarm.planning import seam
 from heptarm.planning.jerk_profile import TimeLaw
+from heptarm.planning.motion import ServoMotion
 from heptarm.planning.plan import Plan
+from heptarm.sim.controller.command import ConditionWatch
 from heptarm.values.arrays import Array
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
@@ -139,7 +141,7 @@ class PathPoint:
         self.due = inf
         timing, lengths = plan.timing, plan.lengths
         if timing is None or lengths is None:
-            is_still = plan.order.kind == "hold" or plan.order.is_servo
+            is_still = isinstance(plan.motion, seam.Hold | ServoMotion)
             if not is_still and not (self.from_start and self.distance > 0):
                 self.due = max(0.0, self.delay)
             return
@@ -230,11 +232,11 @@ class ConditionMonitor:
         """Stop observing a condition."""
         self._observers = {key: one for key, one in self._observers.items() if key != number}
 
-    def begin(self, plan: Plan) -> tuple[WatchedCondition, ...]:
-        """The conditions to evaluate while a motion runs."""
+    def begin(self, plan: Plan, watches: Sequence[ConditionWatch]) -> tuple[WatchedCondition, ...]:
+        """The conditions to evaluate while a motion runs, of a command with this plan."""
         made = tuple(
             watched_condition(one.condition, _once(one.fired), breaks=one.breaks, part=one.part)
-            for one in plan.order.watches
+            for one in watches
         )
         for one in made:
             for point in one.points:

@@ -10,15 +10,16 @@ from typing import Protocol
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.planning.command import TICK, Order
 from heptarm.planning.jerk_profile import ProfileLimits, TimeLaw, brake
+from heptarm.planning.motion import TICK, ServoMotion
 from heptarm.planning.path import JointLine, JointPath
 from heptarm.planning.plan import Plan
-from heptarm.planning.seam import OperationMode
+from heptarm.planning.seam import HandGuide, Hold, OperationMode
 from heptarm.planning.table import MotionTable
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, Superposition
 from heptarm.sim.controller.ahead import SetPointsAhead
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstimate, WatchedCondition
 from heptarm.sim.controller.hand_guiding import GuidedMotion
 from heptarm.sim.controller.queue import Cancellation, MotionQueue
@@ -29,13 +30,13 @@ from heptarm.sim.controller.servo import (
     Follower,
     SmartFollower,
     StraightFollower,
+    braking_axes,
     follower,
 )
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode as ControlMode
-from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.robot import RobotModel
 
 
@@ -43,6 +44,7 @@ class RunningMotion:
     """The command that is being executed.
 
     Args:
+        command: what was commanded.
         planned: its plan.
         serial: its number among all accepted commands.
         watches: its conditions.
@@ -52,6 +54,7 @@ class RunningMotion:
         "braking",
         "broken",
         "cancelled",
+        "command",
         "ended",
         "failure",
         "follower",
@@ -72,7 +75,10 @@ class RunningMotion:
         "watches",
     )
 
-    def __init__(self, planned: Plan, serial: int, watches: tuple[WatchedCondition, ...]) -> None:
+    def __init__(
+        self, command: MotionCommand, planned: Plan, serial: int, watches: tuple[WatchedCondition, ...]
+    ) -> None:
+        self.command = command
         self.plan = planned
         self.serial = serial
         self.watches = watches
@@ -241,7 +247,7 @@ class Interpolator:
     @property
     def order(self) -> int:
         """Id of the running command, 0 if none."""
-        return 0 if self.run is None else self.run.plan.order.id
+        return 0 if self.run is None else self.run.command.id
 
     @property
     def interpolated(self) -> Array:
@@ -311,8 +317,8 @@ class Interpolator:
             return 0.0, nan
         if not run.started:
             run.started = True
-            if run.plan.order.listener is not None:
-                run.plan.order.listener.started()
+            if run.command.listener is not None:
+                run.command.listener.started()
         if self._control.violation:
             self._stop_at_limit(run, self._control.violation)
         return self._follow(run)
@@ -376,17 +382,18 @@ class Interpolator:
 
     def _next(self) -> RunningMotion | None:
         while (accepted := self.queue.take()) is not None:
-            order = accepted.order
-            if self._control.take(order):
+            command = accepted.command
+            if self._control.take(command.mode, tcp=command.tcp, axes=command.axes):
                 self._command.stay(self._q)
             planned = self.queue.planned(accepted, self._command.after)
             if planned is None:
                 continue
-            self.run = run = RunningMotion(planned, accepted.serial, self.condition_monitor.begin(planned))
-            if order.is_servo:
-                run.follower = follower(self._robot, order, self._command.after)
-            if order.guide is not None:
-                run.guided = self._guided(order, order.guide)
+            watches = self.condition_monitor.begin(planned, command.watches)
+            self.run = run = RunningMotion(command, planned, accepted.serial, watches)
+            if isinstance(command.motion, ServoMotion):
+                run.follower = follower(self._robot, command.motion, self._command.after, tcp=command.tcp)
+            if isinstance(command.motion, HandGuide):
+                run.guided = self._guided(command.motion, command.tcp)
             return run
         return None
 
@@ -409,7 +416,7 @@ class Interpolator:
         """Advance the speed override by one tick: overrides, pauses, stops, operation mode."""
         safety, goal = self._safety, self._goal
         if safety.mode is _T1 and self.run is not None:
-            tcp = self.run.plan.order.tcp[:3]
+            tcp = self.run.command.tcp[:3]
             self._speed_override.advance(
                 goal, self._command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp
             )
@@ -438,20 +445,25 @@ class Interpolator:
                 return nan, nan
         if run.follower is not None:
             return self._follow_targets(run, run.follower)
-        if self.action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
+        if (
+            self.action is not None
+            and isinstance(planned.motion, Hold)
+            and not (run.cancelled or run.failure)
+        ):
             self.is_overlaid = True
             self._command.after = self.action.q
             return 0.0, nan
         if self.is_overlaid:
-            self.is_overlaid = False
             self._halt(run)
+            if run.follower is not None:
+                return self._follow_targets(run, run.follower)
         step = TICK if run.braking else self._step(run)
         if run.table is not None and not run.braking and self._follow_ahead(run, run.table, step):
             s = run.place
             return (nan if run.failure else planned.progress(s, run.part)), planned.duration - run.time
         run.time += step
         if run.path is None or run.profile is None:
-            if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
+            if run.cancelled or run.time >= planned.duration or not isinstance(planned.motion, Hold):
                 run.ended = True
                 self._reach(run, 1.0)
             return min(1.0, run.time / planned.duration), planned.duration - run.time
@@ -523,7 +535,7 @@ class Interpolator:
 
     def _reach(self, run: RunningMotion, s: float) -> None:
         """Report the parts that have begun at s."""
-        marks, listener = run.plan.marks, run.plan.order.part_listener
+        marks, listener = run.plan.marks, run.command.part_listener
         while run.part < len(marks) and s >= marks[run.part]:
             run.part += 1
             if listener is not None:
@@ -560,7 +572,7 @@ class Interpolator:
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
             self.run = None
-            self.queue.close(run.plan.order, "error" if run.failure else cause, run.failure)
+            self.queue.close(run.command, "error" if run.failure else cause, run.failure)
         return (nan if run.cancelled or run.failure else 1.0), 0.0
 
     def _fail(self, run: RunningMotion, text: str) -> None:
@@ -569,7 +581,16 @@ class Interpolator:
         self._halt(run)
 
     def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
-        """Brake every axis by itself, in the direction of the present velocity."""
+        """Come to rest off the path: all axes together, in the direction of the present velocity.
+
+        The axes of an overlay have no path in common: each brakes as hard as it may, and as soon, as the guard of the
+        client expects. A jerk as gentle as that of a motion would take several degrees more.
+        """
+        if self.is_overlaid:
+            self.is_overlaid = False
+            run.follower = braking_axes(self._robot, self._command.after, self._command.speed, jerk=FAST_JERK)
+            run.braking, run.stop = True, None
+            return
         if run.guided is not None:
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
@@ -578,7 +599,7 @@ class Interpolator:
     def _cancel(self, cancellation: Cancellation) -> None:
         """Execute a cancellation."""
         run = self.run
-        if run is not None and cancellation.affects(run.serial, run.plan.order):
+        if run is not None and cancellation.affects(run.serial, run.command):
             (self._brake_fast if cancellation.fast else self._brake)(run)
         self.queue.drop(cancellation)
 
@@ -607,9 +628,9 @@ class Interpolator:
         if not self.is_overlaid:  # else the next tick brakes from the overlay's speed
             self._halt(run, jerk=FAST_JERK)
 
-    def _guided(self, order: Order, guide: HandGuide) -> GuidedMotion:
+    def _guided(self, guide: HandGuide, tcp: tuple[float, ...]) -> GuidedMotion:
         ceiling = REDUCED_SPEED if self._safety.mode is OperationMode.T1 else inf
-        law = self._control.guide(guide, self._q, tcp=order.tcp[:3], ceiling=ceiling)
+        law = self._control.guide(guide, self._q, tcp=tcp[:3], ceiling=ceiling)
         return GuidedMotion(law, self._robot)
 
     def _follow_hand(self, run: RunningMotion, guided: GuidedMotion) -> None:
@@ -639,9 +660,8 @@ class Interpolator:
 
     def _follow_targets(self, run: RunningMotion, follower: Follower) -> tuple[float, float]:
         """Move the set-point towards the newest target."""
-        target = self._inputs.target()
-        order = run.plan.order
-        if target is not None and target.order == order.id and not run.cancelled:
+        target, motion = self._inputs.target(), run.command.motion
+        if target is not None and target.order == run.command.id and not run.cancelled:
             follower.aim(target.q, target.dq)
         if not isinstance(follower, StraightFollower) and self._stops_axes(run, follower):
             return nan, follower.remaining
@@ -650,7 +670,10 @@ class Interpolator:
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return nan, nan
-        run.ended = follower.is_still if run.braking else follower.resting > order.servo_timing.goal_timeout
+        if run.braking:
+            run.ended = follower.is_still
+        elif isinstance(motion, ServoMotion):
+            run.ended = follower.resting > motion.timing.goal_timeout
         axis = self._command.beyond(there)
         if axis is not None:
             self._fail(run, f"Command Position violates limit A{axis + 1}")

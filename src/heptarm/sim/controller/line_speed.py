@@ -17,7 +17,7 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.velocity import NEAREST
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

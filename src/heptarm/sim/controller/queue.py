@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heptarm.planning.command import Order, PlanError
+from heptarm.planning.motion import PlanError
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
@@ -21,12 +22,12 @@ class QueuedMotion(NamedTuple):
 
     Attributes:
         serial: its number among all accepted commands.
-        order: the command.
+        command: the command.
         plan: from the end of the one before it; None: that end is not known.
     """
 
     serial: int
-    order: Order
+    command: MotionCommand
     plan: Plan | None
 
 
@@ -43,9 +44,9 @@ class Cancellation(NamedTuple):
     order_id: int | None
     fast: bool
 
-    def affects(self, serial: int, order: Order) -> bool:
+    def affects(self, serial: int, command: MotionCommand) -> bool:
         """Whether it cancels a command."""
-        return serial <= self.newest and self.order_id in (None, order.id)
+        return serial <= self.newest and self.order_id in (None, command.id)
 
 
 class MotionQueue:
@@ -82,7 +83,7 @@ class MotionQueue:
         """Whether the next tick has a cancellation to execute."""
         return bool(self._cancels)
 
-    def submit(self, order: Order) -> None:
+    def submit(self, command: MotionCommand) -> None:
         """Plan a command from the end of the queue and append it.
 
         While the arm brakes, its final position is not known; then the command is planned when its turn comes, and
@@ -95,14 +96,17 @@ class MotionQueue:
             with self._lock:
                 start = self._rest() if self._open == 0 else self._tail
                 cancels = self._cancel_count
-            planned = None if start is None else plan(self._robot, order, start)
+            planned = None if start is None else self._plan(command, start)
             with self._lock:
                 if cancels != self._cancel_count:
                     planned = None  # the end of the running motion is not known any more
                 self._tail = None if planned is None else planned.end
                 self._open += 1
                 self._serial += 1
-                self._inbox.append(QueuedMotion(self._serial, order, planned))
+                self._inbox.append(QueuedMotion(self._serial, command, planned))
+
+    def _plan(self, command: MotionCommand, start: Array) -> Plan:
+        return plan(self._robot, command.motion, start, tcp=command.tcp)
 
     def cancel(self, order_id: int | None, *, fast: bool) -> None:
         """Cancel a command (None: all) in the next tick."""
@@ -117,16 +121,16 @@ class MotionQueue:
 
     def drop(self, cancellation: Cancellation) -> None:
         """Drop the waiting commands that are cancelled."""
-        dropped: list[Order] = []
+        dropped: list[MotionCommand] = []
         with self._lock:
             for _ in range(len(self._inbox)):
                 one = self._inbox.popleft()
-                if cancellation.affects(one.serial, one.order):
-                    dropped.append(one.order)
+                if cancellation.affects(one.serial, one.command):
+                    dropped.append(one.command)
                 else:
                     self._inbox.append(one._replace(plan=None))
-        for order in dropped:
-            self.close(order, "cancelled", "")
+        for command in dropped:
+            self.close(command, "cancelled", "")
 
     def diverge(self) -> None:
         """Forget the planned end of the running command: it will end elsewhere."""
@@ -142,18 +146,18 @@ class MotionQueue:
         if one.plan is not None and float(np.abs(one.plan.start - here).max()) <= 1e-9:
             return one.plan
         try:
-            planned = plan(self._robot, one.order, here.copy())
+            planned = self._plan(one.command, here.copy())
         except PlanError as error:
-            self.close(one.order, "error", str(error))
+            self.close(one.command, "error", str(error))
             return None
         with self._lock:
             if one.serial == self._serial:
                 self._tail = planned.end
         return planned
 
-    def close(self, order: Order, cause: str, text: str) -> None:
+    def close(self, command: MotionCommand, cause: str, text: str) -> None:
         """Report the end of a command to its listener."""
         with self._lock:
             self._open -= 1
-        if order.listener is not None:
-            order.listener.finished(cause, text)
+        if command.listener is not None:
+            command.listener.finished(cause, text)

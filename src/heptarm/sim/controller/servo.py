@@ -16,15 +16,16 @@ from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError
 
 from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import forward
-from heptarm.planning.command import DEFAULT_TIMING, TICK, Order
 from heptarm.planning.geometry import Quat, product
-from heptarm.planning.seam import ServoTiming, StraightLimits
-from heptarm.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
+from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK, ServoMotion, fractions
+from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 
+#: Of a follower that only comes to rest.
+_NO_TIMING = ServoTiming()
 #: Position, velocity and acceleration.
 OtgState = tuple[Array, Array, Array]
 
@@ -166,15 +167,14 @@ class StraightServoLimits:
     timing: ServoTiming
 
     @staticmethod
-    def of(order: Order) -> StraightServoLimits:
-        """Limits of a command; defaults are those of a linear motion, and jerk scales with acceleration."""
+    def of(motion: ServoStraight) -> StraightServoLimits:
+        """Limits of a motion; defaults are those of a linear motion, and jerk scales with acceleration."""
         default = np.repeat((CARTESIAN_DEFAULT, ORIENTATION_DEFAULT), 3, axis=0).T
-        given = order.straight_limits or StraightLimits()
-        velocity = np.where(np.isnan(given.velocity), default[0], given.velocity)
-        acceleration = np.where(np.isnan(given.acceleration), default[1], given.acceleration)
-        axes = np.eye(3) if order.reference is None else rotation(order.reference)
+        velocity = np.where(np.isnan(motion.velocity), default[0], motion.velocity)
+        acceleration = np.where(np.isnan(motion.acceleration), default[1], motion.acceleration)
+        axes = np.eye(3) if motion.axes is None else rotation(motion.axes)
         return StraightServoLimits(
-            velocity, acceleration, acceleration * default[2] / default[1], axes, order.servo_timing
+            velocity, acceleration, acceleration * default[2] / default[1], axes, motion.timing
         )
 
     @property
@@ -207,20 +207,23 @@ class StraightFollower:
 
     Args:
         robot: the robot.
-        order: the servo motion.
+        motion: the servo motion.
         here: first set-point, at rest, shape (7,) [rad].
+        tcp: flange to motion frame, x y z [m], quaternion.
 
     Attributes:
         resting: time since the target was reached [s]; 0 while it is not.
     """
 
-    def __init__(self, robot: RobotModel, order: Order, here: Array) -> None:
-        tcp = Pose.of(order.tcp[:3], order.tcp[3:])
-        origin = Pose.from_matrix(forward(robot, here)) @ tcp
-        limits = self._limits = StraightServoLimits.of(order)
+    def __init__(
+        self, robot: RobotModel, motion: ServoStraight, here: Array, *, tcp: tuple[float, ...]
+    ) -> None:
+        frame = Pose.of(tcp[:3], tcp[3:])
+        origin = Pose.from_matrix(forward(robot, here)) @ frame
+        limits = self._limits = StraightServoLimits.of(motion)
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
-        self._inverse, self._a3 = PathInverse(robot, tcp), float(here[2])
+        self._inverse, self._a3 = PathInverse(robot, frame), float(here[2])
         self._q = here.copy()
         self._speed = np.zeros(7)  # of the axes, in the motion's own time
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
@@ -508,7 +511,7 @@ class ServoLimits:
         *,
         velocity: tuple[float, ...],
         acceleration: tuple[float, ...],
-        timing: ServoTiming = DEFAULT_TIMING,
+        timing: ServoTiming = _NO_TIMING,
     ) -> ServoLimits:
         """From fractions of a robot's limits, seven each; jerk scales with acceleration."""
         return ServoLimits(
@@ -681,6 +684,16 @@ class DirectFollower:
 Follower = SmartFollower | DirectFollower | StraightFollower
 
 
+def braking_axes(robot: RobotModel, here: Array, speed: Array, *, jerk: float = 1.0) -> SmartFollower:
+    """A follower whose axes brake, each by itself and as hard as it may; arguments as of `AxisStop`."""
+    limits = ServoLimits(
+        robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, _NO_TIMING
+    )
+    braking = SmartFollower(limits, here)
+    braking.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+    return braking
+
+
 class AxisStop:
     """Brakes every axis by itself: how a safety stop acts on a servo motion, which has no path to keep.
 
@@ -692,11 +705,7 @@ class AxisStop:
     """
 
     def __init__(self, robot: RobotModel, here: Array, speed: Array, *, jerk: float) -> None:
-        limits = ServoLimits(
-            robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, robot.q_min, robot.q_max, DEFAULT_TIMING
-        )
-        self._stop = SmartFollower(limits, here)
-        self._stop.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+        self._stop = braking_axes(robot, here, speed, jerk=jerk)
 
     @property
     def is_over(self) -> bool:
@@ -708,14 +717,14 @@ class AxisStop:
         return self._stop.advance(TICK)
 
 
-def follower(robot: RobotModel, order: Order, here: Array) -> Follower:
+def follower(robot: RobotModel, motion: ServoMotion, here: Array, *, tcp: tuple[float, ...]) -> Follower:
     """The follower of a servo motion that begins at rest, at a set-point of shape (7,) [rad]."""
-    if order.kind == "straight":
-        return StraightFollower(robot, order, here)
+    if isinstance(motion, ServoStraight):
+        return StraightFollower(robot, motion, here, tcp=tcp)
     limits = ServoLimits.of(
         robot,
-        velocity=order.joint_velocity,
-        acceleration=order.joint_acceleration,
-        timing=order.servo_timing,
+        velocity=fractions(motion.dynamics.velocity),
+        acceleration=fractions(motion.dynamics.acceleration),
+        timing=motion.timing,
     )
-    return (DirectFollower if order.kind == "direct" else SmartFollower)(limits, here)
+    return (DirectFollower if isinstance(motion, ServoDirect) else SmartFollower)(limits, here)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

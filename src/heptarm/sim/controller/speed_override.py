@@ -7,8 +7,8 @@ from math import inf
 import numpy as np
 
 from heptarm.model.kinematics import flange, jacobian
-from heptarm.planning.command import TICK
 from heptarm.planning.jerk_profile import JerkProfile, ProfileLimits, change
+from heptarm.planning.motion import TICK
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel

@@ -115,6 +115,7 @@ class Controller:
         meter: quality of the connection, its counts, latency and jitter.
         traffic: counts of datagrams.
         exchange: signals and frames.
+        said: the last message; None before the first one.
     """
 
     def __init__(self, configuration: SessionConfiguration, robot: RobotModel, *, epoch_ns: int = 0) -> None:
@@ -125,6 +126,7 @@ class Controller:
         self.meter = QualityMeter(configuration.receive_ms * TICK_NS)
         self.traffic = DatagramCounts()
         self.exchange = SessionIo(configuration)
+        self.said: m.Monitoring | None = None
         self._writer = MonitoringEncoder(configuration.version)
         self._robot = robot
         self._epoch = epoch_ns
@@ -456,6 +458,7 @@ class Controller:
             self.meter.asked(number // configuration.multiplier, now)
             self._ready += self.state is m.SessionState.MONITORING_READY
         self.traffic.sent += 1
+        self.said = message
         return self._writer.encode(message)
 
 

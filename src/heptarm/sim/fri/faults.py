@@ -12,7 +12,7 @@ from random import Random
 
 from heptarm.errors import LimitError
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.codec import decode_monitoring, encode_monitoring
+from heptarm.fri.protocol.codec import encode_monitoring
 from heptarm.fri.protocol.version import Version
 
 Span = tuple[float, float]
@@ -87,20 +87,19 @@ class FaultScenario:
         """The safety stop at a time [s], if there is one."""
         return next((stop for span, stop in self.stops if _within(span, elapsed)), None)
 
-    def sent(self, datagram: bytes, version: Version, elapsed: float) -> bytes:
-        """A monitoring datagram of a version as the cabinet sends it at a time [s]."""
+    def sent(self, datagram: bytes, message: m.Monitoring, elapsed: float) -> bytes:
+        """A monitoring datagram, and its message, as the cabinet sends it at a time [s]."""
         if self.version is None or not any(_within(span, elapsed) for span in self.strange):
             return datagram
-        return translate(datagram, version, self.version)
+        return translate(message, self.version)
 
 
 def _within(span: Span, time: float) -> bool:
     return span[0] <= time < span[1]
 
 
-def translate(datagram: bytes, version: Version, other: Version) -> bytes:
-    """A monitoring datagram as a cabinet of another version would send it, without fields that one lacks."""
-    message = decode_monitoring(datagram, version)
+def translate(message: m.Monitoring, other: Version) -> bytes:
+    """A monitoring message as a cabinet of another version would send it, without fields that one lacks."""
     traits = other.traits
     monitor, ipo = message.monitor or m.MonitorData(), message.ipo or m.IpoData()
     if not traits.quaternions:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.fri.protocol.messages import CommandMode
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 

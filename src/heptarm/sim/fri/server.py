@@ -27,12 +27,25 @@ PORTS = range(PORT, PORT + 10)
 
 Address = tuple[str, int]
 
+#: After so long without an answer, a client on this machine is looked for in the system's table of sockets [ns].
+DEAF = 1_000_000_000
+
 #: Largest number of datagrams that one tick reads, so that a flood cannot delay the plant.
 MOST = 64
 
 # Linux: the kernel time-stamps datagrams (SO_TIMESTAMPNS), so that latency is not rounded up to the next tick
 _STAMPS = 35 if sys.platform.startswith("linux") else None
 _STAMP = struct.Struct("@qq")
+
+
+def connected_to(port: int) -> int | None:
+    """The remote port of a connected UDP socket on a port of this machine; None: there is none, or it is not Linux."""
+    with contextlib.suppress(OSError), open("/proc/net/udp", encoding="ascii") as table:
+        for line in list(table)[1:]:
+            local, remote = (int(one.partition(":")[2], 16) for one in line.split()[1:3])
+            if local == port and remote:
+                return remote
+    return None
 
 
 def is_here(host: str) -> bool:
@@ -112,6 +125,7 @@ class Server:
         self._lock = threading.Lock()
         self._ticks = 0
         self._before = 0  # time of the last tick
+        self._deaf_at: int | None = DEAF if self._is_client_here else None
         self._refusals: list[Event] = []
         self._reported: set[str] = set()
         self.strangers = 0
@@ -165,11 +179,13 @@ class Server:
         now = self._ticks * TICK_NS if self._speed == 0.0 else round((wall - self._origin) * self._speed)
         with self._lock:
             self._listen(wall, now)
+            self._find_deaf_client(now)
             reading = self._reading(now)
             datagram = self.controller.tick(reading, now)
             if datagram is not None:
-                version = self.controller.configuration.version
-                self._there.send(self._scenario.sent(datagram, version, now * 1e-9), now)
+                said = self.controller.said
+                assert said is not None
+                self._there.send(self._scenario.sent(datagram, said, now * 1e-9), now)
             for message in self._there.arrived(now):
                 self._send(message)
             action = self.controller.superposition
@@ -205,6 +221,23 @@ class Server:
             self._back.send(datagram, self._arrival(ancillary, wall, now))
         for answer, at in self._back.taken(now):
             self.controller.receive(answer, at)
+
+    def _find_deaf_client(self, now: int) -> None:
+        """Name a client on this machine that hears another port than this one, as a KUKA application with a host does.
+
+        Its socket is connected to the port of a cabinet, which on one machine is its own; the system then drops every
+        message from here, and neither side sees an error.
+        """
+        if self._deaf_at is None or now < self._deaf_at:
+            return
+        self._deaf_at = None
+        heard = connected_to(self._client[1])
+        if self.controller.traffic.taken or heard is None or heard == self.port:
+            return
+        self._report(
+            f"the client on port {self._client[1]} only receives from port {heard}, and this cabinet sends from port "
+            f"{self.port}: start the client without the address of the cabinet (with the SDK's connect(port, NULL))"
+        )
 
     def _answers_from(self, address: Address) -> bool:
         """Whether an address is the client's, too: a client on this machine may answer from another one of its own."""

@@ -6,13 +6,15 @@ import logging
 import threading
 from collections.abc import Callable
 from itertools import count
+from math import nan
 
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, IoValue
 from heptarm.fri.protocol.version import Version
-from heptarm.planning.command import MotionListener, Order
+from heptarm.planning.seam import Hold
 from heptarm.sim.control.laws import Superposition
+from heptarm.sim.controller.command import MotionCommand, MotionListener
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.fri.io import IoImageSync, SessionSignal
 from heptarm.sim.fri.overlay import MotionOverlay, Reading, control_mode
@@ -80,7 +82,7 @@ class PlantArm:
     def hold(self, mode: Mode) -> None:
         """Hold the present position in a control mode, until `release`."""
         self._order, self._control = next(_numbers), control_mode(mode)
-        self.plant.submit(Order(self._order, "hold", mode=mode))
+        self.plant.submit(MotionCommand(self._order, Hold(duration=nan), mode=mode))
 
     def release(self) -> None:
         """End the hold; the arm rests in position control."""

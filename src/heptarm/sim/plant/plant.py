@@ -15,7 +15,7 @@ import numpy as np
 from heptarm._library import Unavailable
 from heptarm.model.inverse_kinematics import status_of
 from heptarm.model.kinematics import flange
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
-from enum import IntEnum
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from math import isnan
 from typing import Any, cast
@@ -24,7 +23,8 @@ import numpy as np
 from heptarm.errors import CommandRejected, HeptarmError, Unreachable
 from heptarm.model.inverse_kinematics import solve
 from heptarm.planning import seam
-from heptarm.planning.command import ConditionWatch, Order, PlanError, Seven
+from heptarm.planning.motion import PlanError
+from heptarm.sim.controller.command import ConditionWatch, MotionCommand
 from heptarm.sim.fri.io import SessionSignal
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.carried import CarriedShapes
@@ -34,8 +34,6 @@ from heptarm.values.frames import TOOL
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
 from heptarm.values.mode.sine import SineImpedance
-from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body
 from heptarm.values.shape import Shape, ShapeKind
@@ -47,7 +45,7 @@ _CALLS_AT_ONCE = 4
 
 
 class JavaListener:
-    """A Java listener as the plant's; see `heptarm.planning.command.PartListener`."""
+    """A Java listener as the plant's; see `heptarm.sim.controller.command.PartListener`."""
 
     __slots__ = ("_java",)
 
@@ -71,19 +69,12 @@ class JavaListener:
 
 
 def _keywords(value: Any) -> dict[str, Any]:
-    """Fields of a value of the seam by name: arrays as arrays, enumerations as words."""
+    """Fields of a value of the seam by name, arrays as arrays."""
     found = {name: getattr(value, name) for name in value.__slots__}
-    return {
-        name: one.name.lower()
-        if isinstance(one, IntEnum)
-        else np.array(one)
-        if isinstance(one, tuple)
-        else one
-        for name, one in found.items()
-    }
+    return {name: np.array(one) if isinstance(one, tuple) else one for name, one in found.items()}
 
 
-def mode_of(mode: seam.ImpedanceMode | None) -> tuple[Mode | None, Seven | None]:
+def mode_of(mode: seam.ImpedanceMode | None) -> tuple[Mode | None, tuple[float, ...] | None]:
     """A control mode, and the quaternion of its axes if they are fixed to the base."""
     if mode is None:
         return None, None
@@ -95,79 +86,29 @@ def mode_of(mode: seam.ImpedanceMode | None) -> tuple[Mode | None, Seven | None]
     return _cartesian(mode)
 
 
-def _cartesian(mode: seam.CartesianImpedance) -> tuple[CartesianImpedance, Seven | None]:
+def _cartesian(mode: seam.CartesianImpedance) -> tuple[CartesianImpedance, tuple[float, ...] | None]:
     given = _keywords(mode)
     axes = given.pop("axes")
     given["max_force_stops"] &= not np.isnan(mode.max_force).all()
     return CartesianImpedance(**given, frame=TOOL if axes is None else "reference"), mode.axes
 
 
-def _filled(values: Sequence[float], default: float) -> tuple[float, ...]:
-    """Numbers with a default for NaN."""
-    return tuple(default if isnan(value) else value for value in values)
-
-
-def _watches(order: seam.MotionOrder, fired: Callable[[int, bool, int], None]) -> tuple[ConditionWatch, ...]:
-    """Triggers, then break conditions: a condition that is both is reported before it ends the motion."""
-    lists = [(-1, False, order.triggers)]
-    lists += [(part, False, one.triggers) for part, one in enumerate(order.parts)]
-    lists += [(-1, True, order.breaks)]
-    return tuple(
-        ConditionWatch(condition, partial(fired, part, breaks, index), breaks, part)
-        for part, breaks, conditions in lists
-        for index, condition in enumerate(conditions)
-    )
-
-
-def _word(value: IntEnum | None, default: IntEnum) -> str:
-    return (default if value is None else value).name.lower()
-
-
-#: Fields of an order that are those of the message from Java, besides the ones that `order_of` converts.
-_SAME = tuple(
-    name
-    for name in (one.name for one in fields(Order))
-    if name in seam.MotionOrder.__slots__ and name not in ("kind", "redundancy", "blending", "parts", "mode")
-)
-
-
-def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
-    """The order of a motion.
+def command_of(order: seam.MotionOrder, java: Any) -> MotionCommand:
+    """The command of a motion.
 
     Args:
-        one: as Java describes it.
-        java: its listener; None for a part of another motion, which has the listener and conditions of the whole.
+        order: as Java describes it.
+        java: its listener.
     """
-    joints, path, blending = one.joint_dynamics, one.cartesian_dynamics, one.blending
-    relative, distance, angle = _filled((blending.relative, blending.distance, blending.angle), 0.0)
-    listener = None if java is None else JavaListener(java)
-    mode, axes = mode_of(one.mode)
-    return Order(
-        kind=one.kind.name.lower(),
-        orientation=Orientation(
-            _word(one.orientation_type, seam.OrientationType.VARIABLE),
-            _word(one.orientation_reference, seam.OrientationReference.BASE),
-        ),
-        redundancy=(one.redundancy.e1, one.redundancy.status, one.redundancy.turn),
-        joint_velocity=_filled(joints.velocity, 1.0),
-        joint_acceleration=_filled(joints.acceleration, 1.0),
-        joint_jerk=_filled(joints.jerk, 1.0),
-        cart_velocity=path.velocity,
-        cart_acceleration=path.acceleration,
-        cart_jerk=path.jerk,
-        ori_velocity=path.orientation_velocity,
-        ori_acceleration=path.orientation_acceleration,
-        ori_jerk=path.orientation_jerk,
-        blending=(relative, distance, angle),
-        parts=tuple(order_of(part) for part in one.parts),
-        guide=None if one.hand_guiding is None else HandGuide(**_keywords(one.hand_guiding)),
-        mode=mode,
-        axes=axes,
-        listener=listener,
-        watches=() if java is None else _watches(one, java.fired),
-        part_listener=listener,
-        **{name: getattr(one, name) for name in _SAME},
+    mode, axes = mode_of(order.mode)
+    listener = JavaListener(java)
+    watches = tuple(
+        ConditionWatch(
+            one.condition, partial(java.fired, one.part, one.breaks, one.index), one.breaks, one.part
+        )
+        for one in order.conditions
     )
+    return MotionCommand(order.id, order.motion, order.tcp, mode, axes, listener, listener, watches)
 
 
 # --------------------------------------------------------------------------------------------------------------- Java
@@ -227,7 +168,7 @@ class JavaPlant:
         """Plan and queue a motion; the text of a refusal, or None."""
         given = seam.MotionOrder.decode(bytes(order.encode()))
         try:
-            made = order_of(given, listener)
+            made = command_of(given, listener)
             overlay = given.fri_overlay
             if overlay is not None:
                 overlaid = self._sessions.overlaid(
@@ -294,7 +235,7 @@ class JavaPlant:
             found = solve(
                 self._plant.robot,
                 Pose.of(place[:3], place[3:]),
-                e1=float(e1),
+                e1=None if isnan(e1) else float(e1),
                 status=int(status),
                 near=_numbers(near),
             )

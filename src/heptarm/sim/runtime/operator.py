@@ -16,7 +16,7 @@ from collections.abc import Callable
 from itertools import count
 from typing import TYPE_CHECKING
 
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.planning.seam import OperationMode
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.shared_state import NEVER

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.planning.command import TICK
+from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.plant import Plant

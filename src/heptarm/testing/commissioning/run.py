@@ -20,7 +20,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.state import OperationMode
 
 #: Modules of this package with steps, in the order in which they run: what does not move comes first.
-GROUPS = ("sunrise", "sensors", "dynamics", "contact", "drives", "safety", "fri")
+GROUPS = ("sunrise", "sensors", "dynamics", "redundancy", "contact", "drives", "safety", "fri")
 #: At home the joints are within this [rad].
 _AT_HOME = 1e-3
 #: Longest approach to the home position [s].

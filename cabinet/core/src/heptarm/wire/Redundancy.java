@@ -3,7 +3,7 @@ package heptarm.wire;
 
 /** KUKA's redundancy of an LBR pose. */
 public final class Redundancy {
-    /** arm angle; NaN: keep the current one [rad] */
+    /** E1, the angle of A3; NaN: keep the current one [rad] */
     public final double e1;
     /** -1: keep */
     public final int status;

@@ -213,7 +213,7 @@ public final class Move implements Cloneable {
         return copy;
     }
 
-    /** Set the redundancy at the end: arm angle E1 [rad], status and turn. */
+    /** Set the redundancy at the end: E1 (the angle of A3) [rad], status and turn. */
     public Move redundancy(double e1, int status, int turn) {
         Move copy = copy();
         copy.redundancy = new Redundancy(e1, status, turn);

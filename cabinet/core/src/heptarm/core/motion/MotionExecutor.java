@@ -193,22 +193,31 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
         end(chosen, Cause.CANCELLED, "");
     }
 
-    public void stop(StopKind kind) {
+    /**
+     * Stop the arm.
+     *
+     * @param author who stops it, such as "by panel at 10.0.0.5"
+     * @return whether a motion was ended by that
+     */
+    public boolean stop(StopKind kind, String author) {
+        String why = "stopped " + author;
         if (kind == StopKind.AFTER_MOTION) {
             List<Program> waiting;
             synchronized (this) {
                 waiting = new ArrayList<Program>(queue);
                 queue.clear();
             }
-            end(waiting, Cause.STOPPED, "stopped by command");
-            return;
+            end(waiting, Cause.STOPPED, why);
+            return !waiting.isEmpty();
         }
-        endAll(Cause.STOPPED, "stopped by command");
+        List<Program> ended = take(0);
+        end(ended, Cause.STOPPED, why);
         if (kind == StopKind.FAST) {
             port.stopFast();
         } else {
             port.stop();
         }
+        return !ended.isEmpty();
     }
 
     public void endAll(Cause cause, String why) {

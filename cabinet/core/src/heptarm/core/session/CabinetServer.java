@@ -38,8 +38,9 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         this.frames = new FrameEncoder(clock);
         this.identity = new CabinetIdentity(settings, robot, service.tools, service.authority);
         this.dispatcher = new RequestDispatcher(service.authority, service.commands, service.sampler, settings.maxRate, log);
-        this.reception = new Reception(settings, frames, this, log);
-        this.places = new Places(service.authority);
+        int room = OpenFiles.room();
+        this.reception = new Reception(settings, frames, this, room, log);
+        this.places = new Places(service.authority, room);
         this.datagrams = new DatagramPort(log);
         service.events.add(this);
         if (settings.reservedFor.length() > 0) {
@@ -123,7 +124,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
 
     public void halt(StopKind kind, String who) {
         log.info(who + " stops the arm, without a session");
-        service.executor.stop(kind);
+        service.commands.stop(kind, "from " + who + ", without a session", true);
     }
 
     /** Sends an event to every open session. */

@@ -184,6 +184,11 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         return writeBegan;
     }
 
+    /** Its address without the port. */
+    String host() {
+        return socket.getInetAddress().getHostAddress();
+    }
+
     String address() {
         return String.valueOf(socket.getRemoteSocketAddress());
     }

@@ -1,6 +1,7 @@
 package heptarm.core.session;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.Log;
 import heptarm.core.checks.ProgramChecks;
 import heptarm.core.motion.FriMonitors;
 import heptarm.core.motion.MotionExecutor;
@@ -27,7 +28,9 @@ import heptarm.wire.ServoOpen;
 import heptarm.wire.ServoPose;
 import heptarm.wire.ServoSettings;
 import heptarm.wire.SetOverride;
+import heptarm.wire.Severity;
 import heptarm.wire.Stop;
+import heptarm.wire.StopKind;
 import heptarm.wire.Violation;
 
 /** Executes commands for the robot, wherever they come from: checks them, then hands them to the part that is responsible. */
@@ -39,9 +42,10 @@ public final class CommandHandler {
     private final ToolTable tools;
     private final ProgramChecks checks;
     private final PanelRequests panel;
+    private final Log log;
 
     CommandHandler(Robot robot, MotionExecutor executor, FriMonitors monitors, SafetyMonitor safety, ToolTable tools,
-            ProgramChecks checks, PanelRequests panel) {
+            ProgramChecks checks, PanelRequests panel, Log log) {
         this.robot = robot;
         this.executor = executor;
         this.monitors = monitors;
@@ -49,6 +53,7 @@ public final class CommandHandler {
         this.tools = tools;
         this.checks = checks;
         this.panel = panel;
+        this.log = log;
     }
 
     /** Check the ranges of a command's fields and execute it; returns its id, 0 if it has none. */
@@ -66,11 +71,27 @@ public final class CommandHandler {
         }
     }
 
+    /**
+     * Stop the arm; who ended motions of others is named on the smartPAD, and in the log.
+     *
+     * @param author such as "by panel at 10.0.0.5"
+     * @param isForeign it is another one than the controller
+     */
+    void stop(StopKind kind, String author, boolean isForeign) {
+        if (!executor.stop(kind, author)) {
+            return;
+        }
+        log.info("the arm was stopped " + author);
+        if (isForeign) {
+            robot.panel.show(Severity.WARNING.value(), "heptarm: the arm was stopped " + author);
+        }
+    }
+
     /** Execute a command whose fields are in range; returns its answer. */
     Message answer(Message message) throws CommandRejected {
         long id = 0;
         if (message instanceof Stop) {
-            executor.stop(((Stop) message).kind);
+            stop(((Stop) message).kind, "by the program in the cabinet", false);
         } else if (message instanceof Run) {
             checks.check((Run) message);
             safety.checkReady();

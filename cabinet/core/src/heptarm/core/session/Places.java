@@ -15,24 +15,31 @@ import heptarm.wire.Code;
  * comes. So nobody who fills all places shuts out the one who has to act.
  */
 final class Places implements Watchdog.Check {
-    private static final int OBSERVERS = 100;
-    private static final int GUESTS = 100;
+    private static final int MOST = 100;
     private static final long GUEST_NS = 2000000000L;
-    /** With more clients than this, those that are ending included, a guest goes without a Goodbye. */
-    private static final int CROWD = 2 * (OBSERVERS + GUESTS);
-
     final List<ClientConnection> clients = new CopyOnWriteArrayList<ClientConnection>();
     /** Guests, and the machine's time from which on they are guests [ns]. */
     private final Map<ClientConnection, Long> guests = new ConcurrentHashMap<ClientConnection, Long>();
     private final ControlAuthority authority;
+    /** Most observers, and as many guests. */
+    private final int most;
+    /** With more clients than this, those that are ending included, a guest goes without a Goodbye. */
+    private final int crowd;
 
-    Places(ControlAuthority authority) {
+    /**
+     * Places for clients.
+     *
+     * @param room connections for which there is room; they take at most half of it
+     */
+    Places(ControlAuthority authority, int room) {
         this.authority = authority;
+        most = Math.max(2, Math.min(MOST, room / 8));
+        crowd = 4 * most;
     }
 
     /** Add a client; for one thread. */
     void add(ClientConnection client) {
-        if (observers() >= OBSERVERS) {
+        if (observers() >= most) {
             makeRoom();
             guests.put(client, System.nanoTime());
         }
@@ -53,11 +60,11 @@ final class Places implements Watchdog.Check {
                 since = guest.getValue();
             }
         }
-        if (guests.size() < GUESTS || oldest == null) {
+        if (guests.size() < most || oldest == null) {
             return;
         }
         guests.remove(oldest);
-        if (clients.size() < CROWD) {
+        if (clients.size() < crowd) {
             dismiss(oldest);
         } else {
             oldest.leave("too many clients");
@@ -84,7 +91,7 @@ final class Places implements Watchdog.Check {
         for (Map.Entry<ClientConnection, Long> guest : guests.entrySet()) {
             if (authority.isController(guest.getKey())) {
                 guest.setValue(now); // it is a guest again when it releases control
-            } else if (observers() < OBSERVERS) {
+            } else if (observers() < most) {
                 guests.remove(guest.getKey());
             } else if (now - guest.getValue() > GUEST_NS) {
                 dismiss(guest.getKey());
@@ -92,8 +99,8 @@ final class Places implements Watchdog.Check {
         }
     }
 
-    private static void dismiss(ClientConnection client) {
-        client.goodbye(Code.TOO_MANY_CLIENTS, OBSERVERS + " clients observe already; others have " + GUEST_NS / 1000000000L
+    private void dismiss(ClientConnection client) {
+        client.goodbye(Code.TOO_MANY_CLIENTS, most + " clients observe already; others have " + GUEST_NS / 1000000000L
                 + " s to take control or to stop the arm");
     }
 }

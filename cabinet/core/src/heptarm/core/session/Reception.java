@@ -38,6 +38,8 @@ final class Reception {
     private final FrameEncoder frames;
     private final Host host;
     private final Log log;
+    /** Most connections without a session. */
+    private final int mostWaiting;
     private final List<Newcomer> waiting = new ArrayList<Newcomer>();
     private final List<Newcomer> displaced = new ArrayList<Newcomer>();
     private final List<Newcomer> halting = new ArrayList<Newcomer>();
@@ -55,11 +57,12 @@ final class Reception {
         void halt(StopKind kind, String who);
     }
 
-    Reception(ServerSettings settings, FrameEncoder frames, Host host, Log log) {
+    Reception(ServerSettings settings, FrameEncoder frames, Host host, int room, Log log) {
         this.settings = settings;
         this.frames = frames;
         this.host = host;
         this.log = log;
+        mostWaiting = Math.max(4, Math.min(MAX_WAITING, room / 4));
     }
 
     /** Open the port; returns it. */
@@ -161,14 +164,18 @@ final class Reception {
                 oldest = oldest == null ? one : oldest;
             }
         }
-        if (count < MAX_OF_ADDRESS && waiting.size() < MAX_WAITING) {
+        if (count < mostOfAddress() && waiting.size() < mostWaiting) {
             return;
         }
-        if (count < MAX_OF_ADDRESS) {
+        if (count < mostOfAddress()) {
             oldest = waiting.get(0);
         }
         waiting.remove(oldest);
         displaced.add(oldest);
+    }
+
+    private int mostOfAddress() {
+        return Math.min(MAX_OF_ADDRESS, 3 * mostWaiting / 4);
     }
 
     // ------------------------------------------------------------------------------------------- receiving

@@ -15,6 +15,7 @@ import heptarm.wire.Rejected;
 import heptarm.wire.ReleaseControl;
 import heptarm.wire.SessionState;
 import heptarm.wire.SessionTransitions;
+import heptarm.wire.Stop;
 import heptarm.wire.Subscribe;
 import heptarm.wire.TakeControl;
 import heptarm.wire.WireException;
@@ -100,7 +101,7 @@ final class RequestDispatcher {
                 return;
             }
             CommandHandler.validate(message);
-            commands.answer(message);
+            answer(client, message);
         } catch (WireException e) { // its tag is right: a client with a defect
             log.warn("a datagram of " + client.name() + " with message " + type + ": " + e.getMessage());
         } catch (CommandRejected e) { // the same request over TCP is answered
@@ -123,6 +124,8 @@ final class RequestDispatcher {
                                 + " Hz; ask for less, raise the process data heptarm.max_rate, or use FRI");
             }
             sampler.subscribe(client, request.groups, request.rate);
+        } else if (message instanceof Stop) {
+            commands.stop(((Stop) message).kind, "by " + client.name() + " at " + client.host(), !authority.isController(client));
         } else if (message instanceof TakeControl) {
             TakeControl request = (TakeControl) message;
             authority.take(client, request.watchdog, request.on_lost);

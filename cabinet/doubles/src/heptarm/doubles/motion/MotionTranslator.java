@@ -1,9 +1,11 @@
 package heptarm.doubles.motion;
 
+import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 
 import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
+import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.deviceModel.StatusTurnRedundancy;
@@ -18,47 +20,57 @@ import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
 import com.kuka.roboticsAPI.motionModel.Motion;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
-import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 
-import heptarm.doubles.seam.Blending;
-import heptarm.doubles.seam.CartesianDynamics;
+import heptarm.doubles.seam.Condition;
 import heptarm.doubles.seam.FriOverlay;
+import heptarm.doubles.seam.MotionCondition;
 import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.Pose;
 import heptarm.doubles.seam.Redundancy;
 
-/** Translates motions of the Sunrise API (mm) into orders for the plant (SI). */
+/** Translates motions of the Sunrise API (mm) into those of the plant (SI): each motion describes itself with it. */
 public final class MotionTranslator {
     private static final double MM = 1e-3;
 
-    private MotionTranslator() {
+    private final ObjectFrame motionFrame;
+    private final LBR robot;
+
+    private MotionTranslator(ObjectFrame motionFrame, LBR robot) {
+        this.motionFrame = motionFrame;
+        this.robot = robot;
     }
 
     /** The order for a motion of a frame on the robot. */
     public static MotionOrder of(long id, IMotion motion, ObjectFrame moved, LBR robot) {
+        MotionOrder order = new MotionOrder();
+        order.id = id;
+        order.motion = new MotionTranslator(moved, robot).described(motion);
+        order.tcp = pose(robot.getFlange().transformationTo(moved));
+        if (motion instanceof RobotMotion) {
+            RobotMotion<?> whole = (RobotMotion<?>) motion;
+            order.conditions = conditions(whole, robot);
+            order.friOverlay = overlay(whole.overlay());
+            order.mode = ControlModeTranslator.of(whole.getMode(), moved, robot);
+        }
+        return order;
+    }
+
+    private PlantMotion described(IMotion motion) {
         if (!(motion instanceof Motion)) {
             throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + motion.getClass().getName());
         }
-        MotionOrder order = new MotionOrder();
-        order.id = id;
-        ((Motion<?>) motion).describe(order, moved, robot);
-        order.tcp = pose(robot.getFlange().transformationTo(moved));
-        List<? extends RobotMotion<?>> parts = parts(motion);
-        order.parts = new MotionOrder[parts.size()];
-        for (int i = 0; i < order.parts.length; i++) {
-            order.parts[i] = of(id, parts.get(i), moved, robot);
-            parametrize(order.parts[i], (RobotMotion<?>) motion); // what a part leaves open
-            if (order.parts[i].breaks.length > 0) {
+        return ((Motion<?>) motion).describe(this);
+    }
+
+    /** The motions of a batch, or the segments of a spline. */
+    public PlantMotion[] parts(List<? extends RobotMotion<?>> parts) {
+        for (RobotMotion<?> one : parts) {
+            if (!one.breakConditions().isEmpty()) {
                 throw new IllegalArgumentException("break conditions of single parts are not supported: set them on the whole batch or spline");
             }
         }
-        if (motion instanceof RobotMotion) {
-            parametrize(order, (RobotMotion<?>) motion);
-            order.breaks = AbstractCondition.translate(((RobotMotion<?>) motion).breakConditions(), robot);
-            order.triggers = AbstractCondition.translate(((RobotMotion<?>) motion).triggerConditions(), robot);
-            overlay(order, ((RobotMotion<?>) motion).overlay());
-            order.mode = ControlModeTranslator.of(((RobotMotion<?>) motion).getMode(), moved, robot);
-        }
-        return order;
+        return parts.stream().map(this::described).toArray(PlantMotion[]::new);
     }
 
     /** Motions of a batch, segments of a spline; none of others. */
@@ -66,40 +78,65 @@ public final class MotionTranslator {
         return motion instanceof Motion ? ((Motion<?>) motion).parts() : List.of();
     }
 
-    /** Sets the parameters that have not been set yet. */
-    private static void parametrize(MotionOrder order, RobotMotion<?> motion) {
-        fill(order.jointDynamics.velocity, motion.jointDynamics().velocity);
-        fill(order.jointDynamics.acceleration, motion.jointDynamics().acceleration);
-        fill(order.jointDynamics.jerk, motion.jointDynamics().jerk);
-        Blending blending = order.blending;
-        blending.relative = first(blending.relative, motion.blending().relative);
-        blending.distance = first(blending.distance, motion.blending().distance);
-        blending.angle = first(blending.angle, motion.blending().angle);
-        if (motion instanceof SplineMotionCP) {
-            SplineMotionCP<?> path = (SplineMotionCP<?>) motion;
-            CartesianDynamics into = order.cartesianDynamics;
-            CartesianDynamics from = path.cartesianDynamics();
-            into.velocity = first(into.velocity, from.velocity);
-            into.acceleration = first(into.acceleration, from.acceleration);
-            into.jerk = first(into.jerk, from.jerk);
-            into.orientationVelocity = first(into.orientationVelocity, from.orientationVelocity);
-            into.orientationAcceleration = first(into.orientationAcceleration, from.orientationAcceleration);
-            into.orientationJerk = first(into.orientationJerk, from.orientationJerk);
-            order.orientationType = order.orientationType == null ? path.orientationType() : order.orientationType;
-            order.orientationReference =
-                    order.orientationReference == null ? path.orientationReference() : order.orientationReference;
-        }
+    public LBR robot() {
+        return robot;
     }
 
-    private static void fill(double[] gaps, double[] values) {
-        for (int i = 0; i < gaps.length; i++) {
-            gaps[i] = first(gaps[i], values[i]);
-        }
+    public ObjectFrame motionFrame() {
+        return motionFrame;
     }
 
-    /** The first number that was set. */
-    private static double first(double value, double other) {
-        return Double.isNaN(value) ? other : value;
+    /** Whether a frame is fixed to the flange; null is not. */
+    public boolean isOnFlange(AbstractFrame frame) {
+        for (AbstractFrame one = frame; one != null; one = one.getParent()) {
+            if (one == robot.getFlange()) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    /** Pose of a frame in the base. */
+    public Pose pose(AbstractFrame frame) {
+        return place(frame.transformationFromWorld());
+    }
+
+    /** A transformation in the plant's terms. */
+    public static Pose place(ITransformation any) {
+        double[] numbers = pose(any);
+        Pose place = new Pose();
+        place.xyz = Arrays.copyOfRange(numbers, 0, 3);
+        place.quat = Arrays.copyOfRange(numbers, 3, 7);
+        return place;
+    }
+
+    /** Redundancy of a frame. */
+    public Redundancy redundancy(AbstractFrame frame) {
+        return redundancy(frame, robot);
+    }
+
+    /** Triggers, then break conditions: one that is both is reported before it ends the motion. */
+    private static MotionCondition[] conditions(RobotMotion<?> whole, LBR robot) {
+        List<MotionCondition> found = new ArrayList<>();
+        add(found, whole.triggerConditions(), false, -1, robot);
+        List<? extends RobotMotion<?>> parts = whole.parts();
+        for (int i = 0; i < parts.size(); i++) {
+            add(found, parts.get(i).triggerConditions(), false, i, robot);
+        }
+        add(found, whole.breakConditions(), true, -1, robot);
+        return found.toArray(new MotionCondition[0]);
+    }
+
+    private static void add(List<MotionCondition> to, List<ICondition> conditions, boolean breaks, int part, LBR robot) {
+        Condition[] translated = AbstractCondition.translate(conditions, robot);
+        for (int i = 0; i < translated.length; i++) {
+            MotionCondition one = new MotionCondition();
+            one.condition = translated[i];
+            one.breaks = breaks;
+            one.part = part;
+            one.index = i;
+            to.add(one);
+        }
     }
 
     /** Quaternion of a frame's axes in the base; null: of none. */
@@ -112,20 +149,17 @@ public final class MotionTranslator {
         return Arrays.copyOfRange(pose(from.transformationTo(frame)), 3, 7);
     }
 
-    private static void overlay(MotionOrder order, IMotionOverlay overlay) {
-        if (overlay instanceof FRIJointOverlay) {
-            order.friOverlay = new FriOverlay();
-            order.friOverlay.session = ((FRIJointOverlay) overlay).session().number();
-            order.friOverlay.command = ((FRIJointOverlay) overlay).mode().ordinal();
-        } else if (overlay != null) {
+    private static FriOverlay overlay(IMotionOverlay overlay) {
+        if (overlay == null) {
+            return null;
+        }
+        if (!(overlay instanceof FRIJointOverlay)) {
             throw new IllegalArgumentException("the virtual cabinet has no overlay " + overlay.getClass().getName());
         }
-    }
-
-    /** Set the target of an order to a frame. */
-    public static void target(MotionOrder order, AbstractFrame frame, LBR robot) {
-        order.pose = pose(frame.transformationFromWorld());
-        order.redundancy = redundancy(frame, robot);
+        FriOverlay made = new FriOverlay();
+        made.session = ((FRIJointOverlay) overlay).session().number();
+        made.command = ((FRIJointOverlay) overlay).mode().ordinal();
+        return made;
     }
 
     /** Redundancy of a frame. */

@@ -51,7 +51,7 @@ public interface Plant {
     /**
      * Inverse kinematics: the joint positions [rad] nearest to others that reach a flange pose in the base; null if there are none.
      *
-     * @param e1 arm angle [rad]; NaN: any
+     * @param e1 the angle of A3 [rad]; NaN: any
      * @param status status of the posture; -1: any
      */
     double[] inverse(double[] pose, double e1, int status, double[] near);

@@ -3,18 +3,18 @@ package heptarm.doubles.seam;
 
 import heptarm.wire.Encoder;
 
-/** Where a motion may blend into its successor; NaN: not given. */
+/** Where a motion may blend into its successor; NaN: as the batch, otherwise 0. */
 public final class Blending {
     /** Fraction of the path */
     public double relative = Double.NaN;
     /** To the end of the path [m] */
     public double distance = Double.NaN;
     /** To the final orientation [rad] */
-    public double angle = Double.NaN;
+    public double orientation = Double.NaN;
 
     void write(Encoder out) {
         out.putF64(relative);
         out.putF64(distance);
-        out.putF64(angle);
+        out.putF64(orientation);
     }
 }

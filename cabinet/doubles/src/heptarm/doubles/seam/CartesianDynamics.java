@@ -3,7 +3,7 @@ package heptarm.doubles.seam;
 
 import heptarm.wire.Encoder;
 
-/** Largest values on a Cartesian path; NaN: not given. */
+/** Largest values on a Cartesian path; NaN: those of the spline, otherwise the default. */
 public final class CartesianDynamics {
     /** [m/s] */
     public double velocity = Double.NaN;

@@ -3,7 +3,7 @@ package heptarm.doubles.seam;
 
 import heptarm.wire.Encoder;
 
-/** Fractions of each axis' maximum; NaN: not given. */
+/** Fractions of each axis' maximum; NaN: those of the batch or spline, otherwise 1. */
 public final class JointDynamics {
     public double[] velocity = Seam.missing(7);
     public double[] acceleration = Seam.missing(7);

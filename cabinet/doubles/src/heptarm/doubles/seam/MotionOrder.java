@@ -3,114 +3,36 @@ package heptarm.doubles.seam;
 
 import heptarm.wire.Encoder;
 
-/** One motion with all its parameters. */
+/** A motion, and under what terms it is executed. */
 public final class MotionOrder {
     /** Unique, chosen by Java */
     public long id;
-    public MotionKind kind = MotionKind.PTP;
-    /** Target of a ptp; none: the pose is the target [rad] */
-    public double[] joints;
-    /** Target of the motion frame in the base */
-    public double[] pose;
-    /** Auxiliary point of a circ, as the pose */
-    public double[] via;
-    public Redundancy redundancy = new Redundancy();
-    /** None: variable */
-    public OrientationType orientationType;
-    /** None: base */
-    public OrientationReference orientationReference;
-    public Blending blending = new Blending();
-    public JointDynamics jointDynamics = new JointDynamics();
-    public CartesianDynamics cartesianDynamics = new CartesianDynamics();
+    public PlantMotion motion;
     /** Motion frame seen from the flange */
     public double[] tcp = new double[7];
-    /** Of a lin_rel, in the axes of the reference */
-    public double[] offset;
-    /** Quaternion of an offset's axes (none: those of the motion frame) or of straight servo limits (none: those of the base) */
-    public double[] reference;
-    /** Of a hold; NaN: until cancelled [s] */
-    public double duration = Double.NaN;
     /** None: position control */
     public ImpedanceMode mode;
-    public ServoTiming servoTiming = new ServoTiming();
-    public StraightLimits straightLimits;
-    public HandGuiding handGuiding;
     public FriOverlay friOverlay;
-    /** Break conditions */
-    public Condition[] breaks = new Condition[0];
-    /** Conditions of triggers */
-    public Condition[] triggers = new Condition[0];
-    /** Motions of a batch, segments of a spline */
-    public MotionOrder[] parts = new MotionOrder[0];
+    /** A condition that is both comes first as a trigger */
+    public MotionCondition[] conditions = new MotionCondition[0];
 
     void write(Encoder out) {
         out.putI64(id);
-        out.putU8(kind.value());
-        out.putBool(joints != null);
-        if (joints != null) {
-            out.putF64s(joints, 7);
-        }
-        out.putBool(pose != null);
-        if (pose != null) {
-            out.putF64s(pose, 7);
-        }
-        out.putBool(via != null);
-        if (via != null) {
-            out.putF64s(via, 7);
-        }
-        redundancy.write(out);
-        out.putBool(orientationType != null);
-        if (orientationType != null) {
-            out.putU8(orientationType.value());
-        }
-        out.putBool(orientationReference != null);
-        if (orientationReference != null) {
-            out.putU8(orientationReference.value());
-        }
-        blending.write(out);
-        jointDynamics.write(out);
-        cartesianDynamics.write(out);
+        out.putU8(motion.tag());
+        motion.write(out);
         out.putF64s(tcp, 7);
-        out.putBool(offset != null);
-        if (offset != null) {
-            out.putF64s(offset, 7);
-        }
-        out.putBool(reference != null);
-        if (reference != null) {
-            out.putF64s(reference, 4);
-        }
-        out.putF64(duration);
         out.putBool(mode != null);
         if (mode != null) {
             out.putU8(mode.tag());
             mode.write(out);
         }
-        servoTiming.write(out);
-        out.putBool(straightLimits != null);
-        if (straightLimits != null) {
-            straightLimits.write(out);
-        }
-        out.putBool(handGuiding != null);
-        if (handGuiding != null) {
-            handGuiding.write(out);
-        }
         out.putBool(friOverlay != null);
         if (friOverlay != null) {
             friOverlay.write(out);
         }
-        out.putCount(breaks.length);
-        for (int i = 0; i < breaks.length; i++) {
-            out.putU8(breaks[i].tag());
-            breaks[i].write(out);
-        }
-        out.putCount(triggers.length);
-        for (int i = 0; i < triggers.length; i++) {
-            out.putU8(triggers[i].tag());
-            triggers[i].write(out);
-        }
-        out.putCount(parts.length);
-        for (int i = 0; i < parts.length; i++) {
-            parts[i].write(out);
+        out.putCount(conditions.length);
+        for (int i = 0; i < conditions.length; i++) {
+            conditions[i].write(out);
         }
     }
 

@@ -5,11 +5,11 @@ import heptarm.wire.Encoder;
 
 /** Which arm posture reaches a pose. */
 public final class Redundancy {
-    /** Arm angle; NaN: keep [rad] */
+    /** E1, the angle of A3; NaN: keep the current one [rad] */
     public double e1 = Double.NaN;
     /** -1: keep */
     public int status = -1;
-    /** -1: keep */
+    /** -1: not given */
     public int turn = -1;
 
     void write(Encoder out) {

@@ -4,7 +4,7 @@ import com.kuka.common.params.IParameterSet;
 
 import heptarm.doubles.runtime.ParameterList;
 
-/** Redundancy of an LBR: arm angle E1 [rad], Status and Turn. */
+/** Redundancy of an LBR: E1, which is the angle of A3 [rad], Status and Turn. */
 public class LBRE1Redundancy extends StatusTurnRedundancy {
     private double e1;
 

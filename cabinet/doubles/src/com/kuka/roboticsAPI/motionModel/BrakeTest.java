@@ -2,13 +2,12 @@ package com.kuka.roboticsAPI.motionModel;
 
 import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeState;
 import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeTestResult;
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionContainer;
+import heptarm.doubles.motion.MotionTranslator;
 import heptarm.doubles.runtime.Station;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.Hold;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm rests; its brakes hold the axis' maximum torque. */
 public class BrakeTest extends RobotMotion<BrakeTest> {
@@ -39,8 +38,9 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.HOLD;
-        order.duration = SECONDS;
+    public PlantMotion describe(MotionTranslator to) {
+        Hold motion = new Hold();
+        motion.duration = SECONDS;
+        return motion;
     }
 }

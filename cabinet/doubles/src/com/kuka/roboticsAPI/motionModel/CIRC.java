@@ -1,12 +1,10 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionTranslator;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.Circ;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Arc of a circle through an auxiliary point. */
 public class CIRC extends SplineMotionCP<CIRC> {
@@ -23,9 +21,15 @@ public class CIRC extends SplineMotionCP<CIRC> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.CIRC;
-        order.via = MotionTranslator.pose(auxiliary.transformationFromWorld());
-        MotionTranslator.target(order, destination, robot);
+    public PlantMotion describe(MotionTranslator to) {
+        Circ motion = new Circ();
+        motion.via = to.pose(auxiliary);
+        motion.end = to.pose(destination);
+        motion.redundancy = to.redundancy(destination);
+        motion.dynamics = cartesianDynamics();
+        motion.joints = jointDynamics();
+        motion.orientation = orientation();
+        motion.blending = blending();
+        return motion;
     }
 }

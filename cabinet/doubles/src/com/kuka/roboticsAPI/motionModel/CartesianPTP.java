@@ -1,12 +1,10 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionTranslator;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.PtpPose;
 
 /** Point to point, to a frame. */
 public class CartesianPTP extends SplineMotionJP<CartesianPTP> {
@@ -21,8 +19,12 @@ public class CartesianPTP extends SplineMotionJP<CartesianPTP> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.PTP;
-        MotionTranslator.target(order, destination, robot);
+    public PlantMotion describe(MotionTranslator to) {
+        PtpPose motion = new PtpPose();
+        motion.target = to.pose(destination);
+        motion.redundancy = to.redundancy(destination);
+        motion.dynamics = jointDynamics();
+        motion.blending = blending();
+        return motion;
     }
 }

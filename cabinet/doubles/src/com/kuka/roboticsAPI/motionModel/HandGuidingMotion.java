@@ -2,14 +2,9 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.Arrays;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-
-import heptarm.doubles.seam.AtLimit;
-import heptarm.doubles.seam.HandGuiding;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
-import heptarm.doubles.seam.OutsideLimit;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.HandGuide;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released. */
 public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
@@ -112,27 +107,21 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return setJointLimitViolationFreezesAll(all);
     }
 
-    /** The limits in the plant's terms. */
-    private HandGuiding settings() {
-        HandGuiding settings = new HandGuiding();
+    @Override
+    public PlantMotion describe(MotionTranslator to) {
+        HandGuide motion = new HandGuide();
         for (int i = 0; i < AXES; i++) {
             if (enabled[i] && !(lowest[i] < highest[i])) {
                 throw new IllegalArgumentException("the lower limit of A" + (i + 1) + " must be below the upper limit, got "
                         + lowest[i] + " and " + highest[i] + " rad");
             }
-            settings.qMin[i] = enabled[i] ? lowest[i] : Double.NaN;
-            settings.qMax[i] = enabled[i] ? highest[i] : Double.NaN;
+            motion.qMin[i] = enabled[i] ? lowest[i] : Double.NaN;
+            motion.qMax[i] = enabled[i] ? highest[i] : Double.NaN;
         }
-        settings.jointVelocity = jointVelocity;
-        settings.cartesianVelocity = MM * cartesianVelocity;
-        settings.atLimit = freezes ? AtLimit.ALL : AtLimit.AXIS;
-        settings.outside = pulls ? OutsideLimit.PULL : OutsideLimit.FREE;
-        return settings;
-    }
-
-    @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.GUIDE;
-        order.handGuiding = settings();
+        motion.jointVelocity = jointVelocity;
+        motion.cartesianVelocity = MM * cartesianVelocity;
+        motion.freezesAll = freezes;
+        motion.pullsBack = pulls;
+        return motion;
     }
 }

@@ -1,12 +1,10 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionTranslator;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.Lin;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Straight line to a frame. */
 public class LIN extends SplineMotionCP<LIN> {
@@ -21,8 +19,14 @@ public class LIN extends SplineMotionCP<LIN> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.LIN;
-        MotionTranslator.target(order, destination, robot);
+    public PlantMotion describe(MotionTranslator to) {
+        Lin motion = new Lin();
+        motion.target = to.pose(destination);
+        motion.redundancy = to.redundancy(destination);
+        motion.dynamics = cartesianDynamics();
+        motion.joints = jointDynamics();
+        motion.orientation = orientation();
+        motion.blending = blending();
+        return motion;
     }
 }

@@ -2,10 +2,8 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Base of motions; {@code T} is the motion's own type, so that setters chain. */
 public abstract class Motion<T extends Motion<T>> implements IMotion {
@@ -20,8 +18,8 @@ public abstract class Motion<T extends Motion<T>> implements IMotion {
         return getClass().getSimpleName();
     }
 
-    /** Write the kind of this motion and its own parameters into an order for the plant, in SI; for the simulation. */
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+    /** This motion in the plant's terms, in SI; for the simulation. */
+    public PlantMotion describe(MotionTranslator to) {
         throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + getClass().getName());
     }
 

@@ -2,11 +2,9 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.Batch;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Motions commanded together; settings of the batch apply to those motions that have none of their own. */
 public class MotionBatch extends RobotMotion<MotionBatch> {
@@ -29,7 +27,11 @@ public class MotionBatch extends RobotMotion<MotionBatch> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.BATCH;
+    public PlantMotion describe(MotionTranslator to) {
+        Batch motion = new Batch();
+        motion.motions = to.parts(motions);
+        motion.dynamics = jointDynamics();
+        motion.blending = blending();
+        return motion;
     }
 }

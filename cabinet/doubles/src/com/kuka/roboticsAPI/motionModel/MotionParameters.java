@@ -24,7 +24,7 @@ public final class MotionParameters {
         }
         text = motion.getClass().getSimpleName() + ", joint velocity " + Arrays.toString(joints.velocity) + ", acceleration "
                 + Arrays.toString(joints.acceleration) + ", jerk " + Arrays.toString(joints.jerk) + ", blending "
-                + blending.relative + ", " + blending.distance / MM + " mm, " + blending.angle + " rad" + cartesian;
+                + blending.relative + ", " + blending.distance / MM + " mm, " + blending.orientation + " rad" + cartesian;
     }
 
     @Override

@@ -1,11 +1,10 @@
 package com.kuka.roboticsAPI.motionModel;
 
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.Ptp;
 
 /** Point to point, to joint positions. */
 public class PTP extends SplineMotionJP<PTP> {
@@ -20,8 +19,11 @@ public class PTP extends SplineMotionJP<PTP> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.PTP;
-        order.joints = destination.get();
+    public PlantMotion describe(MotionTranslator to) {
+        Ptp motion = new Ptp();
+        motion.q = destination.get();
+        motion.dynamics = jointDynamics();
+        motion.blending = blending();
+        return motion;
     }
 }

@@ -2,12 +2,11 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.concurrent.TimeUnit;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.Hold;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Holds the position for a time; -1: until cancelled; 0: it ends at once. */
 public class PositionHold extends RobotMotion<PositionHold> {
@@ -26,8 +25,9 @@ public class PositionHold extends RobotMotion<PositionHold> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.HOLD;
-        order.duration = seconds;
+    public PlantMotion describe(MotionTranslator to) {
+        Hold motion = new Hold();
+        motion.duration = seconds;
+        return motion;
     }
 }

@@ -1,14 +1,12 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
 import heptarm.doubles.motion.MotionTranslator;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.LinRel;
+import heptarm.doubles.seam.PlantMotion;
 
 /** Straight line relative to the pose of the motion frame at the start. */
 public class RelativeLIN extends SplineMotionCP<RelativeLIN> {
@@ -30,17 +28,20 @@ public class RelativeLIN extends SplineMotionCP<RelativeLIN> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.LIN_REL;
-        order.offset = MotionTranslator.pose(offset);
-        order.reference = MotionTranslator.axes(reference);
-        for (AbstractFrame one = reference; one != null; one = one.getParent()) {
-            if (one == robot.getFlange()) { // it moves with the arm, which will be elsewhere when the motion runs: use the motion frame's axes
-                Transformation to = motionFrame.transformationTo(reference);
-                Transformation turn = Transformation.ofRad(0, 0, 0, to.getAlphaRad(), to.getBetaRad(), to.getGammaRad());
-                order.offset = MotionTranslator.pose(turn.compose(offset).compose(turn.invert()));
-                order.reference = null;
-            }
+    public PlantMotion describe(MotionTranslator to) {
+        LinRel motion = new LinRel();
+        if (to.isOnFlange(reference)) { // it moves with the arm, which will be elsewhere when the motion runs: use the motion frame's axes
+            Transformation seen = to.motionFrame().transformationTo(reference);
+            Transformation turn = Transformation.ofRad(0, 0, 0, seen.getAlphaRad(), seen.getBetaRad(), seen.getGammaRad());
+            motion.offset = MotionTranslator.place(turn.compose(offset).compose(turn.invert()));
+        } else {
+            motion.offset = MotionTranslator.place(offset);
+            motion.axes = MotionTranslator.axes(reference);
         }
+        motion.dynamics = cartesianDynamics();
+        motion.joints = jointDynamics();
+        motion.orientation = orientation();
+        motion.blending = blending();
+        return motion;
     }
 }

@@ -64,7 +64,7 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     }
 
     public T setBlendingOri(double radians) {
-        blending.angle = notNegative("blendingOri", radians);
+        blending.orientation = notNegative("blendingOri", radians);
         return self();
     }
 

@@ -1,12 +1,10 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionTranslator;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.Spl;
 
 /** Curved segment of a spline, to a frame. */
 public class SPL extends SplineMotionCP<SPL> {
@@ -21,8 +19,12 @@ public class SPL extends SplineMotionCP<SPL> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.SPL;
-        MotionTranslator.target(order, destination, robot);
+    public PlantMotion describe(MotionTranslator to) {
+        Spl motion = new Spl();
+        motion.target = to.pose(destination);
+        motion.dynamics = cartesianDynamics();
+        motion.joints = jointDynamics();
+        motion.orientation = orientation();
+        return motion;
     }
 }

@@ -2,11 +2,8 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.PlantMotion;
 
 /** A Cartesian spline block: segments without a stop between them. */
 public class Spline extends SplineMotionCP<Spline> {
@@ -25,7 +22,12 @@ public class Spline extends SplineMotionCP<Spline> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.SPLINE;
+    public PlantMotion describe(MotionTranslator to) {
+        heptarm.doubles.seam.Spline motion = new heptarm.doubles.seam.Spline();
+        motion.segments = to.parts(segments);
+        motion.dynamics = cartesianDynamics();
+        motion.joints = jointDynamics();
+        motion.orientation = orientation();
+        return motion;
     }
 }

@@ -2,11 +2,9 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.JointSpline;
+import heptarm.doubles.seam.PlantMotion;
 
 /** A spline block in joint space. */
 public class SplineJP extends SplineMotionJP<SplineJP> {
@@ -25,7 +23,10 @@ public class SplineJP extends SplineMotionJP<SplineJP> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.kind = MotionKind.SPLINE_JOINTS;
+    public PlantMotion describe(MotionTranslator to) {
+        JointSpline motion = new JointSpline();
+        motion.points = to.parts(segments);
+        motion.dynamics = jointDynamics();
+        return motion;
     }
 }

@@ -1,6 +1,7 @@
 package com.kuka.roboticsAPI.motionModel;
 
 import heptarm.doubles.seam.CartesianDynamics;
+import heptarm.doubles.seam.Orientation;
 import heptarm.doubles.seam.OrientationReference;
 import heptarm.doubles.seam.OrientationType;
 
@@ -57,24 +58,17 @@ public abstract class SplineMotionCP<T extends SplineMotionCP<T>> extends RobotM
         return dynamics;
     }
 
-    /** Null: not set; for the simulation. */
-    public OrientationType orientationType() {
-        if (type == null) {
-            return null;
-        }
-        return switch (type) {
+    /** For the simulation. */
+    public Orientation orientation() {
+        Orientation orientation = new Orientation();
+        orientation.type = type == null ? null : switch (type) {
             case Variable -> OrientationType.VARIABLE;
             case Constant -> OrientationType.CONSTANT;
             case Ignore -> OrientationType.IGNORE;
             case OriJoint -> OrientationType.JOINT;
         };
-    }
-
-    /** Null: not set; for the simulation. */
-    public OrientationReference orientationReference() {
-        if (reference == null) {
-            return null;
-        }
-        return reference == OrientationReferenceSystem.Path ? OrientationReference.PATH : OrientationReference.BASE;
+        orientation.reference = reference == null ? null
+                : reference == OrientationReferenceSystem.Path ? OrientationReference.PATH : OrientationReference.BASE;
+        return orientation;
     }
 }

@@ -2,11 +2,10 @@ package com.kuka.connectivity.motionModel.directServo;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotionJP;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.ServoDirect;
 
 /** Moves directly to each destination; destinations must be close and smooth. */
 public class DirectServo extends ServoMotionJP<DirectServo> {
@@ -31,8 +30,10 @@ public class DirectServo extends ServoMotionJP<DirectServo> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        super.describe(order, motionFrame, robot);
-        order.kind = MotionKind.DIRECT;
+    public PlantMotion describe(MotionTranslator to) {
+        ServoDirect motion = new ServoDirect();
+        motion.timing = timing();
+        motion.dynamics = jointDynamics();
+        return motion;
     }
 }

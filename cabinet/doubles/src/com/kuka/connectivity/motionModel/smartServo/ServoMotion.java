@@ -3,12 +3,10 @@ package com.kuka.connectivity.motionModel.smartServo;
 import java.util.concurrent.TimeUnit;
 
 import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
 import heptarm.doubles.motion.ServoRuntime;
-import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.ServoTiming;
 
 /** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
@@ -86,9 +84,9 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         return accepted;
     }
 
-    @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        order.servoTiming = timing;
+    /** For the simulation. */
+    protected final ServoTiming timing() {
+        return timing;
     }
 
     /** The cabinet has accepted the motion; for the simulation. */

@@ -1,11 +1,10 @@
 package com.kuka.connectivity.motionModel.smartServo;
 
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.ServoSmart;
 
 /** Plans a limited trajectory to each destination, far or near. The start position must be the current one. */
 public class SmartServo extends ServoMotionJP<SmartServo> {
@@ -30,8 +29,10 @@ public class SmartServo extends ServoMotionJP<SmartServo> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        super.describe(order, motionFrame, robot);
-        order.kind = MotionKind.SERVO;
+    public PlantMotion describe(MotionTranslator to) {
+        ServoSmart motion = new ServoSmart();
+        motion.timing = timing();
+        motion.dynamics = jointDynamics();
+        return motion;
     }
 }

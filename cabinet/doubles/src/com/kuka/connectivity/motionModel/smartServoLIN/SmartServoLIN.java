@@ -1,14 +1,13 @@
 package com.kuka.connectivity.motionModel.smartServoLIN;
 
+import java.util.Arrays;
+
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
-import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionTranslator;
-import heptarm.doubles.seam.MotionKind;
-import heptarm.doubles.seam.MotionOrder;
-import heptarm.doubles.seam.StraightLimits;
+import heptarm.doubles.seam.PlantMotion;
+import heptarm.doubles.seam.ServoStraight;
 
 /** Follows destinations on straight lines. The start frame must be the current pose of the motion frame. */
 public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
@@ -16,11 +15,18 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
     private static final double MM = 1e-3;
 
     private final AbstractFrame start;
-    private final StraightLimits limits = new StraightLimits();
+    private final double[] velocity = unset();
+    private final double[] acceleration = unset();
     private AbstractFrame reference;
 
     public SmartServoLIN(AbstractFrame start) {
         this.start = start;
+    }
+
+    private static double[] unset() {
+        double[] limits = new double[2 * AXES];
+        Arrays.fill(limits, Double.NaN);
+        return limits;
     }
 
     /** Frame along whose axes the limits apply; default: the world. */
@@ -31,25 +37,25 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
 
     /** Along x, y, z [mm/s]. */
     public SmartServoLIN setMaxTranslationVelocity(double[] millimetresPerSecond) {
-        return limit("maxTranslationVelocity", millimetresPerSecond, limits.velocity, 0, MM);
+        return limit("maxTranslationVelocity", millimetresPerSecond, velocity, 0, MM);
     }
 
     /** Along x, y, z [mm/s²]. */
     public SmartServoLIN setMaxTranslationAcceleration(double[] millimetresPerSecondSquared) {
-        return limit("maxTranslationAcceleration", millimetresPerSecondSquared, limits.acceleration, 0, MM);
+        return limit("maxTranslationAcceleration", millimetresPerSecondSquared, acceleration, 0, MM);
     }
 
     /** About x, y, z [rad/s]. */
     public SmartServoLIN setMaxOrientationVelocity(double[] radiansPerSecond) {
-        return limit("maxOrientationVelocity", radiansPerSecond, limits.velocity, AXES, 1.0);
+        return limit("maxOrientationVelocity", radiansPerSecond, velocity, AXES, 1.0);
     }
 
     /** About x, y, z [rad/s²]. */
     public SmartServoLIN setMaxOrientationAcceleration(double[] radiansPerSecondSquared) {
-        return limit("maxOrientationAcceleration", radiansPerSecondSquared, limits.acceleration, AXES, 1.0);
+        return limit("maxOrientationAcceleration", radiansPerSecondSquared, acceleration, AXES, 1.0);
     }
 
-    /** Has no effect: the simulated arm keeps its arm angle, so it does not move in the null space. */
+    /** Has no effect: the simulated arm keeps A3, so it does not move in the null space. */
     public SmartServoLIN setMaxNullSpaceVelocity(double velocity) {
         positive("maxNullSpaceVelocity", velocity);
         return this;
@@ -88,10 +94,12 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
     }
 
     @Override
-    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
-        super.describe(order, motionFrame, robot);
-        order.kind = MotionKind.STRAIGHT;
-        order.straightLimits = limits;
-        order.reference = MotionTranslator.axes(reference);
+    public PlantMotion describe(MotionTranslator to) {
+        ServoStraight motion = new ServoStraight();
+        motion.timing = timing();
+        motion.velocity = velocity;
+        motion.acceleration = acceleration;
+        motion.axes = MotionTranslator.axes(reference);
+        return motion;
     }
 }

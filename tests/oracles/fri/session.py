@@ -1,52 +1,19 @@
-"""State machine of a client's session: it tracks state, quality, counters and lost messages."""
+"""State machine of a client's session, in Python: what native/fri_session.c has to do."""
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.fast_codec import MonitoringReader, Sample
-from heptarm.fri.protocol.protobuf import MalformedMessage, read_varint
+from heptarm.fri.protocol.protobuf import MalformedMessage
 from heptarm.fri.protocol.version import Version, recognise, spoken_version
-from heptarm.fri.session.answers import NOTHING, Answers, Setpoint
+from heptarm.fri.session.events import Event, Kind
 from heptarm.fri.session.statistics import Counters, Histogram
 from heptarm.values.robot import ROBOTS
 
-
-class Kind(enum.Enum):
-    """Subject of an event."""
-
-    STATE = "state"
-    QUALITY = "quality"
-    VERSION = "version"
-    WRONG_VERSION = "wrong version"
-    MALFORMED = "malformed"
-    LOST = "lost"
-    DUPLICATED = "duplicated"
-    REORDERED = "reordered"
-    RESTARTED = "restarted"
-    COMMAND_MODE = "command mode"
-    SAFETY = "safety"
-    NO_IPO = "no interpolator position"
-    CLIENT = "client"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Event of a session.
-
-    Attributes:
-        kind: subject.
-        text: description.
-        at: time of the client's clock [ns].
-    """
-
-    kind: Kind
-    text: str
-    at: int
-
+from .answers import NOTHING, Answers, Setpoint
+from .sample import Sample, sample_of
 
 #: Largest decrease of the counter that counts as a reordered message; a larger one is a restart of the controller.
 MAX_REORDERED = 64
@@ -116,15 +83,20 @@ class Session:
         latency: Histogram | None = None,
         jitter: Histogram | None = None,
         positions: Positions | None = None,
+        fastest: Sequence[float] | None = None,
     ) -> None:
         self._configured = version
         low, high = positions or widest()
         self.low, self.high = [value - OVERRUN for value in low], [value + OVERRUN for value in high]
+        self.fastest = fastest or [
+            max(float(one.dq_max[i]) for one in ROBOTS.values()) for i in range(m.JOINTS)
+        ]
         self.counters = counters or Counters()
         self.latency = latency or Histogram()
         self.jitter = jitter or Histogram()
         self.sent = 0  # counter of the next answer
         self._events: list[Event] = []
+        self.publish: Callable[[Event], None] = self._events.append
         self.restart()
 
     def restart(self) -> None:
@@ -139,9 +111,8 @@ class Session:
         self.trouble = "no message received from a controller yet"
         self.received = 0  # time of the last message
         self.waiting = 0  # messages since the last answer
-        self.reflected = -1  # counter of the last answer that the controller has received
+        self.reflected = self.sent - 1  # newest answer of this session that the controller has received
         self._safety: m.Safety | None = None
-        self._reader: MonitoringReader | None = None
         self._answers: Answers | None = None
 
     @property
@@ -191,7 +162,7 @@ class Session:
             if link.quality is not self.quality:
                 self._report(Kind.QUALITY, f"quality {self.quality.name} -> {link.quality.name}", now)
                 self.quality = link.quality
-        self._detect_changes(sample, datagram, now)
+        self._detect_changes(sample, now)
         self.sample, self.received, self.trouble = sample, now, ""
         if self.state is not m.SessionState.IDLE:
             self.waiting += 1
@@ -250,7 +221,7 @@ class Session:
             self.trouble = trouble
             self._report(Kind.WRONG_VERSION, trouble, now)
 
-    def _check_plausible(self, sample: Sample) -> None:
+    def _check_plausible(self, sample: Sample, now: int) -> None:
         """Check what an answer may send back: positions and poses that the robot can have.
 
         Raises:
@@ -258,6 +229,7 @@ class Session:
         """
         if sample.q is not None and not math.isfinite(sum(sample.q)):
             raise ImplausibleMessage("FRI message: joint positions must be finite; the datagram is damaged")
+        self._check_periods(sample, now)
         for name, values in (("interpolated", sample.q_ipo), ("commanded", sample.q_cmd)):
             if values is None:
                 continue
@@ -268,7 +240,8 @@ class Session:
                         f"{high - OVERRUN:.4g}] rad, got {value:.4g} rad: the datagram is damaged, or the client's "
                         "model is another robot"
                     )
-        ipo = sample.message.ipo if sample.is_full else None
+        self._check_reach(sample, now)
+        ipo = sample.message.ipo
         if (
             ipo is None or ipo.command_mode is not m.CommandMode.CARTESIAN_POSE
         ):  # only then is a pose sent back
@@ -280,7 +253,7 @@ class Session:
             ):
                 raise ImplausibleMessage(
                     f"FRI message: the interpolated pose must be within {MAX_COORDINATE:g} mm with a quaternion of "
-                    f"norm 1, got {ipo.pose.values}: the datagram is damaged"
+                    f"norm 1, got ({', '.join(f'{v:g}' for v in ipo.pose.values)}): the datagram is damaged"
                 )
         if ipo.redundancy is not None and not abs(ipo.redundancy.value) <= math.tau:
             raise ImplausibleMessage(
@@ -288,25 +261,68 @@ class Session:
                 f"{ipo.redundancy.value:.4g} rad: the datagram is damaged"
             )
 
+    def _check_periods(self, sample: Sample, now: int) -> None:
+        """Check the periods, which never change in a session."""
+        link, last = sample.connection, self.sample
+        if link is None:
+            return
+        for name, unit, value in (
+            ("send period", " ms", link.period_ms),
+            ("receive multiplier", "", link.multiplier),
+        ):
+            if value is not None and value > 100:
+                raise ImplausibleMessage(
+                    f"FRI message: the {name} must be in [1, 100]{unit}, got {value}{unit}: the datagram is damaged"
+                )
+        idle = m.SessionState.IDLE
+        if last is None or idle in (self.state, link.state) or now - self.received > MAX_GAP:
+            return
+        if (sample.sequence - last.sequence) % _WRAP >= _WRAP // 2:
+            return
+        period, multiplier = link.period_ms or 0, max(1, link.multiplier or 1)
+        if (period * 1_000_000, multiplier) != (self.period, self.multiplier):
+            raise ImplausibleMessage(
+                f"FRI message: the session has {self.period // 1_000_000} ms and {self.multiplier} messages per answer, "
+                f"got {period} ms and {multiplier}: the datagram is damaged"
+            )
+
+    def _check_reach(self, sample: Sample, now: int) -> None:
+        """Check that the interpolator can have moved so far since the last message in which commands count."""
+        last, link, ipo = self.sample, sample.connection, sample.q_ipo
+        if last is None or last.q_ipo is None or ipo is None or link is None:
+            return
+        waiting, steps = m.SessionState.COMMANDING_WAIT, (sample.sequence - last.sequence) % _WRAP
+        if self.state < waiting or link.state < waiting or steps >= _WRAP // 2:
+            return
+        elapsed = now - self.received
+        if steps <= 1000:
+            elapsed = max(elapsed, steps * self.period)
+        time = 1e-9 * (elapsed + self.period)
+        for axis, (new, old, fastest) in enumerate(zip(ipo, last.q_ipo, self.fastest, strict=True), 1):
+            if abs(new - old) > 1.5 * fastest * time + 0.01:
+                raise ImplausibleMessage(
+                    f"FRI message: the interpolated position of A{axis} moved by {abs(new - old):.4g} rad within "
+                    f"{time:.4g} s, which no axis can: the datagram is damaged"
+                )
+
     def _read(self, datagram: bytes, now: int) -> Sample:
-        if self._reader is None:
+        if self.version is None:
             sample = self._begin(datagram, now)
         else:
             try:
-                sample = self._reader.read(datagram)
+                sample = sample_of(datagram, self.version)
             except MalformedMessage:
                 # the controller may have started another application with another version
                 if self._configured is not None or recognise(datagram) is self.version:
                     raise
                 sample = self._begin(datagram, now)
-        self._check_plausible(sample)
+        self._check_plausible(sample, now)
         return sample
 
     def _begin(self, datagram: bytes, now: int) -> Sample:
         """Read the first datagram; find or check its version."""
         version = recognise(datagram) if self._configured is None else self._configured
-        reader = MonitoringReader(version)
-        sample = reader.read(datagram)
+        sample = sample_of(datagram, version)
         full = sample.message
         monitor, ipo = full.monitor or m.MonitorData(), full.ipo or m.IpoData()
         spoken = None
@@ -321,7 +337,7 @@ class Session:
             )
         if version is not self.version:
             self._report(Kind.VERSION, f"the controller speaks FRI {version.value}", now)
-        self.version, self._reader, self._answers = version, reader, Answers(version)
+        self.version, self._answers = version, Answers(version)
         return sample
 
     def _count(self, sample: Sample, now: int) -> bool:
@@ -349,7 +365,7 @@ class Session:
             self._report(Kind.REORDERED, f"message {sample.sequence} received after {last.sequence}", now)
             return False
         counts.restarts += 1
-        self.reflected, self.waiting = -1, 0
+        self.reflected, self.waiting = self.sent - 1, 0
         self._report(
             Kind.RESTARTED, f"the controller's counter restarts at {sample.sequence}: a new session", now
         )
@@ -361,46 +377,22 @@ class Session:
             self._report(Kind.STATE, f"{self.state.name} -> {state.name}", now)
             self.state = state
 
-    def _detect_changes(self, sample: Sample, datagram: bytes, now: int) -> None:
+    def _detect_changes(self, sample: Sample, now: int) -> None:
         """Detect a change of command mode or safety state, and answers that the controller missed."""
-        reflected = reflected_in(datagram, framed=bool(self.version and self.version.traits.framed))
-        if 0 <= self.reflected < reflected <= self.sent:
+        reflected = sample.message.header.reflected
+        if self.reflected < reflected <= self.sent:
             self.counters.missed += reflected - self.reflected - 1
-        self.reflected = reflected
-        last = self.sample
-        if last is None or sample.robot is not last.robot:
-            safety = sample.robot.safety if sample.robot is not None else None
-            if safety is not self._safety:
-                if safety is not None and (
-                    self._safety is not None or safety is not m.Safety.NORMAL_OPERATION
-                ):
-                    self._report(Kind.SAFETY, f"safety state {safety.name}", now)
-                self._safety = safety
-        # the layout is unchanged as long as the connection is the same object
-        if last is None or sample.connection is not last.connection:
-            ipo = sample.message.ipo
-            mode = (ipo.command_mode if ipo is not None else None) or m.CommandMode.NO_COMMAND
-            if mode is not self.mode:
-                self._report(Kind.COMMAND_MODE, f"client command mode {self.mode.name} -> {mode.name}", now)
-                self.mode = mode
+            self.reflected = reflected
+        safety = sample.robot.safety if sample.robot is not None else None
+        if safety is not self._safety:
+            if safety is not None and (self._safety is not None or safety is not m.Safety.NORMAL_OPERATION):
+                self._report(Kind.SAFETY, f"safety state {safety.name}", now)
+            self._safety = safety
+        ipo = sample.message.ipo
+        mode = (ipo.command_mode if ipo is not None else None) or m.CommandMode.NO_COMMAND
+        if mode is not self.mode:
+            self._report(Kind.COMMAND_MODE, f"client command mode {self.mode.name} -> {mode.name}", now)
+            self.mode = mode
 
     def _report(self, kind: Kind, text: str, now: int) -> None:
-        if len(self._events) < MAX_EVENTS:
-            self._events.append(Event(kind, text, now))
-
-
-def reflected_in(datagram: bytes, *, framed: bool) -> int:
-    """Read the reflected counter of a legal monitoring datagram; -1 if it is not at its usual place."""
-    pos, end = 4 if framed else 0, len(datagram)
-    if datagram[pos] != 0x0A:
-        return -1
-    size, pos = read_varint(datagram, pos + 1, end)
-    stop, reflected = pos + size, -1
-    while pos < stop:
-        key = datagram[pos]
-        if key & 7 or key > 0x78:  # a field that FRI does not have
-            return -1
-        value, pos = read_varint(datagram, pos + 1, end)
-        if key == 0x18:
-            reflected = value
-    return reflected if reflected < _WRAP else -1
+        self.publish(Event(kind, text, now))

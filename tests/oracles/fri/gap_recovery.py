@@ -27,6 +27,7 @@ def motion_in_gap(speed: float, distance: float, time: float) -> tuple[float, fl
         The distance, limited to the range from zero to constant velocity; and the velocity after the gap.
     """
     furthest = speed * time
+    distance = distance if math.isfinite(distance) else 0.0
     distance = min(max(distance, min(furthest, 0.0)), max(furthest, 0.0))
     later = 2.0 * distance / time - speed
     return distance, min(max(later, min(speed, 0.0)), max(speed, 0.0))
@@ -78,9 +79,10 @@ def vector_in_gap(
         displacement: measured displacement, shape (3,) [m or rad].
         time: duration of the gap [s].
     """
-    size = math.sqrt(sum(value * value for value in speed))
+    size = math.sqrt(speed[0] * speed[0] + speed[1] * speed[1] + speed[2] * speed[2])
     if size == 0.0:
         return [0.0] * 3, [0.0] * 3
-    along = sum(a * b for a, b in zip(speed, displacement, strict=True)) / size
+    x, y, z = (a * b for a, b in zip(speed, displacement, strict=True))
+    along = (x + y + z) / size
     distance, velocity = motion_in_gap(size, along, time)
     return [value * distance / size for value in speed], [value * velocity / size for value in speed]

@@ -1,4 +1,4 @@
-"""Answers of a session: the setpoint of a cycle, and its datagram."""
+"""Answers of a session: the setpoint of a cycle, and its datagram; what native/fri_cycle.c has to do."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.protocol import messages as m
-from heptarm.fri.protocol.codec import encode_command
-from heptarm.fri.protocol.fast_codec import CommandTemplate, Sample
 from heptarm.fri.protocol.version import Version
+
+from .codec import encode_command
+from .sample import Sample
 
 
 @dataclass(slots=True)
@@ -93,7 +94,6 @@ class Answers:
 
     def __init__(self, version: Version) -> None:
         self._version = version
-        self._templates: dict[m.CommandMode, CommandTemplate] = {}
         self.missing = ""
 
     def make(
@@ -127,8 +127,6 @@ class Answers:
             q = motion.q if motion.q is not None else sample.q_ipo
             if q is None:
                 self.missing = "the controller sends no interpolator position to mirror"
-        if q is not None and setpoint.is_plain:
-            return self._joint_answer(mode, q, motion, header)
         commands = q is not None
         command = m.Command(
             header,
@@ -139,20 +137,6 @@ class Answers:
             transformations=setpoint.transformations,
         )
         return encode_command(command, self._version)
-
-    def _joint_answer(self, mode: m.CommandMode, q: m.Joints, motion: Setpoint, header: m.Header) -> bytes:
-        """Encode a frequent answer from its template."""
-        template = self._templates.get(mode)
-        if template is None:
-            template = self._templates[mode] = CommandTemplate(
-                self._version, torque=mode is m.CommandMode.TORQUE, wrench=mode is m.CommandMode.WRENCH
-            )
-        template.q[:] = q
-        if template.tau is not None:
-            template.tau[:] = motion.tau or _ZEROS7
-        if template.wrench is not None:
-            template.wrench[:] = motion.wrench or _ZEROS6
-        return template.encode(header.sequence, header.reflected)
 
     def _pose_answer(self, sample: Sample, motion: Setpoint, setpoint: Setpoint, header: m.Header) -> bytes:
         ipo = sample.message.ipo or m.IpoData()

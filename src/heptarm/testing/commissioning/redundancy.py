@@ -1,0 +1,71 @@
+"""Steps: what E1 means, and what the cabinet's inverse kinematics does where a pose leaves joints free."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.testing.commissioning.person import Person
+from heptarm.testing.commissioning.step import Comparison, Movement, near, step
+from heptarm.testing.measure import fresh
+from heptarm.testing.stage import HOME
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import Redundancy, deg
+
+#: An elbow that is out to the side: there E1 and the arm angle differ.
+_ASIDE = deg(0, 0, 25, 0, 0, 10, 0)
+#: By which E1 is changed, with the flange held still [deg].
+_FARTHER = 20.0
+_A3 = 2
+#: Axes A5 and A7 coincide here.
+_COAXIAL = deg(0, 45, 0, -90, 0, 0, 0)
+#: Largest difference of angles that are the same [deg].
+_SAME = 0.2
+
+
+@step(
+    movement=Movement(
+        "The elbow and the joints",
+        "each axis by at most 60 deg, the flange by 50 mm",
+        "a tenth of every axis' speed",
+    ),
+    needs=("ptp", "lin"),
+)
+def e1(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Is E1 the angle of A3, and does a line without a redundancy keep it?"""
+    arm.move(ptp(HOME + _ASIDE))
+    arm.wait_for_rest()
+    start = fresh(arm)
+    found = [_angle("E1 that the cabinet reports", start.redundancy.e1, start.q[_A3])]
+    farther = start.redundancy.e1 + float(np.radians(_FARTHER))
+    arm.move(lin(start.pose, redundancy=Redundancy(farther, start.redundancy.status, start.redundancy.turn)))
+    arm.wait_for_rest()
+    found.append(_angle("A3 after a line to the same frame with another E1", fresh(arm).q[_A3], farther))
+    arm.move(lin_rel(z=0.05, frame="base"))
+    arm.wait_for_rest()
+    return (*found, _angle("A3 after a line without a redundancy", fresh(arm).q[_A3], farther))
+
+
+@step(
+    movement=Movement(
+        "The arm to 0, 45, 0, -90, 0, 0, 0 deg, and perhaps A5 and A7 against each other",
+        "by up to 170 deg",
+        "a tenth of every axis' speed",
+    ),
+    needs=("ptp",),
+)
+def own_pose(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Do joints that the pose leaves free stay in a motion to the arm's own pose?"""
+    arm.move(ptp(_COAXIAL))
+    arm.wait_for_rest()
+    start = fresh(arm)
+    arm.move(ptp(start.pose))
+    arm.wait_for_rest()
+    moved = np.degrees(np.abs(fresh(arm).q - start.q))
+    arm.move(ptp(HOME))
+    return (near("largest move of a joint", float(moved.max()), 0.0, _SAME, "deg"),)
+
+
+def _angle(quantity: str, measured: float, wanted: float) -> Comparison:
+    return near(quantity, float(np.degrees(measured)), float(np.degrees(wanted)), _SAME, "deg")

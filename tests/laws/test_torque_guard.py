@@ -1,0 +1,77 @@
+"""No law breaks the arm: the guard of torques against laws that try to, on the simulated plant with its drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.guard.torque_guard import TorqueGuard
+from heptarm.model.dynamics import ROTOR, mass_matrix, rigid_bodies
+from heptarm.values.robot import robot
+from tests.long import longer
+
+from .adversaries import Trial
+
+ARM = robot("iiwa14")
+HOME = np.radians([0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0])
+STILL = np.zeros(7)
+PERIOD = 1e-3
+
+
+def guard() -> TorqueGuard:
+    made = TorqueGuard(Limits.of(ARM), rigid_bodies(ARM, rotor=ROTOR))
+    made.start()
+    return made
+
+
+@pytest.mark.parametrize("block", range(longer(8, 100)))
+def test_no_law_brings_an_axis_beyond_its_speed_or_to_a_limit(block: int) -> None:
+    """Random gains, wrong signs, noise, 1e12, NaN; loads, periods, stiffness and noise of the sensors."""
+    size = longer(4, 10)
+    for seed in range(block * size, (block + 1) * size):
+        trial = Trial(seed).run(longer(0.8, 1.5))
+        assert not trial.error, f"{trial.name}: {trial.error}"
+        assert trial.speed.max() <= 0.95, f"{trial.name}: {trial.speed.max():.3f} of the robot's speed"
+        assert trial.nearest >= np.radians(1.0), f"{trial.name}: {np.degrees(trial.nearest):.2f} deg"
+
+
+def test_without_the_guard_such_laws_do_break_the_arm() -> None:
+    found = [Trial(seed, is_guarded=False).run(0.8) for seed in (0, 1, 2, 3, 4, 5)]
+    assert sum(one.speed.max() > 0.95 or bool(one.error) for one in found) >= 3
+
+
+def test_torques_of_a_calm_law_pass_unchanged() -> None:
+    tau = [20.0, -30.0, 10.0, 15.0, -5.0, 4.0, -2.0]
+    made = guard()
+    for _ in range(20):
+        assert made.limit(tau, q=HOME, dq=STILL, period=PERIOD) == tau
+        assert not made.was_limited
+    assert made.report.lines == []
+
+
+def test_an_axis_near_its_limit_brakes_and_the_others_keep_their_accelerations() -> None:
+    made, q, dq = guard(), HOME.copy(), STILL.copy()
+    q[5], dq[5] = ARM.q_max[5] - 0.08, 1.0
+    asked = np.array([10.0, -20.0, 8.0, 10.0, -4.0, 20.0, 2.0])
+    sent = np.array(made.limit(asked.tolist(), q=q, dq=dq, period=PERIOD))
+    mass = mass_matrix(ARM, q) + 0.1 * np.eye(7)
+    wanted, found = np.linalg.solve(mass, asked), np.linalg.solve(mass, sent)
+    assert found[5] < -1.0 < wanted[5], "A6 brakes"
+    others = [0, 1, 2, 3, 4, 6]
+    assert found[others] == pytest.approx(wanted[others], abs=1e-9)
+    assert made.was_limited and any(line.startswith("A6: position limited") for line in made.report.lines)
+
+
+def test_at_the_end_the_torques_bring_the_arm_to_rest() -> None:
+    trial = Trial(3, is_ending=True).run(1.6)
+    assert not trial.error and np.abs(trial.final_speed).max() < 0.02
+
+
+@pytest.mark.parametrize("broken", [np.full(7, np.nan), np.full(7, np.inf)])
+def test_without_positions_there_are_no_torques(broken: np.ndarray) -> None:
+    made = guard()
+    assert made.limit([50.0] * 7, q=broken, dq=STILL, period=PERIOD) == [0.0] * 7
+    assert made.limit([5.0] * 7, q=HOME, dq=broken, period=PERIOD) == [0.0] * 7
+    assert made.limit([5.0] * 7, q=HOME, dq=STILL, period=PERIOD) == [5.0] * 7
+    assert np.isfinite(made.words).all()

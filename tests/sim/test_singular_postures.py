@@ -1,0 +1,101 @@
+"""Where the pose leaves joints free, they stay; E1 is the angle of A3; half a turn goes where the arm can follow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from heptarm.model.kinematics import forward
+from heptarm.planning.motion import PlanError
+from heptarm.planning.seam import PlantMotion
+from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.plant.plant import Plant
+from heptarm.values.pose import Pose, deg
+from tests.sim import motions
+from tests.sim.driving import READY, numbers, run
+
+#: Postures that people teach, where axes coincide.
+ROUND = {
+    "A2 at 0": (20, 0, 40, -90, 0, 60, 0),
+    "wrist": (0, 30, 0, -60, 50, 0, -20),
+    "A2, A4, A6 at 0": (20, 0, 40, 0, -20, 0, 10),
+    "A6 at 0": (0, 45, 0, -90, 0, 0, 0),
+    "candle": (0, 0, 0, 0, 0, 0, 0),
+}
+
+
+def ready(q: npt.ArrayLike = READY) -> Plant:
+    return Plant("iiwa14", q=q)
+
+
+@pytest.mark.parametrize("degrees", ROUND.values(), ids=ROUND)
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-6])
+@pytest.mark.parametrize("kind", [motions.ptp_pose, motions.lin], ids=["ptp", "lin"])
+def test_a_motion_to_its_own_pose_stays(
+    degrees: tuple[float, ...], noise: float, kind: Callable[..., PlantMotion]
+) -> None:
+    q = deg(*degrees)
+    plant = ready(q=q)
+    off = noise * np.random.default_rng(1).uniform(-1, 1, 7)
+    track = run(plant, MotionCommand(1, kind(numbers(Pose.from_matrix(forward(plant.robot, q + off))))))
+    assert np.abs(np.array(track.q_cmd) - q).max() < deg(0.01)[0]
+
+
+def test_home_is_reached_by_its_pose_without_a_swing() -> None:
+    """It needs 40 degrees; A5 ended at -155.5."""
+    start = deg(10, 20, 5, -40, 0, 40, 5)
+    plant = ready(q=start)
+    track = run(
+        plant,
+        MotionCommand(1, motions.ptp_pose(numbers(Pose.from_matrix(forward(plant.robot, np.zeros(7)))))),
+    )
+    assert np.abs(np.array(track.q_cmd) - start).max() < deg(40.1)[0]
+
+
+def test_kukas_sample_moves_in_the_null_space() -> None:
+    start = deg(0, 20, 0, -110, 0, -40, 90)
+    plant = ready(q=start)
+    here = numbers(Pose.from_matrix(forward(plant.robot, start)))
+    for number, e1 in enumerate((-80.0, 0.0), start=1):
+        track = run(
+            plant, MotionCommand(number, motions.lin(here, redundancy=(float(np.radians(e1)), 6, -1)))
+        )
+        assert np.degrees(track.q_cmd[-1][2]) == pytest.approx(e1, abs=1e-3)
+    assert np.abs(track.q_cmd[-1] - start).max() < 1e-4
+
+
+def test_a_ptp_to_a_frame_with_e1_ends_with_a3_there() -> None:
+    plant = ready()
+    pose = Pose.from_matrix(forward(plant.robot, plant.snapshot.q))
+    track = run(plant, MotionCommand(1, motions.ptp_pose(numbers(pose), redundancy=(0.5, -1, -1))))
+    assert track.q_cmd[-1][2] == pytest.approx(0.5, abs=1e-6)
+
+
+def test_a_lin_without_e1_keeps_a3() -> None:
+    plant = ready(q=deg(10, 30, 20, -80, 15, 50, 5))
+    a3 = float(plant.snapshot.q[2])
+    track = run(plant, MotionCommand(1, motions.lin_rel((0.0, 0.1, 0.05, 0, 0, 0, 1), (0, 0, 0, 1))))
+    assert np.abs(np.array(track.q_cmd)[:, 2] - a3).max() < 1e-4
+
+
+@pytest.mark.parametrize("a7", [-150, -60, 60, 150])
+@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+def test_half_a_turn_goes_where_the_arm_can_follow(a7: float, noise: float) -> None:
+    """A LIN by exactly 180 degrees about A7 was refused or not, by noise."""
+    start = deg(0, 30, 0, -90, 0, 60, a7)
+    plant = ready(q=start)
+    goal = Pose.from_matrix(forward(plant.robot, start)) @ Pose.xyz_abc(a=pi + noise)
+    track = run(plant, MotionCommand(1, motions.lin(numbers(goal))))
+    turned = np.degrees(track.q_cmd[-1][6]) - a7
+    assert turned == pytest.approx(180 if a7 < 0 else -180, abs=0.01)
+
+
+def test_half_a_turn_that_no_direction_allows_is_refused() -> None:
+    plant = ready(q=deg(0, 30, 0, -90, 0, 60, 0))
+    goal = Pose.from_matrix(forward(plant.robot, plant.snapshot.q)) @ Pose.xyz_abc(a=pi)
+    with pytest.raises(PlanError, match="A7"):
+        plant.submit(MotionCommand(1, motions.lin(numbers(goal))))
