@@ -16,8 +16,8 @@ from heptarm.values.robot import RobotModel
 
 #: Rounding of a difference of two set-points, relative to the limit.
 ROUNDING = 1e-6
-#: A stop has brought the arm to rest after so long [s], and below this velocity it rests [rad/s].
-STOP_TIME, AT_REST = 2.0, 0.03
+#: A stop has brought the arm to rest after so long [s]; behind closed brakes it gives so much when pushed [rad].
+STOP_TIME, GIVES = 2.0, 0.02
 #: An arm may be so much faster than its set-point.
 MEASURED = 1.2
 #: A set-point that moves less than this in a tick rests [rad].
@@ -105,7 +105,7 @@ def judged(robot: RobotModel, rows: Array, *, compliant: bool) -> list[Violation
     speeds = np.abs(rows[:, StateWords.DQ])
     found += _beyond("measured velocity [rad/s]", speeds, MEASURED * robot.dq_max, seconds)
     if compliant:
-        return found + _stopped(flags, speeds, seconds)
+        return found + _stopped(flags, rows[:, StateWords.Q], seconds)
     found += _beyond("velocity [rad/s]", np.abs(velocity[2:]) * driven[:, None], robot.dq_max, seconds[3:])
     found += _beyond(
         "acceleration [rad/s²]", np.abs(acceleration[1:]) * driven[:, None], robot.ddq_max, seconds[3:]
@@ -117,11 +117,11 @@ def judged(robot: RobotModel, rows: Array, *, compliant: bool) -> list[Violation
         STILL,
         seconds[1:],
     )
-    return found + _stopped(flags, speeds, seconds)
+    return found + _stopped(flags, rows[:, StateWords.Q], seconds)
 
 
-def _stopped(flags: Array, speeds: Array, seconds: Array) -> list[Violation]:
-    return [one for bit in SafetyFlags(_STOPS) for one in _after_stop(bit, flags, speeds, seconds)]
+def _stopped(flags: Array, positions: Array, seconds: Array) -> list[Violation]:
+    return [one for bit in SafetyFlags(_STOPS) for one in _after_stop(bit, flags, positions, seconds)]
 
 
 def _beyond(
@@ -147,14 +147,17 @@ def _first(rule: str, values: Array, allowed: float, seconds: Array) -> list[Vio
     )
 
 
-def _after_stop(bit: SafetyFlags, flags: Array, speeds: Array, seconds: Array) -> list[Violation]:
-    """Motion while a stop has been in force for longer than the arm needs to come to rest."""
-    on = (flags & bit) != 0
-    began, since = -1.0, np.zeros(len(on))
-    for place in np.flatnonzero(np.diff(on.astype(np.int8), prepend=0)):
-        if on[place]:
-            began = float(seconds[place])
-            end = place + int(np.argmin(on[place:])) if not on[place:].all() else len(on)
-            since[place:end] = seconds[place:end] - began
-    fast = speeds.max(axis=1) * (since > STOP_TIME)
-    return _first(f"velocity [rad/s] {STOP_TIME:g} s after {bit.name}", fast, AT_REST, seconds)
+def _after_stop(bit: SafetyFlags, flags: Array, positions: Array, seconds: Array) -> list[Violation]:
+    """Where the arm goes while a stop has been in force for longer than it needs to come to rest."""
+    on = ((flags & bit) != 0).astype(np.int8)
+    found: list[Violation] = []
+    begins, ends = (
+        np.flatnonzero(np.diff(on, prepend=0) == 1),
+        np.flatnonzero(np.diff(on, append=0) == -1) + 1,
+    )
+    for begin, end in zip(begins, ends, strict=True):
+        rest = begin + round(STOP_TIME / _DT)
+        if rest < end:
+            away = np.abs(positions[rest:end] - positions[rest]).max(axis=1)
+            found += _first(f"motion [rad] {STOP_TIME:g} s after {bit.name}", away, GIVES, seconds[rest:end])
+    return found[:1]

@@ -215,13 +215,15 @@ class Outside:
 
 def cut(arm: ha.Arm) -> None:
     """Cut the connection, as a pulled cable does to both sides."""
-    with socket.socket(fileno=os.dup(arm.connection.link._transport.fileno())) as line:
-        line.shutdown(socket.SHUT_RDWR)
+    for name in os.listdir("/proc/self/fd"):
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(name))) as line:
+            if line.getpeername() == address(arm):
+                line.shutdown(socket.SHUT_RDWR)
 
 
 def address(arm: ha.Arm) -> tuple[str, int]:
     """Where the cabinet listens."""
-    host, _, port = arm.cabinet.rpartition(":")
+    host, _, port = arm.connection.link.peer.rpartition(":")
     return host, int(port)
 
 

@@ -62,7 +62,8 @@ class Rig:
             with refusals():
                 step.run(self.arm)
         self.restore()
-        assert np.abs(self.arm.state.q - HOME).max() < 1e-3
+        self.arm.wait_for_rest(timeout=60.0)
+        assert np.abs(self.arm.state.q - HOME).max() < 1e-3, self.arm.state.q
         return self.judge.violations(
             compliant=any(getattr(step, "mode", "position") != "position" for step in program)
         )
