@@ -125,12 +125,13 @@ static int check_periods(struct fri_loop *l, struct message *m, word now) {
                        (long long)s->period / 1000000, (long long)s->multiplier, (long long)period, (long long)multiplier);
 }
 
-/* Whether the interpolator can have moved so far since the last message of this session in which commands count. */
+/* Whether the interpolator can have moved so far since the last message that was mirrored. Only then is it sent back as it is;
+   while commands are effective the guard limits what follows from it, and it may jump where a motion ends. */
 static int check_reach(struct fri_loop *l, struct message *m, word now) {
     struct session *s = &l->session;
     word steps = (m->sequence - s->sequence) & WRAP, elapsed = now - l->reach_from;
-    int commands = l->reach_from && s->state >= COMMANDING_WAIT && m->state >= COMMANDING_WAIT;
-    if (!commands || !s->has_message || steps > WRAP / 2 || !(m->known & BIT_OF(S_Q_IPO))) return 1;
+    int mirrors = l->reach_from && s->state == COMMANDING_WAIT && m->state == COMMANDING_WAIT;
+    if (!mirrors || !s->has_message || steps > WRAP / 2 || !(m->known & BIT_OF(S_Q_IPO))) return 1;
     if (steps <= MAX_LOST && steps * s->period > elapsed) elapsed = steps * s->period;
     double time = 1e-9 * (double)(elapsed + s->period);
     for (int i = 0; i < AXES; i++) {
