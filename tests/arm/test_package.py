@@ -26,7 +26,9 @@ def test_the_names_of_fri_are_there_without_a_socket() -> None:
         assert name in dir(fri)
     with pytest.raises(AttributeError, match="nothing"):
         _ = fri.nothing
-    code = "import sys, heptarm.fri.session.events; assert not {'socket', 'heptarm.fri.loop'} & set(sys.modules)"
+    code = (
+        "import sys, heptarm.fri.session.events; assert not {'socket', 'heptarm.fri.loop'} & set(sys.modules)"
+    )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
 
 

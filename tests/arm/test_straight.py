@@ -46,15 +46,15 @@ def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
 
 
 def test_before_a_limit_it_rests_on_its_line_and_says_which_axis(arm: ha.Arm) -> None:
-    arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 105, 0)))
+    arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 155)))
     with arm.servo("lin", rate=50, speed_radps=1.0, acceleration_radps2=4.0, watchdog=2.0) as sv:
         start = sv.start.pose
-        goal = start @ ha.Pose.xyz_abc(0, 0, 0, 0, np.radians(45), 0)
-        limit = arm.robot.q_max[5]
-        while sv.tick() and sv.t < 30.0 and arm.state.q_cmd[5] < limit - 2e-3:
+        goal = start @ ha.Pose.xyz_abc(0, 0, 0, np.radians(50), 0, 0)  # as A7 at -155 deg reaches it
+        limit = arm.robot.q_max[6]
+        while sv.tick() and sv.t < 30.0 and arm.state.q_cmd[6] < limit - 2e-3:
             sv.set(goal)
-        assert limit - 2e-3 <= arm.state.q_cmd[5] < limit
-        assert sv.stats.slowdown.reason == "limit of A6" and "limit of A6" in str(sv.stats)
+        assert limit - 2e-3 <= arm.state.q_cmd[6] < limit
+        assert sv.stats.slowdown.reason == "limit of A7" and "limit of A7" in str(sv.stats)
         while sv.tick() and sv.t < 60.0 and not _there(arm.state.pose, start):
             sv.set(start)
         assert _there(arm.state.pose, start) and sv.active

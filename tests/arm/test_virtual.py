@@ -288,10 +288,12 @@ def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> No
 
 MOVES = """
     import sys, heptarm as ha
+    from heptarm.modes import compliance
+    from heptarm.when import force
     with ha.connect(sys.argv[1], watchdog=10.0, timeout=30.0) as arm:
         before = set(sys.modules)
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))
-        arm.move([ha.lin_rel(z=-0.01), ha.lin_rel(z=0.01)], mode=ha.modes.compliance("z"), until=ha.when.force > 50)
+        arm.move([ha.lin_rel(z=-0.01), ha.lin_rel(z=0.01)], mode=compliance("z"), until=force > 50)
         for kind, target in (("joint", None), ("pose", None), ("twist", (0.0,) * 6), ("velocity", (0.0,) * 7)):
             with arm.servo(kind, rate=50) as servo:
                 own = servo.start.q if kind == "joint" else servo.start.pose

@@ -86,7 +86,9 @@ def test_what_making_a_law_refuses_is_refused_on_the_way(law: str, name: str, va
     assert one.value.parameter.startswith(name)
     assert not sent and np.array_equal(params.words, before, equal_nan=True), "nothing is half applied"
     with pytest.raises(CommandRejected):  # by params= of the session, too
-        merged(READY[law]().parameters(ARM), {name: value}) if name != "gravity" else params.set(gravity=value)  # type: ignore[arg-type]
+        merged(READY[law]().parameters(ARM), {name: value}) if name != "gravity" else params.set(
+            gravity=value
+        )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", READY)
@@ -111,13 +113,17 @@ def test_several_parameters_change_together_or_none_does() -> None:
 
 def test_errors_name_value_unit_range_and_index() -> None:
     params, _ = live(laws.joint_impedance())
-    with pytest.raises(LimitError, match=r"goal\[3\] must be in \[-2.09\d*, 2.09\d*\] rad, got 90 rad") as error:
+    with pytest.raises(
+        LimitError, match=r"goal\[3\] must be in \[-2.09\d*, 2.09\d*\] rad, got 90 rad"
+    ) as error:
         params.goal = [0.0, 0.0, 0.0, 90.0, 0.0, 0.0, 0.0]
     assert error.value.hint == "angles are in radians: did you mean math.radians(90)?"
 
 
 def test_a_program_declares_its_own_parameters() -> None:
-    law = ha.law(params={"k": ha.param(500.0, low=0.0, high=2000.0, unit="Nm/rad"), "free": 1.0})(lambda s, o, p: 0)
+    law = ha.law(params={"k": ha.param(500.0, low=0.0, high=2000.0, unit="Nm/rad"), "free": 1.0})(
+        lambda s, o, p: 0
+    )
     declared = merged(law.parameters(ARM), {"k": 700.0})
     values, schema = flat(declared, "params")
     params = Params(values, schema, changed=lambda: None, declared=declared)

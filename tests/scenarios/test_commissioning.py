@@ -103,7 +103,9 @@ def arm() -> Iterator[ha.Arm]:
 def test_every_step_without_fri_agrees_on_the_virtual_cabinet(arm: ha.Arm) -> None:
     seen: list[int] = []
     gaps: list[str] = []
-    only = [group for group in ("sunrise", "sensors", "dynamics", "redundancy", "contact", "drives", "safety")]
+    only = [
+        group for group in ("sunrise", "sensors", "dynamics", "redundancy", "contact", "drives", "safety")
+    ]
     began = 0
 
     def commission() -> commissioning.CommissioningReport:

@@ -17,7 +17,10 @@ from moveit_configs_utils import MoveItConfigsBuilder
 ARGUMENTS = {
     "target": ("sim://iiwa14", "what to connect to"),
     "model": ("iiwa14", "iiwa7, iiwa14, med7 or med14"),
-    "flange": ("", "media flange of the robot: plain, or touch; empty: that of the target, plain in the description"),
+    "flange": (
+        "",
+        "media flange of the robot: plain, or touch; empty: that of the target, plain in the description",
+    ),
     "namespace": ("", "namespace of all nodes and topics"),
     "prefix": ("", "prefix of the names of joints and frames, for several arms in one scene"),
     "xyz": ("0 0 0", "position of the arm in the world [m]"),

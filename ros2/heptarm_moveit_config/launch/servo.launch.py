@@ -15,7 +15,10 @@ from moveit_configs_utils import MoveItConfigsBuilder
 
 ARGUMENTS = {
     "model": ("iiwa14", "iiwa7, iiwa14, med7 or med14"),
-    "flange": ("", "media flange of the robot: plain, or touch; empty: that of the target, plain in the description"),
+    "flange": (
+        "",
+        "media flange of the robot: plain, or touch; empty: that of the target, plain in the description",
+    ),
     "namespace": ("", "namespace of the arm's node and of move_group"),
     "prefix": ("", "prefix of the names of joints and frames"),
 }

@@ -14,8 +14,8 @@ class Arm(ArmVerbs):
 
     In a `with` block it is left at rest, however the block ends.
 
-    Its verbs are those of `ArmVerbs`. Here are the skills among its methods: functions of heptarm.skills, which take the
-    arm first and use only its verbs.
+    Its verbs are those of `ArmVerbs`. Here are the skills among its methods: functions of heptarm.skills, which take
+    the arm first and use only its verbs.
     """
 
     touch = touching.touch

@@ -85,8 +85,8 @@ REAL_SPEED = 0.25
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 _Arm = TypeVar("_Arm", bound="ArmVerbs")
 OnCollision: TypeAlias = Callable[[Collision], None] | None
-#: Guards of the blocks that `guarded` has begun, which FRI sessions obey, and what is called at a collision; at most one
-#: for an arm, since two would contradict each other.
+#: Guards of the blocks that `guarded` has begun, which FRI sessions obey, and what is called at a collision; at most
+#: one for an arm, since two would contradict each other.
 guards_in_force: WeakKeyDictionary[ArmVerbs, tuple[CollisionGuard, OnCollision]] = WeakKeyDictionary()
 
 
@@ -852,7 +852,8 @@ class ArmVerbs(Sealed):
         rule = guards_in_force.get(self) if settings.get("collision") is None else None
         if rule is not None:
             settings["collision"] = rule[0]
-        request = fri_settings.request(self._connection, kind, load=self._tooling.load, **settings)
+        settings.setdefault("load", self._tooling.load)
+        request = fri_settings.request(self._connection, kind, **settings)
         return Fri(self._connection, request, on_collision=None if rule is None else rule[1])
 
     # -------------------------------------------------------------------------- stop and recover

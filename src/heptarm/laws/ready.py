@@ -127,7 +127,9 @@ def cartesian_impedance(
         {
             "robot": lambda arm: Param(rigid_bodies(arm, load, rotor=ROTOR), live=False),
             "goal": _pose(goal),
-            "stiffness": _vector(stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS),
+            "stiffness": _vector(
+                stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS
+            ),
             "damping": _number(damping, "damping", high=2.0, rate=10.0),
             "force_max": _number(force_max, "force_max", high=500.0, unit="N", rate=1000.0),
             "moment_max": _number(moment_max, "moment_max", high=100.0, unit="Nm", rate=200.0),
@@ -242,9 +244,7 @@ def free_guiding(
         {
             "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
             "damping": _vector(damping, "damping", high=(100.0,) * 7, unit="Nm s/rad", rate=200.0),
-            "box": Param(
-                given, low=-FAR, high=FAR, unit="m", rate=0.5, check=_check_box, name="box"
-            ),
+            "box": Param(given, low=-FAR, high=FAR, unit="m", rate=0.5, check=_check_box, name="box"),
             "wall_stiffness": _number(wall_stiffness, "wall_stiffness", high=1e4, unit="N/m", rate=2e4),
             "wall_damping": _number(wall_damping, "wall_damping", high=1e3, unit="N s/m", rate=2e3),
             "force_max": _number(force_max, "force_max", high=500.0, unit="N", rate=1000.0),
@@ -256,7 +256,12 @@ def free_guiding(
                 0.0 if extra is None else extra.mass, "extra_mass", high=50.0, unit="kg", rate=2.0
             ),
             "extra_com": _vector(
-                _ZEROS3 if extra is None else extra.com, "extra_com", low=-1.0, high=(1.0,) * 3, unit="m", rate=0.5
+                _ZEROS3 if extra is None else extra.com,
+                "extra_com",
+                low=-1.0,
+                high=(1.0,) * 3,
+                unit="m",
+                rate=0.5,
             ),
             "gravity": Param((0.0, 0.0, -9.81), live=False),
             "tau_max": _torques(tau_max),
@@ -300,9 +305,13 @@ def admittance(
             "wrench": _vector(wrench, "wrench", low=-WRENCH, high=WRENCH, unit="N or Nm", rate=5.0 * WRENCH),
             "mass": _vector(mass, "mass", high=MASS, above=True, unit="kg or kg m²", rate=MASS),
             "damping": _vector(damping, "damping", high=DAMPING, unit="N s/m or Nm s/rad", rate=DAMPING),
-            "stiffness": _vector(stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS),
+            "stiffness": _vector(
+                stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS
+            ),
             "dead_band": _number(dead_band, "dead_band", high=100.0, unit="N", rate=100.0),
-            "moment_dead_band": _number(moment_dead_band, "moment_dead_band", high=30.0, unit="Nm", rate=30.0),
+            "moment_dead_band": _number(
+                moment_dead_band, "moment_dead_band", high=30.0, unit="Nm", rate=30.0
+            ),
             "speed": _number(speed, "speed", high=1.0, above=True, unit="m/s"),
             "turn_speed": _number(turn_speed, "turn_speed", high=3.0, above=True, unit="rad/s"),
         },
@@ -370,7 +379,12 @@ def hybrid(
             "force_axes": Param(chosen, live=False),
             # zero along axes that are controlled by position
             "wrench": _vector(
-                exerted, "wrench", low=-WRENCH * chosen, high=WRENCH * chosen, unit="N or Nm", rate=5.0 * WRENCH
+                exerted,
+                "wrench",
+                low=-WRENCH * chosen,
+                high=WRENCH * chosen,
+                unit="N or Nm",
+                rate=5.0 * WRENCH,
             ),
             "mass": _vector(mass, "mass", high=MASS, above=True, unit="kg or kg m²", rate=MASS),
             "damping": _vector(
@@ -599,17 +613,13 @@ def _vector(
 def _pose(goal: Pose | None) -> Param:
     """A goal of the flange; the law follows it at its largest speeds."""
     given = _ANYWHERE if goal is None else instance(goal, Pose, "goal").array
-    return Param(
-        given, low=-FAR, high=FAR, unit="m", nan=True, check=_check_pose, name="goal"
-    )
+    return Param(given, low=-FAR, high=FAR, unit="m", nan=True, check=_check_pose, name="goal")
 
 
 def _joints(values: npt.ArrayLike | None, name: str, *, rate: float = math.inf) -> _ByRobot:
     """Joint positions within the robot's limits; None: where the arm is."""
     given = array(_ANYWHERE if values is None else values, 7, name, nan=values is None)
-    return lambda arm: Param(
-        given, low=arm.q_min, high=arm.q_max, unit="rad", nan=True, rate=rate, name=name
-    )
+    return lambda arm: Param(given, low=arm.q_min, high=arm.q_max, unit="rad", nan=True, rate=rate, name=name)
 
 
 def _check_pose(values: Array) -> str:
@@ -641,9 +651,7 @@ def _torques(values: npt.ArrayLike | None) -> _ByRobot:
     )
 
 
-def _limits(
-    values: npt.ArrayLike | None, name: str, limit: str, *, fraction: float, unit: str
-) -> _ByRobot:
+def _limits(values: npt.ArrayLike | None, name: str, limit: str, *, fraction: float, unit: str) -> _ByRobot:
     """Limits of the joints; None: a fraction of the robot's, which has them as `limit`."""
     given = None
     if values is not None:

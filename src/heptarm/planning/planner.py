@@ -46,7 +46,9 @@ def plan(
         if isinstance(motion, seam.JointSpline):
             return plan_joint_spline(robot, motion, start, frame)
         if isinstance(motion, seam.Spl):
-            raise PlanError("planning", "Can not plan motion: a SPL is a segment of a spline, no motion by itself")
+            raise PlanError(
+                "planning", "Can not plan motion: a SPL is a segment of a spline, no motion by itself"
+            )
         return plan_motion(robot, motion, start, frame)
     except CommandRejected as error:
         raise PlanError("planning", f"Can not plan motion: {error}") from None

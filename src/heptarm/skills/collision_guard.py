@@ -71,14 +71,13 @@ def _torques_at_rest(arm: ArmVerbs, seconds: float) -> list[Array]:
     return torques
 
 
-@contextlib.contextmanager
 def guarded(
     arm: ArmVerbs,
     guard: CollisionGuard | None = None,
     *,
     on_collision: Callable[[Collision], None] | None = None,
     then: Reaction = "relax",
-) -> Iterator[CollisionGuard]:
+) -> contextlib.AbstractContextManager[CollisionGuard]:
     """A block whose motions, servo motions and FRI sessions end at a collision.
 
     The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path and relaxes. A
@@ -96,6 +95,16 @@ def guarded(
         CollisionDetected: from `move`, `wait` or the end of the block; names the joint and its torque.
         ModeConflict: the block is inside another one.
     """
+    return _block(arm, guard, on_collision, then)
+
+
+@contextlib.contextmanager
+def _block(
+    arm: ArmVerbs,
+    guard: CollisionGuard | None,
+    on_collision: Callable[[Collision], None] | None,
+    then: Reaction,
+) -> Iterator[CollisionGuard]:
     if arm in guards_in_force:
         raise ModeConflict("a collision guard is in force already", hint="leave its block first")
     if on_collision is not None:

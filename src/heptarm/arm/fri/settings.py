@@ -99,7 +99,7 @@ def request(
     timeout: float = 10.0,
     **loop: Unpack[LoopKeywords],
 ) -> FriRequest:
-    """Check the keywords of `Arm.fri`, and the load on the flange as far as it is known; turn them into a request.
+    """Check the keywords of `Arm.fri`; turn them into a request.
 
     Raises:
         CommandRejected: this cabinet does not support such a session.
