@@ -307,7 +307,7 @@ static void follow(struct fri_loop *l, word leap, word elapsed) {
     l->began = s->began;
     l->skipped = 0;
     if (again || !is_commanding(l)) l->guard.is_started = l->pose_guard.is_started = 0;
-    l->reach_from = commands && knows(l, S_Q_IPO) ? s->received : 0;
+    l->reach_from = s->state == COMMANDING_WAIT && knows(l, S_Q_IPO) ? s->received : 0;
     if (l->reach_from) memcpy(l->reach_ipo, joints(l, S_Q_IPO), sizeof l->reach_ipo);
     if (is_commanding(l)) {
         double period = command_period(l), gap = gap_of(l, leap, elapsed, period);

@@ -93,6 +93,9 @@ __attribute__((format(printf, 2, 3))) static int implausible(struct message *m, 
     return 0;
 }
 
+/* A number for a text: a NaN without its sign. */
+static double shown(double value) { return isnan(value) ? NAN : value; }
+
 static int check_range(struct fri_loop *l, struct message *m, int array, const char *name) {
     if (!(m->known & BIT_OF(array))) return 1;
     const double *values = m->joints[PLACE_OF(array)], *low = l->seam->lowest, *high = l->seam->highest;
@@ -100,7 +103,7 @@ static int check_range(struct fri_loop *l, struct message *m, int array, const c
         if (!(low[i] - OVERRUN <= values[i] && values[i] <= high[i] + OVERRUN))
             return implausible(m, "FRI message: the %s position of A%d must be in [%.4g, %.4g] rad, got %.4g rad: the datagram is "
                                   "damaged, or the client's model is another robot",
-                               name, i + 1, low[i], high[i], values[i]);
+                               name, i + 1, low[i], high[i], shown(values[i]));
     return 1;
 }
 
@@ -125,12 +128,13 @@ static int check_periods(struct fri_loop *l, struct message *m, word now) {
                        (long long)s->period / 1000000, (long long)s->multiplier, (long long)period, (long long)multiplier);
 }
 
-/* Whether the interpolator can have moved so far since the last message of this session in which commands count. */
+/* Whether the interpolator can have moved so far since the last message that was mirrored. Only then is it sent back as it is;
+   while commands are effective the guard limits what follows from it, and it may jump where a motion ends. */
 static int check_reach(struct fri_loop *l, struct message *m, word now) {
     struct session *s = &l->session;
     word steps = (m->sequence - s->sequence) & WRAP, elapsed = now - l->reach_from;
-    int commands = l->reach_from && s->state >= COMMANDING_WAIT && m->state >= COMMANDING_WAIT;
-    if (!commands || !s->has_message || steps > WRAP / 2 || !(m->known & BIT_OF(S_Q_IPO))) return 1;
+    int mirrors = l->reach_from && s->state == COMMANDING_WAIT && m->state == COMMANDING_WAIT;
+    if (!mirrors || !s->has_message || steps > WRAP / 2 || !(m->known & BIT_OF(S_Q_IPO))) return 1;
     if (steps <= MAX_LOST && steps * s->period > elapsed) elapsed = steps * s->period;
     double time = 1e-9 * (double)(elapsed + s->period);
     for (int i = 0; i < AXES; i++) {
@@ -159,12 +163,12 @@ static int check_plausible(struct fri_loop *l, struct message *m, word now) {
         if (!is_near || !(fabs(size - 1.0) <= MAX_NORM_ERROR))
             return implausible(m, "FRI message: the interpolated pose must be within %g mm with a quaternion of norm 1, got (%g, %g, %g, "
                                   "%g, %g, %g, %g): the datagram is damaged",
-                               MAX_COORDINATE, v[0], v[1], v[2], v[3], v[4], v[5], v[6]);
+                               MAX_COORDINATE, shown(v[0]), shown(v[1]), shown(v[2]), shown(v[3]), shown(v[4]), shown(v[5]), shown(v[6]));
     }
     if (m->ipo_strategy != ABSENT && !(fabs(m->ipo_e1) <= 2.0 * M_PI))
         return implausible(m, "FRI message: the interpolated redundancy angle must be in [-2π, 2π] rad, got %.4g rad: the datagram is "
                               "damaged",
-                           m->ipo_e1);
+                           shown(m->ipo_e1));
     return 1;
 }
 

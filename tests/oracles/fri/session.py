@@ -292,7 +292,7 @@ class Session:
         if last is None or last.q_ipo is None or ipo is None or link is None:
             return
         waiting, steps = m.SessionState.COMMANDING_WAIT, (sample.sequence - last.sequence) % _WRAP
-        if self.state < waiting or link.state < waiting or steps >= _WRAP // 2:
+        if not (self.state is link.state is waiting) or steps >= _WRAP // 2:
             return
         elapsed = now - self.received
         if steps <= 1000:
