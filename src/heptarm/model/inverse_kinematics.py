@@ -185,7 +185,7 @@ def solve(
         return _with_arm_angle(robot, matrix, angle, given.status, hint)
     outcome, found = _solved(robot, matrix, given.e1, given.status, hint)
     if outcome == FOUND:
-        return np.array(found)
+        return np.frombuffer(found)
     if outcome == TOO_FAR:
         raise too_far(robot, matrix)
     fixed = " with that E1 or Status" if not isnan(given.e1) or given.status >= 0 else ""
@@ -293,7 +293,7 @@ class PathInverse:
         fixed = not isnan(a3)
         outcome = self._solve(self._arm, self._tool, *point, *quat, a3, fixed, Joints(*near.tolist()), found)
         if outcome == FOUND:
-            return np.array(found)
+            return np.frombuffer(found)
         if outcome == TOO_FAR:
             place = Pose(np.array(point), np.array(quat)) @ Pose(
                 np.array(self._tool[:3]), np.array(self._tool[3:])

@@ -26,7 +26,7 @@ def flange(robot: RobotModel, q: Sequence[float]) -> tuple[Columns, Vec]:
     """Columns of the flange's rotation and its position [m] in the base frame; plain floats, for the tick."""
     found = Matrix()
     one().hk_forward(constants(robot), 1, Joints(*q), found)
-    a, b, c, x, d, e, f, y, g, h, i, z, *_ = found
+    a, b, c, x, d, e, f, y, g, h, i, z, *_ = found[:]
     return ((a, d, g), (b, e, h), (c, f, i)), (x, y, z)
 
 
@@ -53,7 +53,7 @@ def forward(robot: RobotModel, q: npt.ArrayLike, *, link: int | None = None) -> 
     else:
         origins = Vectors(*robot.links.origin.ravel().tolist())
         one().hk_link(origins, angles, integer(link, "link", 1, 7), found)
-    return np.array(found).reshape(4, 4)
+    return np.frombuffer(found).reshape(4, 4)
 
 
 def joints(robot: RobotModel, q: Sequence[float]) -> tuple[list[Vec], list[Vec], Vec]:
@@ -97,7 +97,7 @@ def jacobian(
     found = Jacobian()
     target = None if point is None else Vector(*array(point, 3, "point").tolist())
     one().hk_jacobian(constants(robot), 1, given, target, found)
-    result = np.array(found).reshape(6, 7)
+    result = np.frombuffer(found).reshape(6, 7)
     result[:, link:] = 0.0
     return result
 

@@ -9,9 +9,9 @@ from heptarm.testing.commissioning.person import Person
 from heptarm.testing.commissioning.step import Comparison, Movement, near, step
 from heptarm.testing.measure import fresh
 from heptarm.testing.stage import HOME
-from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
-from heptarm.values.pose import Redundancy, deg
+from heptarm.values.pose import Pose, Redundancy, deg
 
 #: An elbow that is out to the side: there E1 and the arm angle differ.
 _ASIDE = deg(0, 0, 25, 0, 0, 10, 0)
@@ -42,7 +42,7 @@ def e1(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     arm.move(lin(start.pose, redundancy=Redundancy(farther, start.redundancy.status, start.redundancy.turn)))
     arm.wait_for_rest()
     found.append(_angle("A3 after a line to the same frame with another E1", fresh(arm).q[_A3], farther))
-    arm.move(lin_rel(z=0.05, frame="base"))
+    arm.move(lin(Pose(start.pose.xyz + [0.0, 0.0, 0.05], start.pose.quat)))
     arm.wait_for_rest()
     return (*found, _angle("A3 after a line without a redundancy", fresh(arm).q[_A3], farther))
 
