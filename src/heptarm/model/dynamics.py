@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.model.native import Joints, Reals, Square, Vector, one, reals
+from heptarm.model.native import Joints, Reals, Square, Vector, one, reals, values_of
 from heptarm.values.arrays import Array, array, frozen, instance
 from heptarm.values.robot import Body, Friction, RobotModel
 
@@ -76,7 +76,7 @@ def mass_matrix(robot: RobotModel, q: npt.ArrayLike, *, load: Body | None = None
     """
     found = Square()
     one().hd_mass_matrix(_bodies(robot, load), _joints(q, "q"), found)
-    return np.frombuffer(found).reshape(7, 7)
+    return values_of(found).reshape(7, 7)
 
 
 def coriolis_matrix(
@@ -95,7 +95,7 @@ def coriolis_matrix(
     """
     found = Square()
     one().hd_coriolis_matrix(_bodies(robot, load), _joints(q, "q"), _joints(dq, "dq"), found)
-    return np.frombuffer(found).reshape(7, 7)
+    return values_of(found).reshape(7, 7)
 
 
 def coriolis(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike, *, load: Body | None = None) -> Array:
@@ -108,7 +108,7 @@ def _torques(
 ) -> Array:
     found = Joints()
     one().hd_inverse(_bodies(robot, load), _joints(q, "q"), dq, ddq, fall, found)
-    return np.frombuffer(found)
+    return values_of(found)
 
 
 def gravity(
@@ -188,4 +188,4 @@ def forward_dynamics(
     driving = array(tau, 7, "tau") - _friction(friction, dq)
     found = Joints()
     one().hd_forward(bodies, angles, rates, Joints(*driving.tolist()), _fall(acceleration), found)
-    return np.frombuffer(found)
+    return values_of(found)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, Unreachable
-from heptarm.model.native import Joints, Matrix, Reals, Spans, constants, one
+from heptarm.model.native import Joints, Matrix, Reals, Spans, constants, one, values_of
 from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
 from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.robot import RobotModel
@@ -185,7 +185,7 @@ def solve(
         return _with_arm_angle(robot, matrix, angle, given.status, hint)
     outcome, found = _solved(robot, matrix, given.e1, given.status, hint)
     if outcome == FOUND:
-        return np.frombuffer(found)
+        return values_of(found)
     if outcome == TOO_FAR:
         raise too_far(robot, matrix)
     fixed = " with that E1 or Status" if not isnan(given.e1) or given.status >= 0 else ""
@@ -293,7 +293,7 @@ class PathInverse:
         fixed = not isnan(a3)
         outcome = self._solve(self._arm, self._tool, *point, *quat, a3, fixed, Joints(*near.tolist()), found)
         if outcome == FOUND:
-            return np.frombuffer(found)
+            return values_of(found)
         if outcome == TOO_FAR:
             place = Pose(np.array(point), np.array(quat)) @ Pose(
                 np.array(self._tool[:3]), np.array(self._tool[3:])

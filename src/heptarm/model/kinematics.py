@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.model.native import Jacobian, Joints, Matrix, Reals, Vector, Vectors, constants, one
+from heptarm.model.native import Jacobian, Joints, Matrix, Reals, Vector, Vectors, constants, one, values_of
 from heptarm.values.arrays import Array, array, instance, integer
 from heptarm.values.robot import RobotModel
 
@@ -53,7 +53,7 @@ def forward(robot: RobotModel, q: npt.ArrayLike, *, link: int | None = None) -> 
     else:
         origins = Vectors(*robot.links.origin.ravel().tolist())
         one().hk_link(origins, angles, integer(link, "link", 1, 7), found)
-    return np.frombuffer(found).reshape(4, 4)
+    return values_of(found).reshape(4, 4)
 
 
 def joints(robot: RobotModel, q: Sequence[float]) -> tuple[list[Vec], list[Vec], Vec]:
@@ -97,7 +97,7 @@ def jacobian(
     found = Jacobian()
     target = None if point is None else Vector(*array(point, 3, "point").tolist())
     one().hk_jacobian(constants(robot), 1, given, target, found)
-    result = np.frombuffer(found).reshape(6, 7)
+    result = values_of(found).reshape(6, 7)
     result[:, link:] = 0.0
     return result
 

@@ -102,3 +102,8 @@ def constants(robot: RobotModel) -> Any:
 def reals(values: Array) -> Reals:
     """Numbers of an array for C."""
     return (_REAL * values.size)(*values.ravel().tolist())
+
+
+def values_of(numbers: Reals) -> Array:
+    """Numbers of C as an array over the same memory."""
+    return np.frombuffer(memoryview(numbers), dtype=np.float64)
