@@ -154,6 +154,21 @@ def test_the_override_and_a_pause_slow_it_down() -> None:
     assert np.abs(places(plant, 2500)[0][-1] - goal).max() < 1e-6
 
 
+@pytest.mark.parametrize("ticks", [0, 1, 3, 300])
+def test_a_stop_at_the_place_where_it_is_leaves_it_there(ticks: int) -> None:
+    """A target that is the present pose, as of a program that holds the arm; once it ended the cabinet."""
+    plant, ear = Plant("iiwa14", q=tuple(np.radians([0, 30, 0, -90, 0, 60, 0]).tolist())), Ear()
+    plant.submit(MotionCommand(7, motions.straight(**LIMITS), listener=ear))
+    plant.step(2)
+    here = plant.snapshot.q_cmd
+    plant.shared.post(7, Pose.from_matrix(forward(plant.robot, here)).array)
+    plant.step(ticks)
+    plant.stop()
+    plant.step(1000)
+    assert ear.causes == ["started", "cancelled"]
+    assert np.abs(plant.snapshot.q_cmd - here).max() < 1e-9
+
+
 # ------------------------------------------------------------------------------------- the limits of the axes
 
 QUICK: dict[str, Any] = {"velocity": (0.5,) * 3 + (1.0,) * 3, "acceleration": (2.0,) * 3 + (4.0,) * 3}

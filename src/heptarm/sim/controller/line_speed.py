@@ -168,6 +168,8 @@ class AxisLimits:
             return None
         times, q = np.array(samples.times), np.array(samples.q)
         gaps = np.diff(times)
+        if not (gaps > 0.0).all():  # a trajectory without any duration
+            return None
         slopes = np.diff(q, axis=0) / gaps[:, None]
         first = np.empty_like(q)
         second = np.empty_like(q)

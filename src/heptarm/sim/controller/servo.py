@@ -283,6 +283,9 @@ class StraightFollower:
         one = self._followed
         if one is None:
             return
+        if self._elapsed >= one.profile.duration:  # at rest already
+            self._followed = None
+            return
         place, turn, speed, change = self._state()
         speed, change = speed * scale, change * scale * scale + speed * rate
         (acceleration, jerk), along, by = _along(speed, self._limits.hardest, speed, change)
