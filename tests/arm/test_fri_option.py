@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import heptarm
+from heptarm._resources import cabinet_sources
 
 PROGRAM = """
 import heptarm as ha
@@ -43,6 +44,8 @@ OPTIONS = ("fastRobotInterface", "HandGuidingMotion")
 def test_a_cabinet_without_the_option_does_all_the_rest(tmp_path: Path) -> None:
     package = tmp_path / "heptarm"
     shutil.copytree(Path(heptarm.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(cabinet_sources() / "project", package / "_cabinet" / "project")  # as a wheel has them
+    shutil.copytree(cabinet_sources() / "core" / "src", package / "_cabinet" / "core" / "src")
     (jar,) = package.glob("sim/jars/*doubles*.jar")
     with zipfile.ZipFile(jar) as old:
         kept = {

@@ -39,6 +39,9 @@ class Cabinet:
     def check_may_wait(self, call: str) -> None:
         """No callback waits here."""
 
+    def newest(self) -> None:
+        """No state arrives here."""
+
     def enter_block(self, program: object, what: str) -> None:
         """No other block is open here."""
 

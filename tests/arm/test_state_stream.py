@@ -11,6 +11,7 @@ from heptarm.arm.link.state_stream import HISTORY, SampleQueue, StateFeed, State
 from heptarm.arm.translate.state import read_robot, read_state
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
 from heptarm.io.clock import StepClock
+from heptarm.values.robot import FLANGES
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 from heptarm.wire.clock_sync import ClockOffset
@@ -170,7 +171,11 @@ def test_no_state_is_younger_than_its_receipt_though_the_clock_is_not_known_well
 
 
 def test_the_robot_has_the_limits_that_the_cabinet_names() -> None:
-    model = read_robot(ROBOT)
+    model = read_robot(ROBOT, FLANGES["touch"])
+    assert model.flange is FLANGES["touch"]
     assert model.q_max[0] == 2.9 and model.d_se == 0.42 and not model.q_max.flags.writeable
     with pytest.raises(ConnectFailed, match="kr6"):
-        read_robot(RobotInfo(model="kr6", title="", q_min=(0,), q_max=(0,), dq_max=(0,), tau_max=(0,)))
+        read_robot(
+            RobotInfo(model="kr6", title="", q_min=(0,), q_max=(0,), dq_max=(0,), tau_max=(0,)),
+            FLANGES["plain"],
+        )

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, shown, within
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, scalar, shown, within
 from heptarm.values.pose import Pose, deg
 from heptarm.values.text import columns, fixed, lines
 
@@ -186,10 +186,8 @@ def flange(name: str | float) -> Flange:
     if isinstance(name, str) and name in FLANGES:
         return FLANGES[name]
     try:
-        if isinstance(name, bool):
-            raise ValueError
-        height = float(name)
-    except (TypeError, ValueError):
+        height = float(name) if isinstance(name, str) else scalar(name, "flange", unit="m")
+    except (ValueError, ShapeError):
         names = ", ".join(FLANGES)
         raise CommandRejected(
             f"flange must be one of {names}, or its height above a plain flange in metres, got {shown(name)}",
