@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 import heptarm as ha
 from heptarm.arm.link import local_simulator
-from tests.long import longer
+from tests.long import LONG, longer
 from tests.random_programs.judge import Judge, Violation
 from tests.random_programs.programs import Step, programs, refusals
 
@@ -23,7 +23,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(longer(600, 8 * 3600))]
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 #: Simulated seconds per second: streams of this machine's clock have gaps, which is part of the test.
 SPEED = 10
-EXAMPLES = longer(150, 20_000)
+#: The usual run has the same programs each time, about ten minutes of simulated time; the long one has others each time.
+EXAMPLES = longer(100, 20_000)
 
 
 class Rig:
@@ -78,6 +79,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 @settings(
     max_examples=EXAMPLES,
+    derandomize=not LONG,
     print_blob=True,
     phases=(Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink),
     suppress_health_check=list(HealthCheck),
