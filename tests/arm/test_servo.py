@@ -74,7 +74,7 @@ def test_poses_are_followed_and_one_out_of_reach_is_not_sent_but_reported(arm: h
 
 
 def test_a_pose_beyond_a_limit_names_the_axis(arm: ha.Arm) -> None:
-    arm.move(ha.ptp(ha.deg(0, 90, 0, -60, 0, 118, 0)))
+    arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 115, 0)))
     with arm.servo("pose", rate=50, watchdog=2.0) as sv:
         here = sv.start.pose
         angle = 0.0

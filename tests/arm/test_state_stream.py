@@ -7,10 +7,11 @@ from collections.abc import Iterable
 
 import pytest
 
-from heptarm.arm.link.state_stream import HISTORY, SampleQueue, StateFeed, States, StateSample
+from heptarm.arm.link.state_stream import HISTORY, StateFeed, States
 from heptarm.arm.translate.state import read_robot, read_state
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
 from heptarm.io.clock import StepClock
+from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.robot import FLANGES
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
