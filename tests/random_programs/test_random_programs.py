@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(longer(600, 8 * 3600))]
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 #: Simulated seconds per second: streams of this machine's clock have gaps, which is part of the test.
 SPEED = 10
-#: The usual run has the same programs each time, about ten minutes of simulated time; the long one has others each time.
+#: The usual run has the same programs each time, ten minutes of simulated time; the long one has others each time.
 EXAMPLES = longer(100, 20_000)
 
 
