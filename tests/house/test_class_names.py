@@ -34,7 +34,6 @@ HOMONYMS: dict[str, str] = {
     "Redundancy": "FRI's own message beside the value; heptarm.fri.protocol distinguishes them",
     "RobotInfo": "FRI's own message beside the protocol's; heptarm.fri.protocol distinguishes them",
     "Safety": "FRI's own enumeration beside the group of a state; heptarm.fri.protocol distinguishes them",
-    "Session": "the sans-IO machine of each of the two protocols: heptarm.wire and heptarm.fri",
     "SessionState": "the states of each of the two protocols: heptarm.wire and heptarm.fri",
     "State": "what a program reads: of an arm (heptarm.State), of an FRI session (heptarm.fri.State)",
     "Policy": "heptarm.fri.Policy for missing commands, heptarm.rl's trained policy: the field's word in both",

@@ -12,7 +12,7 @@ from heptarm import laws
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, ShapeError
 from heptarm.fri import LawTrial
 from heptarm.fri.loop.law_interface import flat
-from heptarm.fri.loop.parameters import Follower, merged
+from heptarm.fri.loop.parameters import RateLimiter, merged
 from heptarm.fri.loop.user_api import Params
 from heptarm.laws import ReadyLaw
 from heptarm.values.robot import ROBOTS, robot
@@ -160,7 +160,7 @@ def test_a_declaration_that_cannot_be_is_refused(make: object) -> None:
 
 def test_a_step_reaches_the_law_as_a_ramp() -> None:
     values, rates = np.array([0.0, 0.0, math.nan, 1.0]), np.array([10.0, math.inf, 1.0, 5.0])
-    follower = Follower(values, rates)
+    follower = RateLimiter(values, rates)
     follower.target[:] = 1.0, 1.0, 1.0, math.nan
     follower.step(0.01)
     assert values[:3].tolist() == [0.1, 1.0, 1.0] and math.isnan(values[3])

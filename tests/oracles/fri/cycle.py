@@ -17,7 +17,7 @@ from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import LAW_FAILED, describe
 from heptarm.fri.loop.native import COLLIDED, GAP_PERIODS, GRACE, MIN_GAP, REPEATS, REPEATS_ANALOG
-from heptarm.fri.loop.parameters import Follower
+from heptarm.fri.loop.parameters import RateLimiter
 from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Floats, Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import chain_of
@@ -381,7 +381,7 @@ class Cycle:
         self.is_ending = False
         self.law = settings.law
         self._params = Params(values.copy(), schema)
-        self._follower = Follower(self._params.words, settings.law_rates)
+        self._follower = RateLimiter(self._params.words, settings.law_rates)
         self._param_tick = -1
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)

@@ -308,7 +308,7 @@ class LawTrial(Sealed):
         address, self._kept = compiled.load(schema, remembered)
         self._function = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 4)(address)
         self._params, self._memory = np.append(values, 0.0), np.append(kept, 0.0)
-        self._follower = parameters.Follower(self._params[:-1], parameters.rates(declared))
+        self._follower = parameters.RateLimiter(self._params[:-1], parameters.rates(declared))
         self.params = Params(self._follower.target, schema, changed=lambda: None, declared=declared)
         self.memory = interface.Memory(self._memory, remembered)
         self._state = np.full(_words(interface.STATE), np.nan)

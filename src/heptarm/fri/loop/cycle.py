@@ -31,7 +31,7 @@ from heptarm.fri.loop.native import (
     Seam,
     library,
 )
-from heptarm.fri.loop.parameters import Follower
+from heptarm.fri.loop.parameters import RateLimiter
 from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Output, Outputs, Params, Signals, State
 from heptarm.fri.loop.wrench import chain_of
@@ -51,7 +51,7 @@ class Cycle:
         settings: settings of the loop.
 
     Attributes:
-        seam: what it shares with Python, `struct fri_seam`.
+        seam: what it and Python have in common, `struct fri_seam`.
         reference: the loop, for its functions.
         limit: interrupts a law in Python that does not return; None: nothing does.
         raised: texts of the errors that a law compiled by Numba has raised.
@@ -126,7 +126,7 @@ class Cycle:
             self.library.fri_protect()
             return
         self._params = Params(np.zeros(values.size), schema)
-        self._follower = Follower(self._params.words, settings.law_rates)
+        self._follower = RateLimiter(self._params.words, settings.law_rates)
         self._memory = Memory(memory, kept) if law is not None and arity(law) >= WITH_MEMORY else None
         self._param_tick, self._memory_tick, self._offer_tick = -1, 0, -1
         self._memory_written = np.zeros(memory.size)

@@ -254,7 +254,7 @@ def _follow() -> Callable[..., None]:
     return made
 
 
-class Follower:
+class RateLimiter:
     """Parameters as a law sees them: they follow what a program sets, each at its rate.
 
     Args:

@@ -24,7 +24,7 @@ _ABOVE = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
+class StationSetup:
     """The robot of a project.
 
     Attributes:
@@ -54,7 +54,7 @@ def find_station(place: Path) -> Path | None:
     return None
 
 
-def read_station(file: Path) -> Station:
+def read_station(file: Path) -> StationSetup:
     """Read a station setup.
 
     Raises:
@@ -66,8 +66,8 @@ def read_station(file: Path) -> Station:
         if match is not None:
             kind = "med" if "med" in "".join(names).lower() else "iiwa"
             flange, title = _flange(item)
-            return Station(file, f"{kind}{match[1]}", flange, title)
-    return Station(file, "", None, "")
+            return StationSetup(file, f"{kind}{match[1]}", flange, title)
+    return StationSetup(file, "", None, "")
 
 
 def _flange(item: ElementTree.Element) -> tuple[Flange | None, str]:
@@ -93,7 +93,7 @@ def simulated_robot(options: SimulatorOptions) -> tuple[RobotModel, tuple[str, .
     file = options.station
     if file is None and options.project is not None:
         file = find_station(options.project)
-    station = Station(Path(), "", None, "") if file is None else read_station(file)
+    station = StationSetup(Path(), "", None, "") if file is None else read_station(file)
     chosen = robot(options.model or station.model or _DEFAULT, flange=options.flange or None)
     is_stated = bool(options.flange) or chosen.flange.height > 0
     arm = chosen if is_stated or station.flange is None else chosen.with_flange(station.flange)
