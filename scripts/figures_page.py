@@ -50,7 +50,7 @@ Record = dict[str, Any]
 
 
 def newest() -> list[Record]:
-    """Each benchmark's newest figures; `machine` and `date` of a figure are those of its run.
+    """Each benchmark's newest figures, without the retired ones; `machine` and `date` of a figure are those of its run.
 
     Raises:
         FileNotFoundError: no run is stored.
@@ -65,7 +65,7 @@ def newest() -> list[Record]:
     for _, _, head, figures in sorted(runs, key=lambda run: run[:2], reverse=True):
         known = {figure["run"]["benchmark"] for figure in found}
         found += [figure | head for figure in figures if figure["run"]["benchmark"] not in known]
-    return found
+    return [one for one in found if not any(fnmatchcase(one["name"], pattern) for pattern in retired())]
 
 
 def machines(figures: list[Record]) -> list[str]:
@@ -76,6 +76,11 @@ def machines(figures: list[Record]) -> list[str]:
 def groups() -> list[Record]:
     """The text of bench/results/figures.toml for each group."""
     return list(tomllib.loads(TEXTS.read_text())["group"])
+
+
+def retired() -> list[str]:
+    """Names of stored figures that bench/results/figures.toml leaves out."""
+    return list(tomllib.loads(TEXTS.read_text())["retired"])
 
 
 def page(figures: list[Record]) -> str:
