@@ -32,6 +32,7 @@ REAL_TIME = (
         "data-flow-servo.md",
         "guidance.md",
         "io.md",
+        "jogging.md",
         "laws.md",
         "servo.md",
         "state.md",
