@@ -54,7 +54,7 @@ def test_a_simulated_robot_begins_at_its_full_speed(cabinet: RunningCabinet) -> 
     assert str(arm) == repr(arm)
 
 
-def test_the_entry_of_a_target_says_otherwise(
+def test_the_entry_of_a_target_comes_first(
     cabinet: RunningCabinet, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))

@@ -62,7 +62,7 @@ def test_the_pose_of_home_needs_no_swing(arm: ha.Arm) -> None:
     assert np.abs(arm.wait_for_rest().q_cmd - start).max() <= ha.deg(40.1)[0]
 
 
-def test_a_stream_into_the_candle_needs_its_own_way(arm: ha.Arm) -> None:
+def test_a_stream_into_the_candle_moves_the_joints_that_it_needs(arm: ha.Arm) -> None:
     start = ha.deg(0, 5, 0, -10, 0, 5, 0)
     arm.move(ha.ptp(start))
     arm.wait_for_rest()

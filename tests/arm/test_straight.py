@@ -45,7 +45,7 @@ def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
     assert np.linalg.norm(off - np.outer(off @ travel, travel), axis=1).max() < 2e-3
 
 
-def test_before_a_limit_it_rests_on_its_line_and_says_which_axis(arm: ha.Arm) -> None:
+def test_before_a_limit_it_rests_on_its_line_and_reports_which_axis(arm: ha.Arm) -> None:
     arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 155)))
     with arm.servo("lin", rate=50, speed_radps=1.0, acceleration_radps2=4.0, watchdog=2.0) as sv:
         start = sv.start.pose

@@ -440,7 +440,7 @@ def test_what_the_system_refuses_is_said_plainly() -> None:
         assert policy == os.SCHED_FIFO or "no real-time priority" in client.refused[0]
 
 
-def test_without_the_extension_it_says_so_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_extension_it_reports_so_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SWITCH, "1")
     library.cache_clear()
     with pytest.raises(Unavailable, match=SWITCH):

@@ -1,6 +1,6 @@
-"""No module of heptarm imports one that imports it, in whatever way: there is no circle.
+"""No module of heptarm imports one that imports it, wherever: there is no circle.
 
-Imports inside functions and those for type checkers count: a circle of them is one to whoever reads the modules. A
+Imports inside functions and those for type checkers count: a circle of them is one to anybody who reads the modules. A
 package's own `__init__` counts where somebody imports a name from it, not where a module in it is imported.
 """
 

@@ -58,7 +58,7 @@ def round_postures(draw: st.DrawFn) -> tuple[RobotModel, np.ndarray, np.ndarray]
 
 @settings(max_examples=longer(250, 20_000), deadline=None)
 @given(round_postures())
-def test_a_pose_of_a_round_posture_leads_back_to_it(
+def test_a_pose_of_a_round_posture_has_it_as_a_solution(
     given_: tuple[RobotModel, np.ndarray, np.ndarray],
 ) -> None:
     robot, q, noise = given_
@@ -90,7 +90,7 @@ def test_many_round_postures_in_one_call(robot: RobotModel) -> None:
 
 
 @each_robot
-def test_into_the_candle_needs_its_own_way_only(robot: RobotModel) -> None:
+def test_into_the_candle_moves_only_the_joints_that_it_needs(robot: RobotModel) -> None:
     """A smooth stream of poses into the candle swung joints by 115 degrees; it needs 10."""
     start, q = deg(0, 5, 0, -10, 0, 5, 0), deg(0, 5, 0, -10, 0, 5, 0)
     for part in np.linspace(0.0, 1.0, 201):
@@ -242,7 +242,7 @@ def test_redundancy_and_back(robot: RobotModel) -> None:
 
 @each_robot
 def test_round_postures_and_back(robot: RobotModel) -> None:
-    """A posture's own E1 and Status lead back to it, next to it; of 972 such postures 120 failed."""
+    """A posture's own E1 and Status give it back, next to it; of 972 such postures 120 failed."""
     steps = [
         np.array(one)
         for one in ((-90, 0, 90), (-45, 0, 60), (-90, 0, 90), (-90, 0), (-90, 0, 90), (-60, 0, 45))

@@ -219,14 +219,14 @@ def test_after_a_minute_of_twists_that_return_the_elbow_is_where_it_was(
 ) -> None:
     arm, random, q = robot("iiwa14"), np.random.default_rng(seed), np.radians(start)
     one, elbow, dt = path(q, speed=0.5), ElbowTask(arm, q), 0.02
-    begin, twist, wish, farthest = Pose.from_matrix(forward(arm, q)), np.zeros(6), np.zeros(6), 0.0
+    begin, twist, goal_twist, farthest = Pose.from_matrix(forward(arm, q)), np.zeros(6), np.zeros(6), 0.0
     for step in range(3000):
         here = Pose.from_matrix(forward(arm, one.q))
         back = here.displacement(begin)
         farthest = max(farthest, here.distance_to(begin))
         if step % 25 == 0:
-            wish = random.normal(size=6) * np.repeat([0.1, 0.3], 3)
-        goal = wish.copy()
+            goal_twist = random.normal(size=6) * np.repeat([0.1, 0.3], 3)
+        goal = goal_twist.copy()
         if step > 2500:
             goal = 3.0 * back
         else:  # within 0.15 m and 0.5 rad
@@ -239,7 +239,7 @@ def test_after_a_minute_of_twists_that_return_the_elbow_is_where_it_was(
     assert np.degrees(np.abs(one.q - q)).max() < 0.5
 
 
-def test_the_elbow_yields_before_a_limit_slows_the_twist_down() -> None:
+def test_the_elbow_moves_before_a_limit_slows_the_twist_down() -> None:
     start = np.radians([0, 30, 0, -90, 0, 60, 170.0])
     one, why = driven(start, np.array([0, 0, 0, 0, 0, 0.2]), 2.0)
     flange = [Pose.from_matrix(forward(robot("iiwa14"), q)) for q in (start, one.q)]
@@ -288,8 +288,8 @@ def test_poses_that_return_bring_the_elbow_back(start: tuple[float, ...]) -> Non
     begin, q, elbow = Pose.from_matrix(forward(arm, first)), first, ElbowTask(arm, first)
     least = 0.0
     for t in np.linspace(0.0, 6.0 * np.pi, 900):
-        way = [0.08 * (np.cos(t) - 1.0), 0.08 * np.sin(t), 0.05 * np.sin(2 * t)]
-        pose = Pose.of(begin.xyz + way, begin.quat) @ Pose.xyz_abc(
+        offset = [0.08 * (np.cos(t) - 1.0), 0.08 * np.sin(t), 0.05 * np.sin(2 * t)]
+        pose = Pose.of(begin.xyz + offset, begin.quat) @ Pose.xyz_abc(
             0, 0, 0, 0.3 * np.sin(t), 0.2 * np.sin(3 * t), 0
         )
         there = resolved_pose(arm, pose, q, elbow=elbow, reach=0.02)
@@ -300,7 +300,7 @@ def test_poses_that_return_bring_the_elbow_back(start: tuple[float, ...]) -> Non
     assert np.degrees(np.abs(q - first)).max() < 0.01 and np.degrees(least) < 0.1
 
 
-def test_with_a_posture_poses_lead_the_elbow_to_it() -> None:
+def test_with_a_posture_poses_bring_the_elbow_to_it() -> None:
     arm, posture = robot("iiwa14"), np.radians([25, 32, -35, -90, 20, 60, -10])
     pose, q = Pose.from_matrix(forward(arm, HOME)), HOME
     elbow = ElbowTask(arm, HOME, posture=posture)

@@ -1,6 +1,6 @@
 """The judge of random programs: what no tick of the plant may show, whatever a client asks for.
 
-It reads the plant's own record (`heptarm.sim.plant.shared_state.Trace`), not what a client was told.
+It reads the plant's own record (`heptarm.sim.plant.shared_state.Trace`), not what a client received.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class Posture:
 
 @dataclass(frozen=True)
 class Move:
-    """A motion, which may be cancelled, stopped or paused on its way."""
+    """A motion, which may be cancelled, stopped or paused before its end."""
 
     kind: str
     goal: Posture
@@ -128,7 +128,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Stream:
-    """A servo stream towards a posture: in steps, smooth, or of velocities, ended in one of several ways."""
+    """A servo stream towards a posture: in steps, smooth, or of velocities, ended in one of several manners."""
 
     kind: str
     goal: Posture

@@ -81,13 +81,13 @@ class Lockstep:
         for _ in range(round(seconds * 1e3)):
             self._tick()
 
-    def end(self, way: str) -> None:
+    def end(self, manner: str) -> None:
         """End the session: the program leaves its block, the overlay stops, it closes, the client falls silent."""
-        if way == "leave":
+        if manner == "leave":
             self._arm.release()
-        elif way == "stop":
+        elif manner == "stop":
             self._controller.stop()
-        elif way == "close":
+        elif manner == "close":
             self._controller.close()
         else:
             self._held = []

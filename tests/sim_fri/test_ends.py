@@ -1,4 +1,4 @@
-"""Whoever brakes last brakes within limits: a session ends at speed towards a joint limit, in every way it can."""
+"""What brakes last brakes within limits: a session ends at speed towards a joint limit, in every manner it can."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ TARGET = np.array((1.5, 0.4, 1.5, -1.2, 2.5, 4.0, -2.5))
 
 
 @pytest.mark.parametrize("period", [1, 5, 10])
-@pytest.mark.parametrize("way", ["leave", "stop", "close", "silence"])
-def test_the_end_of_a_session_passes_no_limit(way: str, period: int) -> None:
+@pytest.mark.parametrize("manner", ["leave", "stop", "close", "silence"])
+def test_the_end_of_a_session_passes_no_limit(manner: str, period: int) -> None:
     for moment in (0.25, 0.5, 0.7):  # while it accelerates, at full speed, while it brakes before the limit
         session = Lockstep(q=START, period_ms=period)
         limits = Limits.of(session.plant.robot)
         session.command(TARGET)
         session.run(moment)
         before = session.plant.snapshot.q_cmd[5]
-        session.end(way)
+        session.end(manner)
         session.run(1.0)
         reached = np.array([one.q_cmd[5] for one in session.track])
         assert reached[-1] > before, "it was moving towards the limit"

@@ -31,7 +31,7 @@ def state_folder() -> Path:
 
 
 def runtime_folder() -> Path:
-    """Folder of what running programs share: heptarm in XDG_RUNTIME_DIR, otherwise in the temporary folder."""
+    """Folder of what running programs have in common: heptarm in XDG_RUNTIME_DIR, otherwise in the temporary folder."""
     base = os.environ.get("XDG_RUNTIME_DIR", "")
     if base and os.path.isabs(base):
         return Path(base) / "heptarm"

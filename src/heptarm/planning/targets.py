@@ -155,10 +155,10 @@ def cartesian_path(robot: RobotModel, motion: PathMotion, start: Array, tcp: Pos
     )
     middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))
     is_free = abs(float(middle @ middle_of_other)) < _SAME_TURN
-    return other if is_free and not _leads_on(robot, path, start) and _leads_on(robot, other, start) else path
+    return other if is_free and not _goes_on(robot, path, start) and _goes_on(robot, other, start) else path
 
 
-def _leads_on(robot: RobotModel, path: CartesianPath, start: Array) -> bool:
+def _goes_on(robot: RobotModel, path: CartesianPath, start: Array) -> bool:
     """Whether the arm can follow a path within its joint limits, by samples."""
     near = start
     for s in np.linspace(0.0, 1.0, _LOOKS)[1:].tolist():

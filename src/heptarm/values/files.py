@@ -1,7 +1,7 @@
 """Files of users: read without trusting their lengths or their kind, and never replaced unasked.
 
 A reader that is given any file ends in an error that names the file and the place; nothing waits for a pipe, and
-nothing is as large as a number in a file says.
+nothing is as large as a number in a file states.
 """
 
 from __future__ import annotations
@@ -205,7 +205,7 @@ def _array(data: bytes) -> npt.NDArray[Any]:
     """The array of an .npy file.
 
     Raises:
-        ValueError: it is none, or its size is not what it says.
+        ValueError: it is none, or its size is not what it states.
     """
     raw = io.BytesIO(data)
     version = np.lib.format.read_magic(raw)

@@ -138,7 +138,7 @@ class ServoRequest:
         timeout: of velocities: silence after which the velocity becomes zero [s], 0.01 to 10; None: 0.2.
         elbow: of "twist" and "pose": what the redundant joint does: "keep": the arm angle stays that of the start, the
             default; "center": the joints stay away from their limits. Where a limit or a singularity would slow the
-            arm down, the elbow yields first.
+            arm down, the elbow moves first.
         posture: instead of `elbow`: the joints stay as near as they can to these positions, shape (7,) [rad].
         keep_clear_of: model of bodies to keep clear of, such as a `heptarm.CollisionModel`, which has the shapes of the
             attached tool and workpiece as well: velocities brake before them, targets that are nearer than its margin
@@ -813,7 +813,7 @@ class PoseServo(Servo):
     def set(self, pose: Pose) -> Pose:
         """Send a target; the newest one wins. After the end of the motion it has no effect.
 
-        The joint positions are those nearest to the last target, with the elbow where `elbow` or `posture` wants it. A
+        The joint positions are those nearest to the last target, with the elbow as `elbow` or `posture` states. A
         pose that they cannot reach is not sent: the arm is held at the last good target, and `stats` has the reason.
 
         Returns:
@@ -983,8 +983,8 @@ class LineServo(PoseServo):
             return
         robot = self._connection.robot
         left = Pose.from_matrix(forward(robot, joints.q_cmd)).displacement(self._pose @ self._to_flange)
-        way, turn = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
-        seconds = max(way / limits.velocity, turn / limits.orientation_velocity)
+        distance, turn = float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:]))
+        seconds = max(distance / limits.velocity, turn / limits.orientation_velocity)
         self._slowdown = FREE
         if seconds > _ARRIVED:
             why = blockage(robot, joints.q_cmd, left / seconds)

@@ -177,7 +177,7 @@ class Client(Sealed, Reader):
         """Send a command to the loop; it is valid until the next one, or until the policy's patience ends.
 
         A command is for the session of the state that was read last from this client (`state`, `session`, `next`,
-        `wait`). In a session of which no state was read it is not executed, `events` says so and `stats.stale` counts
+        `wait`). In a session of which no state was read it is not executed, `events` reports it, `stats.stale` counts
         it: a place that was computed in an older session may be far from where the arm now is.
 
         The guard limits it. NaN entries keep the last target of their axis or coordinate, or of the rotation. Arguments

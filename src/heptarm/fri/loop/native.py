@@ -1,4 +1,4 @@
-"""The loop in C: the structures that it shares with Python, and its functions.
+"""The loop in C: the structures that it and Python both use, and its functions.
 
 schema/generate.py writes native/fri_layout.h from the tables of this module.
 """

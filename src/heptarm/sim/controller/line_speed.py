@@ -98,9 +98,9 @@ class RateProfile:
         s = min(1.0, (time - times[k - 1]) / gap)
         # Hermite's cubic
         begin, end = self._q[k - 1], self._q[k]
-        way, u = end - begin, 1.0 - s
-        bent = u * (gap * self._slopes[k - 1] - way) - s * (gap * self._slopes[k] - way)
-        place: Array = begin + s * way + (s * u) * bent
+        step, u = end - begin, 1.0 - s
+        bent = u * (gap * self._slopes[k - 1] - step) - s * (gap * self._slopes[k] - step)
+        place: Array = begin + s * step + (s * u) * bent
         return place
 
     def change(self, elapsed: float) -> float:
@@ -230,8 +230,8 @@ class AxisLimits:
             gain = min(a - b * z for a, b in zip(rows[k], turns[k], strict=True))
             loss = max(-a - b * z for a, b in zip(rows[k], turns[k], strict=True))
             for a, b in zip(rows[k + 1], turns[k + 1], strict=True):
-                if (share := 1.0 + b * step) > 0.0:
-                    gain, loss = min(gain, (a - b * z) / share), max(loss, (-a - b * z) / share)
+                if (scale := 1.0 + b * step) > 0.0:
+                    gain, loss = min(gain, (a - b * z) / scale), max(loss, (-a - b * z) / scale)
             then = max(0.0, z + step * loss, min(most[k + 1], z + step * gain))
             if then > most[k + 1] * _ROUNDING + _AT_REST:
                 return None

@@ -247,7 +247,7 @@ class VirtualCabinet:
         return self.is_foreign and self._server is not None
 
     def ready(self) -> dict[str, Any]:
-        """What the line reports that says that it is ready."""
+        """What the line reports that announces that it is ready."""
         robot = self.plant.robot
         return {"ready": True, "pid": os.getpid(), "model": robot.name, "notes": self.notes}
 

@@ -3,7 +3,7 @@
    A law is called for every message while commands are effective, in the thread that answers the cabinet: it must not wait,
    print or open files. Its parameters and its memory are structures of doubles, in the order of params= and memory= in Python.
    It returns 0, or a number of its own that ends the session; the arm brakes. The guard limits what it commands, and
-   the motion to which its torques lead. Declare the parameters with heptarm.param: Python then refuses what is out of range, and
+   the motion that its torques cause. Declare the parameters with heptarm.param: Python then refuses what is out of range, and
    a law sees a step as a ramp.
 
        struct parameters { double stiffness, goal[7]; };
