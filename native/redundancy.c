@@ -28,6 +28,9 @@ static const double USUAL[N] = {0.0, 0.3, 0.0, -M_PI / 2, 0.0, M_PI / 3, 0.0};
 static const double IN_PLANE = 1e-10;
 /* Where the smallest lever arm [m] or sine of a closed form is below it, another posture may be nearer. */
 static const double VAGUE = 0.02;
+/* With a given A3 the posture in the Status of `near` stands alone if it is so clear: `near` is then nearer to it than to the one in
+   another Status, half of what makes it clear away. What TOLERANCE would allow instead is noise, which paths show as acceleration. */
+static const double ALONE = 1e-4, NEAREST = 0.5;
 /* Postures with A3 and Status of `near` are taken if they are at most so many times as far as the nearest one. */
 static const double PREFERENCE = 5.0;
 /* Distances this small are none [rad]. */
@@ -312,7 +315,7 @@ struct search {
 static void offer(struct search *s, const double *q) {
     const struct request *request = s->request;
     int in_status = is_in(s->arm, q, s->status, s->border), keeps_a3 = fabs(q[2] - s->a3) <= SAME;
-    if ((request->status >= 0 && !in_status) || (request->is_fixed && fabs(q[2] - s->a3) > s->border)) return;
+    if ((request->status >= 0 && !in_status) || (request->is_fixed && fabs(q[2] - s->a3) > (request->is_unlimited ? SAME : s->border))) return;
     double away = distance(q, s->near), outside = request->is_unlimited ? 0.0 : excess(s->arm, q);
     if (outside > ON_LIMIT) {
         if (outside <= NEAR_LIMIT && away < s->beyond_distance) {
@@ -519,28 +522,31 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
     s.border = request->near ? BOTH_SIGNS : NO_SIGN;
     s.status = request->status < 0 ? hi_status(arm, near) : request->status;
     for (int class = 0; class < CLASSES; class++) s.distance[class] = INFINITY;
-    int is_given = request->is_fixed && request->status >= 0;
+    /* on a path A3 has no noise of a measurement: another A3 each time would add up */
+    int is_given = request->is_fixed && request->status >= 0, is_exact = request->is_fixed && request->is_unlimited;
     double first[N], loose[N];
     /* the usual case: the posture with A3 and Status is clear, and moves no joint farther than it must */
-    if (with_a3(arm, &target, s.a3, s.status, near, 0, first) > (is_given && !request->near ? NO_SIGN : VAGUE) && (request->is_unlimited || excess(arm, first) <= ON_LIMIT)) {
-        double most = largest_move(first, near);
+    double clear = with_a3(arm, &target, s.a3, s.status, near, 0, first), most = largest_move(first, near);
+    if (is_exact && clear > ALONE && most <= NEAREST * clear) return take(&s, first, q);
+    if (clear > (is_given && !request->near ? NO_SIGN : VAGUE) && (request->is_unlimited || excess(arm, first) <= ON_LIMIT)) {
         if (is_given || most <= SAME || (most <= LONG_WAY && distance(first, near) <= PREFERENCE * estimate(arm, &target, near))) return take(&s, first, q);
     }
     memcpy(first, near, sizeof first);
     first[2] = s.a3;
     if (estimate(arm, &target, near) < FAR_AWAY) {
-        offer_settled(&s, request->is_fixed ? first : near, 0);
+        if (!is_exact) offer_settled(&s, request->is_fixed ? first : near, 0);
         offer_settled(&s, first, 1);
     }
     for (int status = 0; status < ALL; status++) {
-        double clear = with_a3(arm, &target, s.a3, status, near, 0, first), error[6], j[6][N];
+        double error[6], j[6][N];
+        clear = with_a3(arm, &target, s.a3, status, near, 0, first);
         if (clear < 0.0) continue;
         if (clear > VAGUE || miss(arm, &target, first, error, j) <= TOLERANCE) offer(&s, first);
         if (clear > VAGUE) continue;
         with_a3(arm, &target, s.a3, status, near, 1, loose);
         if (distance(loose, near) >= s.least) continue;
         offer_settled(&s, loose, 1);
-        offer_settled(&s, loose, 0);
+        if (!is_exact) offer_settled(&s, loose, 0);
     }
     if (!request->is_fixed && (!(s.least < INFINITY) || largest_move(s.q[choose(&s)], near) > LONG_WAY)) offer_sweep(&s);
     if (!(fmin(s.least, s.beyond_distance) < INFINITY)) return NO_POSTURE;

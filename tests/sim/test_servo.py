@@ -127,14 +127,70 @@ def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
     assert ear.causes == ["started", "done"]
 
 
-def test_a_velocity_that_goes_out_of_the_limits_stops_the_arm() -> None:
+def test_an_axis_that_passes_its_target_with_a_velocity_rests_before_its_limit() -> None:
     plant, ear = serving(timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
     plant.shared.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))
-    to_rest(plant, most=6000)
-    cause, text = ear.heard[-1]
-    assert cause == "error" and "violates limit A7" in text
+    path = commands(plant, 6000)
+    assert edge[6] < path[-1][6] <= plant.robot.q_max[6]
+    assert (path[-1] == path[-100]).all() and ear.causes == ["started"]
+    within_limits(plant, path)
+
+
+def within_limits(plant: Plant, path: Array) -> None:
+    """Assert that set-points, tick by tick, are within the range, velocity and acceleration of every axis."""
+    robot, speed = plant.robot, np.diff(path, axis=0) * 1e3
+    assert (path >= robot.q_min - 1e-9).all() and (path <= robot.q_max + 1e-9).all()
+    assert (np.abs(speed) <= robot.dq_max * (1.0 + 1e-6)).all()
+    assert (np.abs(np.diff(speed, axis=0)) * 1e3 <= robot.ddq_max * (1.0 + 1e-6)).all()
+
+
+#: Near the limits of A1, A3, A5 to A7.
+CORNER = np.radians([160.0, 30.0, 150.0, -90.0, 165.0, 110.0, 160.0])
+
+
+def towards_the_limits(kind: str) -> tuple[Plant, Array]:
+    """A plant whose axes are on the way to their limits, and the limits."""
+    plant = Plant("iiwa14", q=tuple(CORNER.tolist()))
+    plant.submit(MotionCommand(7, motions.direct() if kind == "direct" else motions.servo()))
+    plant.step(2)
+    goal = np.where(np.abs(CORNER) > np.pi / 2 + 0.1, plant.robot.q_max, CORNER)
+    plant.shared.post(7, goal)
+    return plant, goal
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_target_on_the_limits_is_reached_within_every_limit(kind: str) -> None:
+    plant, goal = towards_the_limits(kind)
+    path = np.vstack([[CORNER] * 3, commands(plant, 1500)])
+    within_limits(plant, path)
+    assert np.abs(path[-1] - goal).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("how", ["cancel", "stop_fast", "emergency stop"])
+@pytest.mark.parametrize("after", [100, 170, 220, 260, 300])
+def test_a_stop_on_the_way_to_the_limits_leaves_none(kind: str, how: str, after: int) -> None:
+    plant, _ = towards_the_limits(kind)
+    path = np.vstack([[CORNER] * 3, commands(plant, after)])
+    match how:
+        case "cancel":
+            plant.cancel(7)
+        case "stop_fast":
+            plant.stop_fast()
+        case _:
+            plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
+    within_limits(plant, np.vstack([path, commands(plant, 700)]))
+
+
+def test_a_direct_motion_whose_target_comes_too_near_passes_it_and_not_the_limit() -> None:
+    plant, goal = towards_the_limits("direct")
+    path = np.vstack([[CORNER] * 3, commands(plant, 120)])
+    plant.shared.post(7, path[-1])
+    path = np.vstack([path, commands(plant, 600)])
+    within_limits(plant, path)
+    assert np.abs(path[-1] - path[122]).max() < 1e-9 < np.abs(path[-500:] - path[122]).max()
 
 
 @pytest.mark.parametrize("kind", KINDS)

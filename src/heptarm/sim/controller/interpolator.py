@@ -547,7 +547,7 @@ class Interpolator:
         try:
             there = run.path.at(s, self._command.after)
         except Unreachable as error:
-            self._fail(run, f"the path is not reachable: {error.text}")
+            self._break_off(run, f"the path is not reachable: {error.text}")
             return
         self._set(run, there)
 
@@ -555,7 +555,7 @@ class Interpolator:
         """Set the next set-point; one that an axis could not follow ends the motion."""
         axis = self._command.leap(there)
         if axis is not None and not run.failure:
-            self._fail(run, f"Command Velocity violates limit A{axis + 1} (singularity)")
+            self._break_off(run, f"Command Velocity violates limit A{axis + 1} (singularity)")
             return
         self._command.after = there
 
@@ -580,15 +580,26 @@ class Interpolator:
         run.failure = text
         self._halt(run)
 
+    def _break_off(self, run: RunningMotion, text: str) -> None:
+        """Let the motion fail in a tick that has no set-point: it brakes from there at once, for a rest of a tick jumps."""
+        self._fail(run, text)
+        if run.follower is not None:
+            self._command.after = run.follower.advance(TICK)
+        elif run.path is not None and run.profile is not None:
+            run.time += TICK
+            self._command.after = run.path.at(run.profile.at(run.time)[0], self._command.after)
+
     def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
         """Come to rest off the path: all axes together, in the direction of the present velocity.
 
-        The axes of an overlay have no path in common: each brakes as hard as it may, and as soon, as the guard of the
-        client expects. A jerk as gentle as that of a motion would take several degrees more.
+        The axes of an overlay or of a servo motion in joint space have no path in common: each brakes as hard as it
+        may, or it would get beyond its range for the sake of a faster one. Those of an overlay do so as soon as the
+        guard of the client expects. A jerk as gentle as that of a motion would take several degrees more.
         """
-        if self.is_overlaid:
-            self.is_overlaid = False
-            run.follower = braking_axes(self._robot, self._command.after, self._command.speed, jerk=FAST_JERK)
+        if self.is_overlaid or isinstance(run.follower, SmartFollower | DirectFollower):
+            if self.is_overlaid:
+                self.is_overlaid, jerk = False, FAST_JERK
+            run.follower = braking_axes(self._robot, self._command.after, self._command.speed, jerk=jerk)
             run.braking, run.stop = True, None
             return
         if run.guided is not None:
@@ -668,15 +679,15 @@ class Interpolator:
         try:
             there = follower.advance(TICK if run.braking else TICK * self._speed_override.factor)
         except Unreachable as error:
-            self._fail(run, f"the path is not reachable: {error.text}")
+            self._break_off(run, f"the path is not reachable: {error.text}")
             return nan, nan
         if run.braking:
             run.ended = follower.is_still
         elif isinstance(motion, ServoMotion):
             run.ended = follower.resting > motion.timing.goal_timeout
-        axis = self._command.beyond(there)
+        axis = None if run.failure else self._command.beyond(there)
         if axis is not None:
-            self._fail(run, f"Command Position violates limit A{axis + 1}")
+            self._break_off(run, f"Command Position violates limit A{axis + 1}")
         else:
             self._set(run, there)
         return nan, follower.remaining

@@ -527,6 +527,40 @@ class ServoLimits:
         )
 
 
+def _stoppable(room: Array, acceleration: Array) -> Array:
+    """Largest speeds for the next tick after which axes still come to rest within a distance, shape (7,) [rad/s].
+
+    The speed changes from tick to tick: that of m accelerations times a tick stops within 1 + ... + m of the steps that
+    one of them makes, and between two of these speeds the distance is linear.
+    """
+    step = acceleration * TICK
+    room = np.maximum(room, 0.0)
+    whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * room / (step * TICK)) - 1.0))
+    most: Array = 0.5 * whole * step + room / ((whole + 1.0) * TICK)
+    return most
+
+
+class _HardBrake:
+    """Axes that brake with their acceleration at once.
+
+    Args:
+        axes: which ones, shape (7,).
+        here: set-point, shape (7,) [rad].
+        speed: that has led there, shape (7,) [rad/s].
+        acceleration: shape (7,) [rad/s²].
+    """
+
+    def __init__(self, axes: Array, *, here: Array, speed: Array, acceleration: Array) -> None:
+        self._axes, self._q, self._dq, self._acceleration = axes, here, speed, acceleration
+
+    def advance(self, dt: float, others: Array) -> Array:
+        """The next set-point, shape (7,) [rad], with other axes as they are given."""
+        step = self._acceleration * dt
+        self._dq = self._dq - np.clip(self._dq, -step, step)
+        self._q = self._q + self._dq * dt
+        return np.where(self._axes, self._q, others)
+
+
 class SmartFollower:
     """Follows targets with a velocity-, acceleration- and jerk-limited trajectory to each.
 
@@ -545,6 +579,7 @@ class SmartFollower:
         self._goal: tuple[Array, Array | None] | None = None
         self._passes = False
         self._stopping = False
+        self._hard: _HardBrake | None = None
         self.resting = 0.0
 
     def restart(self, here: Array) -> None:
@@ -581,10 +616,13 @@ class SmartFollower:
                 self._halt(self._state())
             elif not self._passes:
                 self.resting = over
-        return self._state()[0]
+        there = self._state()[0]
+        return there if self._hard is None else self._hard.advance(dt, there)
 
     def brake(self, *, scale: float, rate: float, speed: Array | None = None) -> None:
         """Come to rest as fast as the axes may, ignoring further targets; ends when `is_still`.
+
+        An axis that would get beyond its range by the limit of its jerk brakes without that.
 
         Args:
             scale: speed as a fraction of full speed; the stop itself runs at full speed.
@@ -597,8 +635,14 @@ class SmartFollower:
         if speed is not None:
             dq = speed
         limit = self._limits.acceleration  # beyond it the axis would reverse at the end of braking
-        self._halt((q, dq * scale, np.clip(ddq * scale * scale + dq * rate, -limit, limit)))
+        dq = dq * scale
+        self._halt((q, dq, np.clip(ddq * scale * scale + dq * rate, -limit, limit)))
         self._stopping = True
+        end = self._otg.at(self._otg.duration)[0] if self._otg.has_begun else q
+        low, high = np.minimum(self._limits.lowest, q), np.maximum(self._limits.highest, q)
+        outside = (end < low - _TINY) | (end > high + _TINY)
+        if outside.any():
+            self._hard = _HardBrake(outside, here=q, speed=dq, acceleration=limit)
 
     @property
     def is_still(self) -> bool:
@@ -661,13 +705,19 @@ class DirectFollower:
         if dt <= 0.0:
             return self._q
         limits, distance = self._limits, self._target - self._q
-        velocity = distance / max(self._left, APPROACH)
-        ceiling = np.minimum(limits.velocity, np.sqrt(2.0 * limits.acceleration * np.abs(distance)))
-        velocity = np.clip(velocity, -ceiling, ceiling)
+        ceiling = np.minimum(limits.velocity, _stoppable(np.abs(distance), limits.acceleration))
+        # an axis that had to pass its target, since that came too near, stays within its range
+        below = np.minimum(limits.lowest, self._target) - self._q
+        above = np.maximum(limits.highest, self._target) - self._q
+        velocity = np.clip(
+            np.clip(distance / max(self._left, APPROACH), -ceiling, ceiling),
+            -_stoppable(-below, limits.acceleration),
+            _stoppable(above, limits.acceleration),
+        )
         self._dq = self._dq + np.clip(
             velocity - self._dq, -limits.acceleration * dt, limits.acceleration * dt
         )
-        self._q = self._q + self._dq * dt
+        self._q = self._q + np.clip(self._dq * dt, np.minimum(below, 0.0), np.maximum(above, 0.0))
         self._left = max(0.0, self._left - dt)
         self.resting = self.resting + dt if self._left == 0.0 else 0.0
         return self._q
