@@ -1,4 +1,4 @@
-"""Steps: how far the arm deforms under a weight, and what it does where it touches something."""
+"""Steps: how far the arm deforms under a weight, how it is guided, and what it does where it touches something."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import numpy as np
 
 from heptarm import model
 from heptarm.arm.arm import Arm
-from heptarm.sim.control.laws import STIFFNESS
+from heptarm.sim.control.cartesian_impedance import GUIDED_STIFFNESS
+from heptarm.sim.control.laws import GUIDED, STIFFNESS
 from heptarm.skills.touch import touch
-from heptarm.testing.commissioning.person import Person, PersonTask, expect
+from heptarm.testing.commissioning.person import PATIENCE, Person, PersonTask, expect
 from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, near, step
-from heptarm.testing.measure import watch
+from heptarm.testing.measure import Unfit, watch
 from heptarm.testing.stage import DEEPEST
 from heptarm.values.arrays import Array
+from heptarm.values.mode.compliance import compliance
+from heptarm.values.motion.hold import hold
 from heptarm.values.motion.line import lin_rel
 from heptarm.when import force
 
@@ -23,6 +26,10 @@ _FORCE, _SLOWLY, _ABOVE = 15.0, 0.01, 0.01
 #: Times for which the arm is watched under a weight, and after its end [s].
 _HANGING, _SWINGING = 3.0, 1.0
 _UP = 0.05
+#: A weight pulls the flange down by so much, of which the first part does not count [m].
+_FALL, _BEGINNING = 0.1, 0.02
+#: Time for which a compliant arm is watched without a weight [s].
+_FREE = 0.5
 
 
 def hang(arm: Arm, person: Person, before: Array) -> None:
@@ -77,6 +84,45 @@ def stiffness(arm: Arm, person: Person) -> tuple[Comparison, ...]:
         at_most(
             "and comes back to it within", 1000 * abs(swinging[-1].pose.z - height), 100 * expected, "mm"
         ),
+    )
+
+
+@step(
+    movement=Movement(
+        "The flange",
+        "down by 0.2 m at most, pulled by the weight",
+        f"{1000 * GUIDED[0]:g} mm/s; the arm is compliant vertically: hang {MASS:g} kg on the flange and drop it "
+        "when you are asked to",
+    ),
+    needs=("cartesian_impedance",),
+)
+def guiding(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Does a direction without stiffness resist a weight as assumed, by a critical damper, below the bound of speed?"""
+    handle = arm.start(hold(PATIENCE), mode=compliance("z", frame="base"))
+    handle.wait_started(PATIENCE)
+    free = watch(arm, _FREE)
+    begin = free[-1].pose.z
+    across = model.jacobian(arm.robot, free[-1].q)
+    person.does(PersonTask.HANG)
+    falling = []
+    for state in handle.states():
+        falling.append(state)
+        if state.pose.z < begin - _FALL:
+            break
+    handle.cancel()
+    handle.wait()
+    person.does(PersonTask.DROP)
+    steady = [state for state in falling if state.pose.z < begin - _BEGINNING]
+    if len(steady) < 3:
+        raise Unfit(f"the weight moved the flange by less than {_FALL:g} m within {PATIENCE:g} s")
+    seconds = np.array([state.stamp - steady[0].stamp for state in steady]) * 1e-9
+    speed = -float(np.polyfit(seconds, [state.pose.z for state in steady], 1)[0])
+    inertia = np.linalg.inv(across @ np.linalg.inv(model.mass_matrix(arm.robot, free[-1].q)) @ across.T)
+    damper = 2.0 * float(np.sqrt(GUIDED_STIFFNESS[2] * inertia[2, 2]))
+    return (
+        at_most("without the weight it sinks by", 1000 * abs(begin - free[0].pose.z), 10.0, "mm"),
+        near("weight by the speed with which it sinks", WEIGHT / speed, damper, 0.5 * damper, "N s/m"),
+        at_most("which is", speed, GUIDED[0], "m/s"),
     )
 
 
