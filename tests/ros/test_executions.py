@@ -157,13 +157,13 @@ def test_a_goal_preempts_a_motion_that_is_not_yet_accepted(
 ) -> None:
     start, begun = driver.arm.start, threading.Event()
 
-    def slowly(*arguments: object, **named: object) -> object:
+    def slowly(_: object, *arguments: object, **named: object) -> object:
         begun.set()
         time.sleep(0.3)
         return start(*arguments, **named)  # type: ignore[arg-type]
 
     def goal_behind_a_motion() -> None:
-        monkeypatch.setattr(driver.arm, "start", slowly)
+        monkeypatch.setattr(type(driver.arm), "start", slowly)  # of the class: the arm is sealed
         begun.clear()
         mover = threading.Thread(target=driver.start, args=(ptp(HOME + 0.5 * AWAY),))
         mover.start()
