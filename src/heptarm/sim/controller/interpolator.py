@@ -581,7 +581,7 @@ class Interpolator:
         self._halt(run)
 
     def _break_off(self, run: RunningMotion, text: str) -> None:
-        """Let the motion fail in a tick that has no set-point: it brakes from there at once: a tick of rest would jump."""
+        """Let the motion fail in a tick without a set-point: it brakes at once, since a tick of rest would jump."""
         self._fail(run, text)
         if run.follower is not None:
             self._command.after = run.follower.advance(TICK)
