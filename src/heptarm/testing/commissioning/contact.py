@@ -15,8 +15,8 @@ from heptarm.testing.measure import Unfit, watch
 from heptarm.testing.stage import DEEPEST
 from heptarm.values.arrays import Array
 from heptarm.values.mode.compliance import compliance
-from heptarm.values.motion.hold import hold
 from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.motion import hold
 from heptarm.when import force
 
 #: Weight that the person attaches to the flange, and its mass [N, kg].
@@ -92,7 +92,7 @@ def stiffness(arm: Arm, person: Person) -> tuple[Comparison, ...]:
         "The flange",
         "down by 0.2 m at most, pulled by the weight",
         f"{1000 * GUIDED[0]:g} mm/s; the arm is compliant vertically: hang {MASS:g} kg on the flange and drop it "
-        "when you are asked to",
+        "and drop it when you are asked to",
     ),
     needs=("cartesian_impedance",),
 )
