@@ -185,7 +185,7 @@ def test_a_stop_on_the_way_to_the_limits_leaves_none(kind: str, how: str, after:
 
 
 def test_a_direct_motion_whose_target_comes_too_near_passes_it_and_not_the_limit() -> None:
-    plant, goal = towards_the_limits("direct")
+    plant, _ = towards_the_limits("direct")
     path = np.vstack([[CORNER] * 3, commands(plant, 120)])
     plant.shared.post(7, path[-1])
     path = np.vstack([path, commands(plant, 600)])

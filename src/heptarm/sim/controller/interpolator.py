@@ -581,7 +581,7 @@ class Interpolator:
         self._halt(run)
 
     def _break_off(self, run: RunningMotion, text: str) -> None:
-        """Let the motion fail in a tick that has no set-point: it brakes from there at once, for a rest of a tick jumps."""
+        """Let the motion fail in a tick that has no set-point: it brakes at once, for one tick of rest is a jump."""
         self._fail(run, text)
         if run.follower is not None:
             self._command.after = run.follower.advance(TICK)

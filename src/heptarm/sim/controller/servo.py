@@ -12,6 +12,7 @@ from functools import partial
 from math import atan2, cos, sin, sqrt
 
 import numpy as np
+import numpy.typing as npt
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
 from heptarm.model.inverse_kinematics import PathInverse
@@ -550,7 +551,9 @@ class _HardBrake:
         acceleration: shape (7,) [rad/s²].
     """
 
-    def __init__(self, axes: Array, *, here: Array, speed: Array, acceleration: Array) -> None:
+    def __init__(
+        self, axes: npt.NDArray[np.bool_], *, here: Array, speed: Array, acceleration: Array
+    ) -> None:
         self._axes, self._q, self._dq, self._acceleration = axes, here, speed, acceleration
 
     def advance(self, dt: float, others: Array) -> Array:

@@ -17,7 +17,7 @@ from heptarm.values.robot import RobotModel
 OVERRIDE_SLEW = ProfileLimits(4.0, 40.0, 800.0)
 #: Below this factor the full speed cannot be computed from the set-points any more.
 _FAINT = 1e-4
-#: Fraction of the axes' acceleration with which a motion halts on its path: the rest is for how the path bends meanwhile.
+#: Fraction of the axes' acceleration with which a motion halts on its path: the rest is for its bend.
 _GRIP = 0.98
 #: Sharpness of the transition to the speed ceiling; higher is sharper.
 _SHARPNESS = 8
