@@ -11,6 +11,7 @@ import pytest
 from heptarm.model.kinematics import forward
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -230,6 +231,23 @@ def test_it_brakes_on_its_line_before_a_limit_and_can_go_back(
     back = followed(plant, lambda: start, 2200)
     assert Pose.from_matrix(forward(plant.robot, back[-1])).distance_to(start) < 1e-6
     assert ear.causes == ["started"]
+
+
+def test_an_emergency_stop_on_a_bent_line_keeps_every_axis_within_its_acceleration() -> None:
+    plant = Plant("iiwa14", q=tuple(np.radians(HOME).tolist()))
+    plant.submit(MotionCommand(7, motions.straight(velocity=(0.4,) * 3 + (0.8,) * 3), listener=Ear()))
+    plant.step(2)
+    begin, end = np.radians(HOME), np.radians([-15.0, -15.0, 0.0, -89.0, -15.0, 120.0, 0.0])
+    ticks = iter(range(1500))
+
+    def target() -> Pose:
+        part = np.sin(0.02 * next(ticks))
+        return Pose.from_matrix(forward(plant.robot, begin + part * (end - begin)))
+
+    followed(plant, target, 223)
+    plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
+    rest = followed(plant, target, 200)
+    assert (rest[-1] == rest[-50]).all()
 
 
 @pytest.mark.parametrize("every", ["target", "target once"])

@@ -17,6 +17,8 @@ from heptarm.values.robot import RobotModel
 OVERRIDE_SLEW = ProfileLimits(4.0, 40.0, 800.0)
 #: Below this factor the full speed cannot be computed from the set-points any more.
 _FAINT = 1e-4
+#: Fraction of the axes' acceleration with which a motion halts on its path: the rest is for its bend.
+_GRIP = 0.98
 #: Sharpness of the transition to the speed ceiling; higher is sharper.
 _SHARPNESS = 8
 
@@ -35,7 +37,7 @@ class SpeedOverride:
 
     def __init__(self, robot: RobotModel) -> None:
         self._robot = robot
-        self._step = robot.ddq_max * TICK
+        self._step = _GRIP * robot.ddq_max * TICK
         self._free = 1.0  # the factor before a ceiling
         self._goal = 1.0
         self._slew: JerkProfile | None = None  # while it changes
