@@ -53,7 +53,6 @@ PACKAGES = (
         (
             *("tests/sim/test_table.py", "tests/sim/test_spline.py", "tests/sim/test_circ.py"),
             *("tests/sim/test_lookahead.py", "tests/sim/test_straight.py", "tests/sim/test_motions.py"),
-            *("tests/sim/test_posture.py",),
         ),
     ),
     Package("guard", ("src/heptarm/fri/guard",), ("tests/fri",)),
