@@ -21,8 +21,8 @@ from tests.sim.driving import Ear
 NOTHING = np.zeros(7)
 #: Every joint is stiff but A6, which floats.
 FLOATS = JointImpedance([1000.0] * 5 + [0.0, 1000.0])
-#: Soft, but too stiff to be guided by hand: guiding bounds the velocity, and a push then trips the torque sensor.
-SOFT = JointImpedance(20.0)
+#: Compliant, but too stiff to be guided by hand: guiding bounds the velocity, and a push then trips the torque sensor.
+COMPLIANT = JointImpedance(20.0)
 
 
 def at(robot: RobotModel, axis: int, value: float) -> np.ndarray:
@@ -87,7 +87,7 @@ def push_slowly(plant: Plant, tick: int) -> None:
 @pytest.mark.parametrize(
     ("mode", "a6", "push", "text"),
     [
-        (SOFT, 60.0, push_speed, "drive error in A6: velocity"),
+        (COMPLIANT, 60.0, push_speed, "drive error in A6: velocity"),
         (FLOATS, 119.5, push_beyond, "drive error in A6: position 120."),
         (None, 60.0, push_slowly, "deg behind its set-point"),
     ],
