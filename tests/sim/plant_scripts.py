@@ -15,6 +15,7 @@ from heptarm.sim.plant.world import Box
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.robot import Body, robot
+from tests.sim import motions
 from tests.sim.driving import READY
 from tests.sim.ideal import KINDS
 
@@ -93,7 +94,9 @@ PLANT_SCRIPTS = {
     **{kind: PlantScript({3: submit(kind)}) for kind in ("ptp", "lin", "circ", "batch", "spline")},
     "from the straight arm": PlantScript({3: submit("ptp")}, q=(0.0,) * 7),
     "from home, twice": PlantScript(
-        {3: submit("ptp"), 5: submit("ptp", id=2, joints=HOME), 7: submit("lin", id=3)}, ticks=3000, q=HOME
+        {3: submit("ptp"), 5: submit("ptp", id=2, motion=motions.ptp(HOME)), 7: submit("lin", id=3)},
+        ticks=3000,
+        q=HOME,
     ),
     "overrides": PlantScript(
         {3: submit("ptp"), 200: _override(0.3), 500: _override(0.9), 700: _override(1.0), 900: _override(0.0)}
@@ -103,18 +106,22 @@ PLANT_SCRIPTS = {
     "pause of a joint motion": PlantScript({3: submit("ptp"), 300: Plant.pause, 700: Plant.resume}),
     "stop of a joint motion": PlantScript({3: submit("ptp"), 400: Plant.stop}),
     "fast stop, and another motion": PlantScript(
-        {3: submit("ptp"), 400: Plant.stop_fast, 700: submit("ptp", id=2, joints=READY)}
+        {3: submit("ptp"), 400: Plant.stop_fast, 700: submit("ptp", id=2, motion=motions.ptp(READY))}
     ),
     "emergency stop and release": PlantScript({3: submit("ptp"), 400: _stop, 900: _go_on}, ticks=1600),
     "T1": PlantScript({3: _t1, 5: submit("ptp")}),
     "servo": PlantScript({3: submit("servo"), 20: _target(_LATER), 400: _target(READY)}),
     "direct": PlantScript({3: submit("direct"), 20: _target(_LATER), 200: _target(READY)}),
     "joint impedance": PlantScript(
-        {3: submit("ptp", mode=_COMPLIANT), 1100: submit("ptp", id=2, joints=READY)}
+        {3: submit("ptp", mode=_COMPLIANT), 1100: submit("ptp", id=2, motion=motions.ptp(READY))}
     ),
     "cartesian impedance": PlantScript(
         {
-            3: submit("hold", mode=CartesianImpedance((800.0, 900.0, 700.0, 60.0, 70.0, 50.0)), duration=0.6),
+            3: submit(
+                "hold",
+                mode=CartesianImpedance((800.0, 900.0, 700.0, 60.0, 70.0, 50.0)),
+                motion=motions.hold(0.6),
+            ),
             100: lambda plant: plant.apply_wrench((10.0, -5.0, 8.0), duration=0.2),
         }
     ),
@@ -131,13 +138,13 @@ PLANT_SCRIPTS = {
             3: submit("ptp"),
             300: lambda plant: plant.apply_wrench((1500.0, 900.0, 0.0), duration=0.05),
             900: lambda plant: (plant.acknowledge(), plant.resume()),
-            950: submit("ptp", id=2, joints=READY),
+            950: submit("ptp", id=2, motion=motions.ptp(READY)),
         },
         ticks=1500,
     ),
     "noisy sensors": PlantScript({3: submit("ptp")}, noisy=True),
     "contact": PlantScript(
-        {3: submit("lin", offset=(0.0, 0.0, -0.25, 0.0, 0.0, 0.0, 1.0), cart_velocity=0.12)},
+        {3: submit("lin", motion=motions.lin_rel((0.0, 0.0, -0.25, 0.0, 0.0, 0.0, 1.0), velocity=0.12))},
         box=Box((0.6, 0.0, 0.25), (0.6, 0.8, 0.3)),
     ),
 }
