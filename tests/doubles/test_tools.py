@@ -116,7 +116,7 @@ def test_a_project_file_reports_its_tools_and_places(project: Path) -> None:
     ("text", "expected_text"),
     [
         ("no xml", "not a project file"),
-        (PROJECT.replace("120.0", "high"), "transformation z must be a number, got 'high'"),
+        (PROJECT.replace("120.0", "high"), "transformation z must be a finite number, got 'high'"),
     ],
 )
 def test_a_broken_project_is_refused(tmp_path: Path, text: str, expected_text: str) -> None:
