@@ -1,7 +1,7 @@
 """Set-points of a motion in joint space, many at once.
 
 Its path consists of straight lines and its profile of cubic polynomials, so that set-points need no more than the
-numbers of both. C computes them; without a compiler, numpy does with full arrays.
+numbers of both. C computes them; without the extension, numpy does with full arrays.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from heptarm.planning.composite_path import CompositePath
 from heptarm.planning.jerk_profile import TimeLaw
 from heptarm.values.arrays import Array
 
-#: So many set-points are computed at once in C, and without a compiler, where each time takes half a millisecond.
+#: So many set-points are computed at once in C, and without the extension, where each time takes half a millisecond.
 MANY, MANY_IN_PYTHON = 64, 1024
 _AXES = 7
 _WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
