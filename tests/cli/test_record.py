@@ -82,13 +82,15 @@ def test_for_some_seconds_with_pictures(cabinet: RunningCabinet, tmp_path: Path)
     [
         (("plot", "nothing.mcap"), "nothing.mcap cannot be read"),
         (("convert", __file__, "a.npz"), "must be a recording of heptarm"),
-        (("plot", "{recorded}", "--signals", "speed"), "name must be one of t, "),
+        (("plot", "{recorded}", "--signals", "speed", "-o", "{folder}/a.png"), "name must be one of t, "),
         (("convert", "{recorded}", "a.xls"), "suffix must be one of .parquet, .csv, .npz"),
         (("record", "a.mcap", "--camera-size", "640", "--target", "sim://127.0.0.1:1"), "such as 640x480"),
         (("record", "a.mcap", "--listen", "--camera"), "--listen records FRI messages alone"),
         (("record", "a.mcap", "--for", "-1", "--target", "sim://127.0.0.1:1"), "for must be in (0, 1e+07] s"),
     ],
 )
-def test_a_mistake_is_one_sentence(recorded: Path, arguments: tuple[str, ...], words: str) -> None:
-    done = run(*(one.format(recorded=recorded) for one in arguments))
+def test_a_mistake_is_one_sentence(
+    recorded: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    done = run(*(one.format(recorded=recorded, folder=tmp_path) for one in arguments))
     assert done.returncode == 1 and words in done.stderr and "Traceback" not in done.stderr

@@ -43,6 +43,8 @@ def at_home(arm: ha.Arm) -> None:
 class Person(devices.SyntheticDevice):
     """A person who decides by what has happened: called with the number of the reading."""
 
+    readings: int
+
     def __init__(self, decide: Callable[[int], devices.DeviceInput]) -> None:
         self.readings = 0
 

@@ -59,6 +59,7 @@ OBJECTS: dict[str, object] = {
     "Condition": force > 10.0,
     "Output": Output(),
     "Recording": bad_values.RECORDING,
+    "Param": heptarm.param([0.1] * 7, low=0.0),
     "Params.set": Params(*Params.flat({"gain": 1.0}), changed=lambda: None),
 }
 

@@ -259,7 +259,11 @@ class Pose(Value):
 
         Returns:
             x y z [m], and the rotation vector of the smaller turn [rad].
+
+        Raises:
+            ShapeError: `other` is not a pose.
         """
+        check_pose(other, "other")
         turn = Pose(np.zeros(3), multiply(other.quat, self.quat * np.array([-1.0, -1.0, -1.0, 1.0])))
         return np.concatenate([other.xyz - self.xyz, turn.rotvec])
 

@@ -884,7 +884,12 @@ class PoseServo(Servo):
         """What keeps the arm from going on to a pose from the last good target; empty: nothing near."""
         here, there = self._pose @ self._to_flange, pose @ self._to_flange
         twist = here.displacement(there) / self.period
-        return blockage(self._connection.robot, self._q, twist).reason
+        found = blockage(self._connection.robot, self._q, twist)
+        if found.reason.startswith(
+            "speed"
+        ):  # the target is far: what would stop the arm if it went there more slowly?
+            found = blockage(self._connection.robot, self._q, 0.99 * found.factor * twist)
+        return found.reason
 
     @property
     def stats(self) -> ServoStats:

@@ -105,7 +105,7 @@ class Param(Value):
             LimitError: an entry is outside its range, or not finite.
             CommandRejected: the check of the whole value refuses it.
         """
-        given = _numbers(value, name)
+        given = _numbers(value, instance(name, str, "name"))
         if given.shape != self.low.shape:
             raise ShapeError(
                 f"{name} must have shape {self.low.shape}, as initially, got {given.shape}", parameter=name
