@@ -44,3 +44,18 @@ def test_importing_costs_nothing_and_connecting_needs_no_simulator() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("modes", "from heptarm import modes"),
+        ("when", "from heptarm import when"),
+        ("conect", "did you mean 'connect'?"),
+        ("zzz", "heptarm has no attribute 'zzz'"),
+    ],
+)
+def test_a_wrong_name_of_the_package_is_answered_with_the_right_one(name: str, said: str) -> None:
+    program = f"import heptarm as ha\ntry:\n    ha.{name}\nexcept AttributeError as error:\n    print(error)"
+    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True)
+    assert said in done.stdout, done.stderr

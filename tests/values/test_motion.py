@@ -151,12 +151,12 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: spline_joints([[0.0] * 6 + [NAN]]), LimitError, r"points\[0\]\[6\] must .*got nan"),
         (lambda: spline_joints([ptp([0.0] * 6 + [NAN])]), LimitError, r"points\[0\]\[6\] must .*got nan"),
         (lambda: ptp([math.inf] + [0.0] * 6), LimitError, r"q\[0\] must .*got inf"),
-        (lambda: ptp(Q, speed=0), LimitError, r"speed\[0\] must be in \(0, 1\], got 0"),
-        (lambda: ptp(Q, speed=1.1), LimitError, r"speed\[0\] must be in \(0, 1\], got 1.1"),
+        (lambda: ptp(Q, speed=0), LimitError, r"speed must be in \(0, 1\], got 0"),
+        (lambda: ptp(Q, speed=1.1), LimitError, r"speed must be in \(0, 1\], got 1.1"),
         (lambda: ptp(Q, speed=NAN), LimitError, r"speed\[0\] must .*got nan"),
         (lambda: ptp(Q, speed=[0.1] * 6), ShapeError, r"speed must have shape .*got \(6,\)"),
         (lambda: ptp(Q, acceleration=[0.1] * 6 + [2]), LimitError, r"acceleration\[6\] must .*got 2"),
-        (lambda: ptp(Q, jerk=-1), LimitError, r"jerk\[0\] must .*got -1"),
+        (lambda: ptp(Q, jerk=-1), LimitError, r"jerk must .*got -1"),
         (lambda: ptp(Q, blend_rel=1.5), LimitError, r"blend_rel must be in \[0, 1\], got 1.5"),
         (lambda: ptp(Q, blend_m=-0.1), LimitError, r"blend_m must be in \[0, 2\] m, got -0.1"),
         (lambda: ptp(Q, blend_rad="much"), ShapeError, "blend_rad must be a number, got 'much'"),
@@ -251,3 +251,16 @@ def test_limits_that_a_motion_does_not_have_are_refused(
 ) -> None:
     with pytest.raises(error, match=text):
         make()
+
+
+def test_the_repr_leaves_out_what_is_at_its_default() -> None:
+    assert repr(ptp(Q)) == f"Ptp(q={ptp(Q).q!r})"
+    assert repr(ptp(Q, speed=0.5).dynamics) == f"Dynamics(joint_speed={np.full(7, 0.5)!r})"
+    assert repr(Dynamics()) == "Dynamics()"
+
+
+def test_a_percentage_is_told_from_a_fraction() -> None:
+    with pytest.raises(
+        LimitError, match=r"speed must be in \(0, 1\], got 50 \(it is a fraction: did you mean 0.5\?"
+    ):
+        ptp(Q, speed=50)

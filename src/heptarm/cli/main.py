@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,6 +19,10 @@ from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
 from heptarm import __version__
 from heptarm.errors import HeptarmError, missing_extra
 
+#: Exit code after misuse of a command, as of other tools.
+_USAGE = 2
+#: What errors say in Python about angles that were given in degrees; a shell has an option for it.
+_IN_DEGREES = re.compile(r"did you mean ha\.deg\([^)]*\)\?")
 #: Commands and where their functions are.
 COMMANDS = {
     "demo": "demo:demo",
@@ -98,20 +103,22 @@ def _list_targets(
 
 
 def main() -> None:
-    """Run the command line: an error is one sentence on standard error and exit code 1."""
+    """Run the command line: an error is one sentence on standard error and exit code 1; misuse of the command, 2."""
     try:
         code = app(print_error=False, exit_on_error=False)
     except UnusedCliTokensError as error:
-        _fail(f"unexpected: {' '.join(error.unused_tokens or ())} ({_help()})")
+        _fail(f"unexpected: {' '.join(error.unused_tokens or ())} ({_help()})", code=_USAGE)
     except CycloptsError as error:
-        _fail(f"{' '.join(str(error).split())} ({_help()})")
+        _fail(f"{' '.join(str(error).split())} ({_help()})", code=_USAGE)
     except HeptarmError as error:
         from heptarm.arm.translate.text import printable
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise
         page = f"\n{error.page}" if error.code and sys.stderr.isatty() else ""
-        _fail(printable(str(error), lines=True) + page)
+        _fail(
+            _IN_DEGREES.sub("did you mean them in degrees? --deg", printable(str(error), lines=True)) + page
+        )
     except ModuleNotFoundError as error:
         missing = missing_extra(error.name or "")
         if missing is None or os.environ.get("HEPTARM_DEBUG"):
@@ -140,9 +147,9 @@ def _help() -> str:
     return " ".join([*known, "--help"])
 
 
-def _fail(sentence: str) -> NoReturn:
+def _fail(sentence: str, *, code: int = 1) -> NoReturn:
     print(f"heptarm: {sentence}", file=sys.stderr)
-    sys.exit(1)
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -207,7 +207,7 @@ JERK = 100.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RobotModel:
+class RobotModel(Value):
     """A robot of the LBR family. Chain: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7).
 
     Attributes:
@@ -241,6 +241,10 @@ class RobotModel:
     dddq_max: Array
     tau_max: Array
     flange: Flange = _PLAIN
+
+    def __hash__(self) -> int:
+        """Of its name: results are cached by the model, and a name stands for its numbers."""
+        return hash(self.name)
 
     @property
     def base_name(self) -> str:
