@@ -1,9 +1,10 @@
-"""Requests over TCP, in one call of C and without it: several threads, states between them, Ctrl-C at any moment."""
+"""Requests over TCP, in one call of C and as without the GIL: threads, states in between, Ctrl-C at any moment."""
 
 from __future__ import annotations
 
 import random
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -11,7 +12,6 @@ from collections.abc import Iterator
 import pytest
 
 import heptarm as ha
-from heptarm._library import SWITCH
 from heptarm.io.tcp import connect, listening
 from heptarm.io.transport import Transport
 from heptarm.wire import messages as wire
@@ -29,10 +29,10 @@ class TcpPeer(Peer):
         return ours
 
 
-@pytest.fixture(params=["C", "Python"])
+@pytest.fixture(params=["C", "no lock"])
 def peer(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Peer]:
-    if request.param == "Python":
-        monkeypatch.setenv(SWITCH, "1")
+    if request.param == "no lock":
+        monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)
     made = TcpPeer()
     yield made
     made.close()

@@ -23,7 +23,6 @@ class ExternalLoad:
     Attributes:
         torque: external load acting on the joints, shape (7,) [Nm].
         wrench: force and torque acting on the flange, base axes, shape (6,) [N, Nm].
-        is_misjudged: whether the controller's load data differ from the true payload.
 
     The arrays stay the same.
     """
@@ -33,11 +32,9 @@ class ExternalLoad:
         self._site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._jp = np.zeros((3, model.nv))
         self._jr = np.zeros((3, model.nv))
-        self._applied, self._constraint = data.qfrc_applied[:7], data.qfrc_constraint[:7]
-        self._pulled = data.xfrc_applied
+        self._applied = data.qfrc_applied[:7]
         self._push: Array | None = None
         self._until = inf
-        self.is_misjudged = False
         self.torque = np.zeros(7)
         self.wrench = np.zeros(6)
         self._jacobian = np.zeros((6, 7))
@@ -61,16 +58,6 @@ class ExternalLoad:
             return
         mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
         self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
-
-    def measure(self, inertial: Array) -> None:
-        """After the dynamics of a tick: the torques.
-
-        Args:
-            inertial: M q̈ + h - τ, the residual of the controller's model, shape (7,) [Nm].
-        """
-        # forces on bodies and unknown payloads appear in no vector of MuJoCo, only in the residual
-        explained = not self.is_misjudged and not self._pulled.any()
-        self.torque[:] = self._applied + self._constraint if explained else inertial
 
     def resolve(self, *, is_loaded: bool) -> None:
         """The wrench of the torques; zero without any load."""

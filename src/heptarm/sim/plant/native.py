@@ -1,8 +1,4 @@
-"""The arithmetic of a tick in C: position control, sensors, supervision of the drives, and the published state.
-
-The Python modules are the reference, and compute wherever there is no compiler: `heptarm.sim.control.laws`, and `Plant`
-with its parts. tests/sim/test_native_tick.py compares the two.
-"""
+"""The arithmetic of a tick, in C: position control, sensors, supervision of the drives, and the published state."""
 
 from __future__ import annotations
 
@@ -17,7 +13,7 @@ from heptarm._library import Unavailable, library
 from heptarm.model.native import constants
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
-from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
+from heptarm.sim.control.laws import GAINS
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.arrays import Array
@@ -37,19 +33,18 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     (
         "reals",
         0,
-        "q dq acceleration bias passive applied constraint pulled actuators mass armature ranges shown",
+        "q dq acceleration bias passive applied constraint pulled actuators mass armature ranges shown gains",
     ),
     # what a tick computes
     ("reals", 0, "torque tau_cmd tau load wrench"),
     ("word", 0, "stride pulls is_misjudged flags mode order left is_awaited"),
-    ("real", 0, "mass_damping stiffness_damping"),
     # the running motion: its table, where it is in that, how far its time and an axis come in a tick; where the part
     # begins and ends whose progress is shown, and where the next one begins
     ("table", 0, "table"),
     ("cursor", 0, "cursor"),
     ("reals", 0, "leap"),
     ("real", 0, "step part_begin part_end mark"),
-    ("real", AXES, "stiffness most"),
+    ("real", AXES, "most"),
     ("real", 3 * AXES, "points"),
     # `struct arm` of the robot; MuJoCo's model and state, its functions, and vectors of all its degrees of freedom
     ("address", 0, "arm model data"),
@@ -108,13 +103,13 @@ def tick_library() -> ctypes.CDLL:
     """Load the functions; MuJoCo's profiler is off from then on, unless the program has given it a clock.
 
     Raises:
-        Unavailable: this system is not supported, or has no compiler.
+        Unavailable: the compiled part of heptarm is missing, or this MuJoCo does not show its functions.
     """
     made = library(holds_gil=True)
     made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
     made.ht_write.restype, made.ht_publish.restype = None, _WORD
-    made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
-    made.ht_command.restype = None
+    made.ht_drive.argtypes = made.ht_sense.argtypes = (_POINTER,)
+    made.ht_drive.restype = None
     made.ht_strained.argtypes = (_POINTER, _WORD)
     made.ht_write.argtypes = (_POINTER, _WORD, _REAL, _REAL)
     made.ht_tick.restype, made.ht_tick.argtypes = _WORD, made.ht_write.argtypes
@@ -141,7 +136,7 @@ class NativeTick:
         arrays: vectors of the members of `struct tick` that are pointers; they stay where they are.
 
     Raises:
-        Unavailable: this system is not supported, or has no compiler.
+        Unavailable: the compiled part of heptarm is missing, or this MuJoCo does not show its functions.
     """
 
     def __init__(
@@ -155,7 +150,7 @@ class NativeTick:
         **arrays: Array,
     ) -> None:
         library = tick_library()
-        self._command, self._sense = library.ht_command, library.ht_sense
+        self._drive, self._sense = library.ht_drive, library.ht_sense
         self._strained, self._write, self._publish = library.ht_strained, library.ht_write, library.ht_publish
         self._tick, self._put, self._follow = library.ht_tick, library.ht_put, library.ht_follow
         self._memory = memory = _Memory()
@@ -176,8 +171,8 @@ class NativeTick:
         if ranges is not None:
             memory.ranges = ranges.ctypes.data
         memory.arm = ctypes.cast(arm, _POINTER).value
-        memory.mass_damping, memory.stiffness_damping = MASS_DAMPING, STIFFNESS_DAMPING
-        memory.stiffness[:], memory.most[:] = STIFFNESS.tolist(), robot.tau_max.tolist()
+        memory.gains = GAINS.ctypes.data
+        memory.most[:] = robot.tau_max.tolist()
         self._points = np.frombuffer(memory.points).reshape(3, AXES)
 
     def believe(self, mass: Array, bias: Array, *, is_misjudged: bool) -> None:
@@ -278,11 +273,9 @@ class NativeTick:
         memory, self._words = self._memory, words
         memory.flags, memory.mode, memory.order = words
 
-    def command(self, before: Array, now: Array, after: Array) -> None:
-        """Drive the motors towards set-points of shape (7,) [rad] of the last, this and the next tick."""
-        points = self._points
-        points[0], points[1], points[2] = before, now, after
-        self._command(self._at)
+    def drive(self) -> None:
+        """Let the motors exert `torque`, as far as they can."""
+        self._drive(self._at)
 
     def sense(self) -> bool:
         """Torques at the sensors and external load, after the dynamics; returns whether there is a load."""

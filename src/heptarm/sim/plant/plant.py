@@ -12,9 +12,6 @@ from math import inf, nan
 import mujoco
 import numpy as np
 
-from heptarm._library import Unavailable
-from heptarm.model.inverse_kinematics import status_of
-from heptarm.model.kinematics import flange
 from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.sim.control.controller import ActiveLaw
@@ -181,7 +178,6 @@ class Plant:
         self._bias, self._passive = d.qfrc_bias[:7], d.qfrc_passive[:7]
         self._ctrl = d.ctrl[:7]
         self._armature = self.model.dof_armature[:7].copy()
-        self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
         self._mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, d, self._mass)
         self._measured = (
@@ -189,34 +185,31 @@ class Plant:
         )  # positions that the sensors show
         self._torque, self._tau, self._tau_cmd = np.zeros(7), np.zeros(7), np.zeros(7)
 
-    def _in_c(self) -> NativeTick | None:
-        """The arithmetic of a tick in C; None: where it is not available."""
+    def _in_c(self) -> NativeTick:
+        """The arithmetic of a tick."""
         d, monitor = self.data, self._monitor
-        try:
-            return NativeTick(
-                self.robot,
-                self.model,
-                d,
-                self.shared,
-                ranges=None if monitor is None else monitor.scales,
-                q=self._q,
-                dq=self._dq,
-                acceleration=self._acc,
-                passive=self._passive,
-                applied=d.qfrc_applied[:7],
-                constraint=d.qfrc_constraint[:7],
-                pulled=d.xfrc_applied,
-                actuators=self._ctrl,
-                armature=self._armature,
-                shown=self._measured,
-                torque=self._torque,
-                tau_cmd=self._tau_cmd,
-                tau=self._tau,
-                load=self._load.torque,
-                wrench=self._load.wrench,
-            )
-        except Unavailable:
-            return None
+        return NativeTick(
+            self.robot,
+            self.model,
+            d,
+            self.shared,
+            ranges=None if monitor is None else monitor.scales,
+            q=self._q,
+            dq=self._dq,
+            acceleration=self._acc,
+            passive=self._passive,
+            applied=d.qfrc_applied[:7],
+            constraint=d.qfrc_constraint[:7],
+            pulled=d.xfrc_applied,
+            actuators=self._ctrl,
+            armature=self._armature,
+            shown=self._measured,
+            torque=self._torque,
+            tau_cmd=self._tau_cmd,
+            tau=self._tau,
+            load=self._load.torque,
+            wrench=self._load.wrench,
+        )
 
     @property
     def time_ns(self) -> int:
@@ -316,10 +309,9 @@ class Plant:
         payload, sensed = self._payload, self._sensed
         while self._changes:
             self._changes.popleft()()
-        sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
+        sensed.mass, sensed.bias = payload.mass, payload.bias
         self._is_ideal = self._errors is None and self._safety_monitor is None and not payload.differs
-        if self._native is not None:
-            self._native.believe(payload.mass, payload.bias, is_misjudged=payload.differs)
+        self._native.believe(payload.mass, payload.bias, is_misjudged=payload.differs)
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
         """Change the parameters of the running command's control mode; does nothing for another command or mode."""
@@ -383,21 +375,20 @@ class Plant:
 
     def _foresee(self) -> None:
         """Find out whether the next ticks need no more than the running motion's table, unless something happens."""
-        native, interpolator = self._native, self.interpolator
-        self._is_foreseen = (
-            native is not None and self._gripper is None and interpolator.is_foreseen and self._is_plain
-        )
-        if native is None or not self._is_foreseen:
+        interpolator = self.interpolator
+        self._is_foreseen = self._gripper is None and interpolator.is_foreseen and self._is_plain
+        if not self._is_foreseen:
             return
         run, self._shown = interpolator.run, self.safety.flags
         assert run is not None and run.table is not None
         part = (*run.plan.measured(run.part), run.plan.end_of(run.part))
-        native.prepare(interpolator.command, run.table, time=run.time, step=interpolator.step, part=part)
+        self._native.prepare(
+            interpolator.command, run.table, time=run.time, step=interpolator.step, part=part
+        )
 
     def _follow(self, most: int) -> int:
         """Compute at most so many ticks by the table of the running motion; returns how many."""
         native, interpolator = self._native, self.interpolator
-        assert native is not None
         done = native.follow(self.tick_count + 1, most)
         left = DONE if done == most else native.left
         if not done and left == DONE:
@@ -423,10 +414,10 @@ class Plant:
         progress, remaining = self._advance()
         if self._gripper is not None:
             self._gripper.tick()
-        native, left = self._native, ELSEWHERE
-        if native is not None and self._is_plain:
+        left = ELSEWHERE
+        if self._is_plain:
             words, times = self._words(), (progress, remaining)
-            left = native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
+            left = self._native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
         self._complete(left, progress, remaining)
 
     def _complete(self, left: int, progress: float, remaining: float) -> None:
@@ -472,14 +463,7 @@ class Plant:
     def _publish(self) -> None:
         """Give readers the computed state, and wake those that wait for it: they read it when it is due."""
         self.tick_count = k = self.tick_count + 1
-        if self._native is not None:
-            is_awaited = self._native.publish(k)
-        else:
-            header = self.shared.header
-            self.shared.ints[k % SLOTS, StateWords.SEQ] = 2 * k + 2
-            header[HeaderWords.NEWEST] = k
-            is_awaited = k * TICK_NS >= header[HeaderWords.WAKE]
-        if is_awaited and self.on_wake is not None:
+        if self._native.publish(k) and self.on_wake is not None:
             self.on_wake(k * TICK_NS)
         if self._seen != self._flags:
             self._flags = self._seen
@@ -488,42 +472,23 @@ class Plant:
 
     def _drive(self) -> None:
         """The control law in force: torques of the motors."""
-        interpolator, native = self.interpolator, self._native
-        command = interpolator.command
-        if (
-            native is not None
-            and self._control.is_plain
-            and self._brakes is None
-            and not interpolator.is_overlaid
-        ):
-            native.command(command.before, command.now, command.after)
-        else:
-            sensed = self._sensed
-            sensed.before, sensed.now, sensed.after = command
-            sensed.is_overlaid = interpolator.is_overlaid
-            torque = (
-                self._control.torque(sensed) if self._brakes is None else self._brakes.torque(self._braked)
-            )
-            if interpolator.is_overlaid and interpolator.action is not None:
-                self._control.superpose(torque, interpolator.action)
-            np.minimum(torque, self._limit, out=torque)
-            np.maximum(torque, self._least, out=self._torque)
-            self._tau_cmd[:] = self._torque if self._brakes is None else 0.0
-            self._ctrl[:] = self._torque
+        interpolator, sensed = self.interpolator, self._sensed
+        sensed.before, sensed.now, sensed.after = interpolator.command
+        sensed.is_overlaid = interpolator.is_overlaid
+        torque = self._control.torque(sensed) if self._brakes is None else self._brakes.torque(self._braked)
+        if interpolator.is_overlaid and interpolator.action is not None:
+            self._control.superpose(torque, interpolator.action)
+        self._torque[:] = torque
+        self._native.drive()
+        if self._brakes is not None:
+            self._tau_cmd[:] = 0.0
         if self._errors is not None:
             self._torque -= self._errors.friction(self._dq)
             self._ctrl[:] = self._torque
 
     def _sense(self) -> None:
         """What the sensors show after the dynamics, and the external load."""
-        load, sensed = self._load, self._sensed
-        if self._native is not None:
-            is_loaded = self._native.sense()
-        else:
-            # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
-            self._tau[:] = self._torque - self._armature * self._acc + self._passive
-            load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - self._torque)
-            is_loaded = bool(load.torque.any())
+        load, is_loaded = self._load, self._native.sense()
         if self._errors is not None:
             reading = self._errors.read(self._q, self._tau)
             self._measured[:], self._tau[:] = reading.q, reading.tau
@@ -540,14 +505,10 @@ class Plant:
     def _supervise(self, monitor: DriveMonitor) -> None:
         """Let a drive trip: its brakes close at once, wherever the arm is."""
         is_stiff = self._brakes is None and self._control.is_stiff
-        native = self._native
-        if (
-            native is not None
-            and not monitor.is_strained
-            and not native.strained(self.interpolator.command.after, is_stiff=is_stiff)
-        ):
+        after = self.interpolator.command.after
+        if not monitor.is_strained and not self._native.strained(after, is_stiff=is_stiff):
             return
-        lag = self.interpolator.command.after - self._q if is_stiff else None
+        lag = after - self._q if is_stiff else None
         reason = monitor.check(self._dq, self._q, self._tau, lag)
         if reason:
             self._tripped = True
@@ -589,29 +550,8 @@ class Plant:
 
     def _write(self, progress: float, remaining: float) -> None:
         """Write the state after the next tick into its slot; readers see it after `_publish`."""
-        k, shared, after = self.tick_count + 1, self.shared, self.interpolator.command.after
-        given = self._words()
-        if self._native is not None:
-            self._native.write(k, after, words=given, times=(progress, remaining))
-            return
-        words, reals = shared.ints[k % SLOTS], shared.floats[k % SLOTS]
-        words[StateWords.SEQ] = 2 * k + 1
-        words[StateWords.TIME] = k * TICK_NS
-        q = self._measured
-        reals[StateWords.Q] = q
-        reals[StateWords.Q_CMD] = after
-        reals[StateWords.DQ] = self._dq
-        reals[StateWords.TAU] = self._tau
-        reals[StateWords.TAU_EXT] = self._load.torque
-        reals[StateWords.TAU_CMD] = self._tau_cmd
-        values = q.tolist()
-        (x, y, z), p = flange(self.robot, values)
-        reals[StateWords.POSE] = (*p, *_quaternion(x, y, z))
-        reals[StateWords.WRENCH] = self._load.wrench
-        words[StateWords.FLAGS], words[StateWords.MODE], words[StateWords.ORDER] = given
-        reals[StateWords.PROGRESS], reals[StateWords.REMAINING] = progress, remaining
-        reals[StateWords.E1], words[StateWords.STATUS] = values[2], status_of(self.robot, values)
-        words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
+        after, words = self.interpolator.command.after, self._words()
+        self._native.write(self.tick_count + 1, after, words=words, times=(progress, remaining))
 
     def _words(self) -> tuple[int, int, int]:
         """Flags, operation mode and running command of the next tick."""
@@ -640,20 +580,3 @@ class Plant:
             self.interpolator.order,
             float(slot[StateWords.PROGRESS]),
         )
-
-
-def _quaternion(x: tuple[float, ...], y: tuple[float, ...], z: tuple[float, ...]) -> tuple[float, ...]:
-    """Quaternion x y z w of the columns of a rotation, computed from its largest component."""
-    xx, yy, zz = x[0], y[1], z[2]
-    w = xx + yy + zz
-    if w >= xx and w >= yy and w >= zz:
-        q = (y[2] - z[1], z[0] - x[2], x[1] - y[0], 1.0 + w)
-    elif xx >= yy and xx >= zz:
-        q = (1.0 + xx - yy - zz, x[1] + y[0], x[2] + z[0], y[2] - z[1])
-    elif yy >= zz:
-        q = (x[1] + y[0], 1.0 + yy - xx - zz, y[2] + z[1], z[0] - x[2])
-    else:
-        q = (x[2] + z[0], y[2] + z[1], 1.0 + zz - xx - yy, x[1] - y[0])
-    n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) ** -0.5
-    n = -n if q[3] < 0 else n
-    return q[0] * n, q[1] * n, q[2] * n, q[3] * n
