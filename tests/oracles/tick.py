@@ -13,6 +13,7 @@ import numpy as np
 
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING, MeasuredState
+from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.native import ELSEWHERE
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.arrays import Array
@@ -43,11 +44,11 @@ class PythonTick:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         shared: SharedState,
+        arm: ArmVectors,
         *,
         ranges: Array | None,
-        **arrays: Array,
     ) -> None:
-        self._robot, self._shared, self._of = robot, shared, arrays
+        self._robot, self._shared, self._arm = robot, shared, arm
 
     def believe(self, mass: Array, bias: Array, *, is_misjudged: bool) -> None:
         """See `NativeTick.believe`."""
@@ -67,19 +68,19 @@ class PythonTick:
 
     def drive(self) -> None:
         """See `NativeTick.drive`."""
-        of, most = self._of, self._robot.tau_max
-        of["torque"][:] = np.maximum(np.minimum(of["torque"], most), -most)
-        of["tau_cmd"][:] = of["actuators"][:] = of["torque"]
+        arm, most = self._arm, self._robot.tau_max
+        arm.torque[:] = np.maximum(np.minimum(arm.torque, most), -most)
+        arm.tau_cmd[:] = arm.actuators[:] = arm.torque
 
     def sense(self) -> bool:
         """See `NativeTick.sense`."""
-        of, load = self._of, self._of["load"]
-        of["tau"][:] = of["torque"] - of["armature"] * of["acceleration"] + of["passive"]
-        if self._is_misjudged or of["pulled"].any():
-            load[:] = self._mass @ of["acceleration"] + self._bias - of["passive"] - of["torque"]
+        arm = self._arm
+        arm.tau[:] = arm.torque - arm.armature * arm.acceleration + arm.passive
+        if self._is_misjudged or arm.pulled.any():
+            arm.load[:] = self._mass @ arm.acceleration + self._bias - arm.passive - arm.torque
         else:
-            load[:] = of["applied"] + of["constraint"]
-        return bool(load.any())
+            arm.load[:] = arm.applied + arm.constraint
+        return bool(arm.load.any())
 
     def strained(self, after: Array, *, is_stiff: bool) -> bool:
         """Leave it to `DriveMonitor.check`."""
@@ -89,12 +90,12 @@ class PythonTick:
         self, tick: int, after: Array, *, words: tuple[int, int, int], times: tuple[float, float]
     ) -> None:
         """See `NativeTick.write`."""
-        slot, of = tick % SLOTS, self._of
-        whole, reals, q = self._shared.ints[slot], self._shared.floats[slot], of["shown"].tolist()
+        slot, arm = tick % SLOTS, self._arm
+        whole, reals, q = self._shared.ints[slot], self._shared.floats[slot], arm.shown.tolist()
         whole[StateWords.SEQ], whole[StateWords.TIME] = 2 * tick + 1, tick * TICK_NS
-        reals[StateWords.Q], reals[StateWords.Q_CMD], reals[StateWords.DQ] = q, after, of["dq"]
-        reals[StateWords.TAU], reals[StateWords.TAU_CMD] = of["tau"], of["tau_cmd"]
-        reals[StateWords.TAU_EXT], reals[StateWords.WRENCH] = of["load"], of["wrench"]
+        reals[StateWords.Q], reals[StateWords.Q_CMD], reals[StateWords.DQ] = q, after, arm.dq
+        reals[StateWords.TAU], reals[StateWords.TAU_CMD] = arm.tau, arm.tau_cmd
+        reals[StateWords.TAU_EXT], reals[StateWords.WRENCH] = arm.load, arm.wrench
         columns, place = flange(self._robot, q)
         reals[StateWords.POSE] = (*place, *_quaternion(*columns))
         whole[StateWords.FLAGS], whole[StateWords.MODE], whole[StateWords.ORDER] = words

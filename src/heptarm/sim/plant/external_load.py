@@ -7,6 +7,7 @@ from math import inf
 import mujoco
 import numpy as np
 
+from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.values.arrays import Array
 
 #: Damping of the least squares near singularities.
@@ -19,6 +20,7 @@ class ExternalLoad:
     Args:
         model: MuJoCo's model; its first seven joints are the arm's.
         data: its state.
+        arm: vectors of the arm.
 
     Attributes:
         torque: external load acting on the joints, shape (7,) [Nm].
@@ -27,16 +29,15 @@ class ExternalLoad:
     The arrays stay the same.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arm: ArmVectors) -> None:
         self._model, self._data = model, data
         self._site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._jp = np.zeros((3, model.nv))
         self._jr = np.zeros((3, model.nv))
-        self._applied = data.qfrc_applied[:7]
+        self._applied = arm.applied
         self._push: Array | None = None
         self._until = inf
-        self.torque = np.zeros(7)
-        self.wrench = np.zeros(6)
+        self.torque, self.wrench = arm.load, arm.wrench
         self._jacobian = np.zeros((6, 7))
 
     @property

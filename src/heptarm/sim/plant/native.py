@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from dataclasses import fields
 from typing import Any
 
 import mujoco
@@ -15,6 +16,7 @@ from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
 from heptarm.sim.control.laws import GAINS
 from heptarm.sim.controller.setpoints import SetPoints
+from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -132,8 +134,8 @@ class NativeTick:
         model: MuJoCo's model.
         data: its state.
         shared: where the states are published.
+        arm: its vectors; they stay where they are.
         ranges: of the drives' supervision, see `DriveMonitor`; None: it is off.
-        arrays: vectors of the members of `struct tick` that are pointers; they stay where they are.
 
     Raises:
         Unavailable: the compiled part of heptarm is missing, or this MuJoCo does not show its functions.
@@ -145,9 +147,9 @@ class NativeTick:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         shared: SharedState,
+        arm: ArmVectors,
         *,
         ranges: Array | None,
-        **arrays: Array,
     ) -> None:
         library = tick_library()
         self._drive, self._sense = library.ht_drive, library.ht_sense
@@ -157,20 +159,20 @@ class NativeTick:
         self._table: MotionTable | None = None
         self._words = (0, 0, 0)
         self._at = ctypes.addressof(memory)
-        arrays |= {"vector": np.zeros(model.nv), "product": np.zeros(model.nv)}
-        arm = constants(robot)
-        self._kept = (model, data, shared, ranges, arrays, arm)
+        numbers, vector, product = constants(robot), np.zeros(model.nv), np.zeros(model.nv)
+        self._kept = (model, data, shared, ranges, arm, numbers, vector, product)
         memory.model, memory.data = model._address, data._address
         functions = _mujoco()
         for name, member in _CALLED.items():
             setattr(memory, member, ctypes.cast(getattr(functions, name), _POINTER).value)
         memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
-        for name, values in arrays.items():
-            setattr(memory, name, values.ctypes.data)
-        memory.pulls = arrays["pulled"].size
+        for field in fields(arm):
+            setattr(memory, field.name, getattr(arm, field.name).ctypes.data)
+        memory.vector, memory.product = vector.ctypes.data, product.ctypes.data
+        memory.pulls = arm.pulled.size
         if ranges is not None:
             memory.ranges = ranges.ctypes.data
-        memory.arm = ctypes.cast(arm, _POINTER).value
+        memory.arm = ctypes.cast(numbers, _POINTER).value
         memory.gains = GAINS.ctypes.data
         memory.most[:] = robot.tau_max.tolist()
         self._points = np.frombuffer(memory.points).reshape(3, AXES)
