@@ -89,7 +89,7 @@ def test_requests_of_several_threads_beside_states(peer: Peer) -> None:
             thread.join()
         assert not problems and stamps == sorted(set(stamps))
         assert sum(isinstance(message, wire.Stop) for message in peer.seen) == 450
-        assert not arm.connection.link._pending and not arm.connection.link._session.waiting
+        assert not arm.connection.link._requests.by_id and not arm.connection.link._session.waiting
 
 
 class CtrlC:
@@ -133,7 +133,7 @@ def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
             arm.stop()
             assert arm.connected and min(asked, interrupted) >= 500, (asked, interrupted)
             link = arm.connection.link
-            assert not link._reading.locked() and not link._sending.locked()
+            assert not link._turns.lock.locked() and not link._sending.locked()
     finally:
         over.set()
         signal.signal(signal.SIGINT, before)
