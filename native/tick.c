@@ -49,12 +49,18 @@ static void feed_back(const double *gains, const double *points, const double *q
 }
 
 /* Position control without a preload; heptarm.sim.control.laws.PositionLaw explains it and has the gains. */
-void ht_position(const double *points, const double *q, const double *dq, const double *mass, word stride,
-                 const double *bias, const double *passive, const double *gains, double *torque) {
+static void position(const double *gains, const double *points, const double *q, const double *dq, const double *mass, word stride,
+                     const double *bias, const double *passive, double *torque) {
     double slip[AXES], acceleration[AXES];
     aim(gains, points, dq, slip, acceleration);
     for (int i = 0; i < AXES; i++) torque[i] = row(mass, stride, i, acceleration);
     feed_back(gains, points, q, bias, passive, slip, torque);
+}
+
+/* The same for one that has its numbers in Python: set-points of three ticks, q, dq, bias and passive, and then the torques. */
+void ht_position(const double *gains, double *given, const double *mass, word stride) {
+    const double *q = given + 3 * AXES, *dq = q + AXES, *bias = dq + AXES, *passive = bias + AXES;
+    position(gains, given, q, dq, mass, stride, bias, passive, given + 7 * AXES);
 }
 
 /* The motors exert `torque`, as far as they can. */
@@ -65,6 +71,12 @@ void ht_drive(struct tick *t) {
         if (torque < -t->most[i]) torque = -t->most[i];
         t->torque[i] = t->tau_cmd[i] = t->actuators[i] = torque;
     }
+}
+
+/* Position control of a tick. */
+void ht_command(struct tick *t) {
+    position(t->gains, t->points, t->q, t->dq, t->mass, t->stride, t->bias, t->passive, t->torque);
+    ht_drive(t);
 }
 
 /* What the torque sensors show and what acts from outside, after the dynamics. Returns LOADED if there is such a load. */

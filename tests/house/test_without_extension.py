@@ -1,4 +1,4 @@
-"""Without the extension values, wire and errors work, and what computes in C says in one sentence what is missing."""
+"""Without the extension values, wire and errors work, and what computes in C states in one sentence what is missing."""
 
 from __future__ import annotations
 

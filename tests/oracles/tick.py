@@ -13,6 +13,7 @@ import numpy as np
 
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING, MeasuredState
+from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.native import ELSEWHERE
 from heptarm.sim.plant.shared_state import SharedState
@@ -65,6 +66,13 @@ class PythonTick:
         """Follow no table."""
         self.left = 0  # the next tick has not begun
         return 0
+
+    def command(self, points: SetPoints) -> None:
+        """See `NativeTick.command`."""
+        arm = self._arm
+        sensed = MeasuredState(arm.q, arm.dq, self._mass, self._bias, arm.passive, *points)
+        arm.torque[:] = position_torque(sensed)
+        self.drive()
 
     def drive(self) -> None:
         """See `NativeTick.drive`."""

@@ -184,7 +184,7 @@ def test_an_illegal_position_ends_the_motion_and_the_arm_has_not_moved(
         (POSE, {"pose": None}, "no Cartesian pose"),
         (POSE, {"pose": m.Transformation("p", (nan, 0, 0, 1, 0, 0, 0))}, "must be finite"),
         (POSE, {"pose": m.Transformation("p", (400, 0, 400, 2, 0, 0, 0))}, "unit quaternion"),
-        (POSE, {"pose": m.Transformation("p", (4000.0, 0, 400, 1, 0, 0, 0))}, "is not reachable"),
+        (POSE, {"pose": m.Transformation("p", (4000.0, 0, 400, 1, 0, 0, 0))}, "4.001 m from the shoulder"),
         (POSE, {"redundancy": m.Redundancy(m.RedundancyStrategy.E1, inf)}, "redundancy"),
         (POSE, {"redundancy": m.Redundancy(m.RedundancyStrategy.E1, 0.5)}, "Illegal axis delta"),
     ],

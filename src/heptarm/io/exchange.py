@@ -88,7 +88,7 @@ def compiled_link(
     """
     if socket() < 0 or not getattr(sys, "_is_gil_enabled", lambda: True)():
         return None
-    extension_file()  # says what is missing
+    extension_file()  # reports what is missing
     from heptarm._native import exchange_functions
 
     locks = reading.acquire, reading.release, sending.acquire, sending.release

@@ -9,7 +9,7 @@ from heptarm.wire.clock_sync import ClockOffset, PingDeparture
 
 
 class Arrivals:
-    """States and answers to pings of a link, whichever way they came.
+    """States and answers to pings of a link, over TCP or by datagram.
 
     Two threads call it, so each call takes a lock; the callback runs under it, and states reach it in order.
 

@@ -15,9 +15,9 @@ arrived.
 
 **Who reads** (`read_turns`). There is one socket and there are many threads. The one that waits for an answer
 reads the socket itself, so that an answer wakes one thread, not two; so does a loop over fast states. The
-*link thread* reads while nobody waits. Whoever reads handles everything that has come, in order, so callbacks
-(`on_event`, `on_state`, `on_answer`) run in any of these threads; they must not block. `on_event` and
-`on_answer` may send requests: the thread that reads then reads on for its own answer (`is_read_here`).
+*link thread* reads while nobody waits. The thread that reads handles everything that has come, in order, so
+callbacks (`on_event`, `on_state`, `on_answer`) run in any of these threads; they must not block. `on_event`
+and `on_answer` may send requests: the thread that reads then reads on for its own answer (`is_read_here`).
 `on_state` may not, since it runs under the lock of `Arrivals`. Two threads may wait at once: one reads, and
 `PendingRequest.resolve` wakes the other.
 
@@ -32,7 +32,7 @@ two of them. Their answers also measure the clock. The cabinet is lost after two
 which this process stood still does not count, since nobody could have listened (`heartbeat`).
 
 **Datagrams** (`datagrams`) carry targets, states and copies of stops beside TCP, with a thread of their own.
-States may come by both ways and overtake each other; `arrivals` drops the older one. TCP remains the proof of
+States may come by both and overtake each other; `arrivals` drops the older one. TCP remains the proof of
 life, and carries a target as well whenever datagrams go unanswered.
 
 **Ctrl-C** may raise KeyboardInterrupt between any two instructions of the main thread. A request is shielded

@@ -1,9 +1,10 @@
-"""Which thread reads the socket of a link: one that waits for an answer, a loop over states, or else the link thread.
+"""Which thread reads the socket of a link: one that waits for an answer, a loop over states, or else the link
+thread.
 
-An answer should wake one thread, and a state, too: a second wake-up costs 20 to 50 µs, more on a busy machine. So
-whoever waits reads. The link thread has to keep away from the socket meanwhile, also in the moments between two
-requests or two states, or it would be woken by what the next caller waits for; it must be back when nobody reads any
-more, since pings, events and the end of the connection wait for no caller.
+An answer should wake one thread, and a state, too: a second wake-up costs 20 to 50 µs, more on a busy
+machine. So the thread that waits reads. The link thread has to keep away from the socket meanwhile, also in
+the moments between two requests or two states, or it would be woken by what the next caller waits for; it
+must be back when nobody reads any more, since pings, events and the end of the connection wait for no caller.
 """
 
 from __future__ import annotations

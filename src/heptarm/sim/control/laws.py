@@ -31,6 +31,7 @@ MASS_DAMPING = 90.0
 STIFFNESS_DAMPING = 0.004
 #: All of these for `ht_position` of tick.c.
 GAINS = frozen([*STIFFNESS, MASS_DAMPING, STIFFNESS_DAMPING])
+_GAINS_AT = GAINS.ctypes.data
 #: Time constant with which a preload fades when the brakes have opened [s].
 PRELOAD_FADING = 0.1
 #: Least damping of a joint, also of one without stiffness [Nm s/rad].
@@ -117,7 +118,7 @@ def _position_law() -> Any:
     """
     function = library(holds_gil=True).ht_position
     address = ctypes.c_void_p
-    function.argtypes, function.restype = (*[address] * 4, ctypes.c_int64, *[address] * 4), None
+    function.argtypes, function.restype = (address, address, address, ctypes.c_int64), None
     return function
 
 
@@ -166,18 +167,21 @@ class PositionLaw:
     @staticmethod
     def _undisturbed(sensed: MeasuredState) -> Array:
         """The torques without a preload."""
-        torque, points = np.empty(7), np.concatenate((sensed.before, sensed.now, sensed.after))
-        _position_law()(
-            points.ctypes.data,
-            sensed.q.ctypes.data,
-            sensed.dq.ctypes.data,
-            sensed.mass.ctypes.data,
-            sensed.mass.strides[0] // 8,
-            sensed.bias.ctypes.data,
-            sensed.passive.ctypes.data,
-            GAINS.ctypes.data,
-            torque.ctypes.data,
+        given = np.concatenate(
+            (
+                sensed.before,
+                sensed.now,
+                sensed.after,
+                sensed.q,
+                sensed.dq,
+                sensed.bias,
+                sensed.passive,
+                np.zeros(7),
+            )
         )
+        mass = sensed.mass
+        _position_law()(_GAINS_AT, given.ctypes.data, mass.ctypes.data, mass.strides[0] // 8)
+        torque: Array = given[49:]
         return torque
 
 

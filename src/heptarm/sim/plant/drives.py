@@ -84,7 +84,7 @@ class Drives:
     Args:
         arm: its vectors.
         native: computes on the same.
-        sensed: measured state; `exert` puts the set-points into it.
+        sensed: measured state; the set-points are put into it for the laws.
         law: control law in force.
         monitor: the drives' own supervision; None: no drive trips.
         errors: of friction; None: the joints have none.
@@ -131,16 +131,20 @@ class Drives:
             is_overlaid: they are an FRI client's.
             action: what such a client adds; None: nothing.
         """
-        arm, sensed, is_braked = self._arm, self._sensed, self._brakes.are_closed
-        sensed.before, sensed.now, sensed.after = points
-        sensed.is_overlaid = is_overlaid
-        torque = self._brakes.torque() if is_braked else self._law.torque(sensed)
-        if is_overlaid and action is not None:
-            self._law.superpose(torque, action)
-        arm.torque[:] = torque
-        self._native.drive()
-        if is_braked:
-            arm.tau_cmd[:] = 0.0
+        arm, is_braked = self._arm, self._brakes.are_closed
+        if self._law.is_plain and not is_braked and not is_overlaid:
+            self._native.command(points)  # what `PositionLaw` computes, without looking for addresses
+        else:
+            sensed = self._sensed
+            sensed.before, sensed.now, sensed.after = points
+            sensed.is_overlaid = is_overlaid
+            torque = self._brakes.torque() if is_braked else self._law.torque(sensed)
+            if is_overlaid and action is not None:
+                self._law.superpose(torque, action)
+            arm.torque[:] = torque
+            self._native.drive()
+            if is_braked:
+                arm.tau_cmd[:] = 0.0
         if self._errors is not None:
             arm.torque[:] -= self._errors.friction(arm.dq)
             arm.actuators[:] = arm.torque

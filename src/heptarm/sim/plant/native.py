@@ -110,8 +110,8 @@ def tick_library() -> ctypes.CDLL:
     made = library(holds_gil=True)
     made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
     made.ht_write.restype, made.ht_publish.restype = None, _WORD
-    made.ht_drive.argtypes = made.ht_sense.argtypes = (_POINTER,)
-    made.ht_drive.restype = None
+    made.ht_command.argtypes = made.ht_drive.argtypes = made.ht_sense.argtypes = (_POINTER,)
+    made.ht_command.restype = made.ht_drive.restype = None
     made.ht_strained.argtypes = (_POINTER, _WORD)
     made.ht_write.argtypes = (_POINTER, _WORD, _REAL, _REAL)
     made.ht_tick.restype, made.ht_tick.argtypes = _WORD, made.ht_write.argtypes
@@ -152,7 +152,7 @@ class NativeTick:
         ranges: Array | None,
     ) -> None:
         library = tick_library()
-        self._drive, self._sense = library.ht_drive, library.ht_sense
+        self._command, self._drive, self._sense = library.ht_command, library.ht_drive, library.ht_sense
         self._strained, self._write, self._publish = library.ht_strained, library.ht_write, library.ht_publish
         self._tick, self._put, self._follow = library.ht_tick, library.ht_put, library.ht_follow
         self._memory = memory = _Memory()
@@ -274,6 +274,12 @@ class NativeTick:
         """Set flags, mode and order of the states to come."""
         memory, self._words = self._memory, words
         memory.flags, memory.mode, memory.order = words
+
+    def command(self, points: SetPoints) -> None:
+        """Position control without a preload: compute the torques of the motors, and `drive` them."""
+        rows = self._points
+        rows[0], rows[1], rows[2] = points.before, points.now, points.after
+        self._command(self._at)
 
     def drive(self) -> None:
         """Let the motors exert `torque`, as far as they can."""

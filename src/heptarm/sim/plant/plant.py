@@ -15,7 +15,7 @@ Theory of operation
 5. the state is written into its slot of the shared memory and published. `time` of tick k is k ms: the plant
    has no other clock, so it may run at any pace.
 
-**Three ways through a tick**, from the general to the fast one; tests hold them together, bit by bit or
+**Three forms of a tick**, from the general to the fast one; tests hold them together, bit by bit or
 nearly:
 
 * *In parts* (`_simulate`): impedance laws, brakes, pushes, noisy sensors, overlays of FRI clients.
@@ -27,7 +27,7 @@ nearly:
   waits for a state, or a tick is no longer plain. The interpolator learns of it when it is next asked for
   anything (`Interpolator.catch_up`).
 
-What makes the fast ways safe is one test before each call, `_is_undisturbed`: whatever any thread may have
+What makes the fast forms safe is one test before each call, `_is_undisturbed`: whatever any thread may have
 done in between is a flag that this property reads. A new way to disturb the arm has to appear there, or in
 `_is_plain`.
 

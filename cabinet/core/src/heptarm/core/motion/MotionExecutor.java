@@ -42,10 +42,10 @@ import heptarm.wire.When;
  * <p><b>The end is asked for, then awaited.</b> {@link Program#end} notes the cause and cancels the robot's jobs, from the last
  * to the first so that none starts meanwhile. It does not wait. The motion thread waits until the robot has reported the end of
  * each item, so the next program starts from an arm at rest, and "finished" is reported once and last. A program that never ran
- * is reported by whoever ended it. After a failure the waiting programs are dropped: the robot is not where they should start.
+ * is reported by the request that ended it. After a failure the waiting programs are dropped: the robot is not where they should start.
  *
  * <p><b>An activity</b>, a servo motion or an FRI session that commands the robot, is a program without items: it runs for as
- * long as its client wants. It starts only while nothing runs or waits, since it begins at the present position, and nobody can
+ * long as its client keeps it open. It starts only while nothing runs or waits, since it begins at the present position, and nobody can
  * know where that is behind a queue.
  *
  * <p><b>Threads.</b> One thread, {@code ha-motion}, calls the robot's {@code start} and nothing else does: the robot executes

@@ -32,7 +32,7 @@ import heptarm.wire.Welcome;
  * states leave. <i>Ending</i> ({@link #ending}): a Goodbye is the last frame that is queued; what waits is still sent, what
  * arrives is read and discarded, because closing a socket with unread bytes would discard the last frames to the client.
  * <i>Gone</i> ({@link #gone}): the socket is closed. {@link #goodbye} begins the orderly end, {@link #leave} ends at once; each
- * takes effect once, and the owner is told of both ({@link Owner}), so that control passes on as soon as the end begins.
+ * takes effect once, and each is reported to the owner ({@link Owner}), so that control passes on as soon as the end begins.
  *
  * <p><b>Threads.</b> The <i>reader</i> cuts the bytes into frames, checks them and hands each request to the dispatcher, one
  * after the other: so requests of a client take effect in their order, and a slow one delays nobody else. Any thread may queue
@@ -45,9 +45,9 @@ import heptarm.wire.Welcome;
  * <p><b>The outbox</b> is answers and events before states. Events must all arrive: if they pile up, the client does not read,
  * and the connection is closed. Of states the newest counts: the oldest are dropped, and one {@link StatesMissed} reports how
  * many. {@link #writing} is held by the thread that writes, one at a time; the outbox's lock never is while it writes, or a
- * client that does not read would block whoever reports an event.
+ * client that does not read would block the thread that reports an event.
  *
- * <p><b>Frames</b> are numbered both ways, and with a key each has a tag over number and body. A frame that is not the next one,
+ * <p><b>Frames</b> are numbered in both directions, and with a key each has a tag over number and body. A frame that is not the next one,
  * or whose tag is wrong, ends the session: nothing that follows could be trusted. Only whole frames count as a sign of life
  * then, as anybody can send bytes.
  *
