@@ -1,5 +1,4 @@
-"""Which thread reads the socket of a link: one that waits for an answer, a loop over states, or else the link
-thread.
+"""Which thread reads the socket of a link: a caller, a loop over states, or else the link thread.
 
 An answer should wake one thread, and a state, too: a second wake-up costs 20 to 50 µs, more on a busy
 machine. So the thread that waits reads. The link thread has to keep away from the socket meanwhile, also in
