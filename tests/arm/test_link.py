@@ -191,10 +191,10 @@ def test_a_loop_that_was_held_up_keeps_its_connection(peer: Peer) -> None:
     with peer.arm(rate=200.0) as arm:
         link = arm.connection.link
         assert link is not None
-        read, held_up, here = link._read, [], threading.get_ident()
+        read, held_up = link._read, list[None]()
 
         def late(*, wait: bool) -> None:
-            if threading.get_ident() == here and len(held_up) < 5:
+            if threading.current_thread() is threading.main_thread() and len(held_up) < 5:
                 time.sleep(0.1)  # until bytes wait
                 link._heartbeat.received -= 10_000_000_000
                 held_up.append(time.sleep(0.02))

@@ -57,14 +57,14 @@ class Ideal(Plant):
     def tick(self) -> None:
         self._advance()
         _, now, after = self.interpolator.command
-        self.data.qpos[:7] = after
-        self.data.qvel[:7] = (after - now) / TICK
+        self._q[:] = after
+        self._dq[:] = (after - now) / TICK
         self.tick_count += 1
 
     @property
     def speed(self) -> Array:
         """Of the set-points, shape (7,) [rad/s]."""
-        return self.data.qvel[:7].copy()
+        return self._dq.copy()
 
     @property
     def acceleration(self) -> Array:
@@ -77,11 +77,21 @@ class Ideal(Plant):
         """Whether the set-points move, or a motion brakes that has not come to its end."""
         run = self.interpolator.run
         braking = run is not None and run.cancelled and not run.ended
-        return braking or bool(self.data.qvel[:7].any())
+        return braking or bool(self._dq.any())
 
     def press(self) -> None:
         """Press the emergency stop."""
         self.safety.request_stop(StopRequest.EMERGENCY_STOP)
+
+    @property
+    def _q(self) -> Array:
+        """Its measured positions, shape (7,) [rad]."""
+        return np.asarray(self.data.qpos[:7])
+
+    @property
+    def _dq(self) -> Array:
+        """Its velocities, shape (7,) [rad/s]."""
+        return np.asarray(self.data.qvel[:7])
 
 
 def stopping_time(plant: Plant, how: str) -> float:

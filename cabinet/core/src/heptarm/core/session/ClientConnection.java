@@ -27,36 +27,8 @@ import heptarm.wire.Welcome;
 /**
  * One connection: a reader thread that answers requests, and a writer thread with an outbox for everything else.
  *
- * <p><b>States.</b> {@link Newcomer} and {@link Handshake} come before: this object begins where the handshake has ended.
- * <i>Opening:</i> the Welcome goes out, before anything else. <i>Open</i> ({@link #open}): requests are handled, events and
- * states leave. <i>Ending</i> ({@link #ending}): a Goodbye is the last frame that is queued; what waits is still sent, what
- * arrives is read and discarded, because closing a socket with unread bytes would discard the last frames to the client.
- * <i>Gone</i> ({@link #gone}): the socket is closed. {@link #goodbye} begins the orderly end, {@link #leave} ends at once; each
- * takes effect once, and each is reported to the owner ({@link Owner}), so that control passes on as soon as the end begins.
- *
- * <p><b>Threads.</b> The <i>reader</i> cuts the bytes into frames, checks them and hands each request to the dispatcher, one
- * after the other: so requests of a client take effect in their order, and a slow one delays nobody else. Any thread may queue
- * an event or a state; that never waits, so a client that does not read delays nobody. The <i>writer</i> empties the outbox. Two
- * others may write in its stead, since waking a thread costs as much as all the rest: the reader its answer, the sampler a state
- * of a client that is alone. Both only if the line is free and nothing waits, which keeps the frames in order; and the sampler
- * not for a while after a write that had to wait. The <i>watchdog</i> looks at the times of the last bytes, and ends the
- * connection ({@link LinkWatchdog}).
- *
- * <p><b>The outbox</b> is answers and events before states. Events must all arrive: if they pile up, the client does not read,
- * and the connection is closed. Of states the newest counts: the oldest are dropped, and one {@link StatesMissed} reports how
- * many. {@link #writing} is held by the thread that writes, one at a time; the outbox's lock never is while it writes, or a
- * client that does not read would block the thread that reports an event.
- *
- * <p><b>Frames</b> are numbered in both directions, and with a key each has a tag over number and body. A frame that is not the next one,
- * or whose tag is wrong, ends the session: nothing that follows could be trusted. Only whole frames count as a sign of life
- * then, as anybody can send bytes.
- *
- * <p><b>Datagrams</b> carry targets and states beside TCP, and copies of urgent requests. Such a copy may come before or after
- * the request over TCP; {@link #requests} makes sure that it acts at most once, and before or instead of a later request, never
- * after.
- *
- * <p><b>Silence</b> is measured where the bytes arrive, and confirmed by two looks: a busy machine may not have read them yet.
- * Bytes that wait in the socket excuse a second at most, so that a stuck reader cannot hide a dead client.
+ * <p>Events and states go into the outbox without waiting, so a client that does not read delays nobody. When states pile up,
+ * the oldest are dropped; a connection whose events pile up is closed.
  */
 final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber, DatagramPeer.Receiver {
     private static final int BUFFER = 16384;
