@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 import heptarm as ha
-from heptarm.arm.link.link import Heartbeat
+from heptarm.arm.link.heartbeat import Heartbeat
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from heptarm.wire.session import Session
@@ -144,13 +144,13 @@ def test_control_that_is_lost_is_noticed(peer: Peer) -> None:
 def test_a_loop_over_fast_states_reads_the_link_itself_until_it_ends(peer: Peer) -> None:
     with peer.arm(rate=400.0) as arm:
         link, here = arm.connection.link, threading.get_ident()
-        take, readers = link._on_state, []
+        take, readers = link._arrivals.on_state, []
 
         def taken(body: bytes, now: int) -> None:
             readers.append(threading.get_ident())
             take(body, now)
 
-        link._on_state = taken
+        link._arrivals.on_state = taken
         states, deadline = arm.states(), time.monotonic() + 20.0
         stamps = []
         while readers.count(here) < 50:
@@ -191,10 +191,10 @@ def test_a_loop_that_was_held_up_keeps_its_connection(peer: Peer) -> None:
     with peer.arm(rate=200.0) as arm:
         link = arm.connection.link
         assert link is not None
-        read, held_up = link._read, []
+        read, held_up = link._read, list[None]()
 
         def late(*, wait: bool) -> None:
-            if link._loop_reads and len(held_up) < 5:
+            if threading.current_thread() is threading.main_thread() and len(held_up) < 5:
                 time.sleep(0.1)  # until bytes wait
                 link._heartbeat.received -= 10_000_000_000
                 held_up.append(time.sleep(0.02))

@@ -9,21 +9,14 @@ import numpy as np
 import pytest
 
 from heptarm import laws, model
-from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri import LawTrial
-from heptarm.fri.loop.native import library
 from heptarm.laws.ready import across, shared_library
 from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS, Body, robot
 
 from .plant import ARM, DT, HOME, Floats, Plant
-
-try:
-    library()
-except Unavailable as reason:
-    pytest.skip(f"no native part: {reason}", allow_module_level=True)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

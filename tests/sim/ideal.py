@@ -83,6 +83,16 @@ class Ideal(Plant):
         """Press the emergency stop."""
         self.safety.request_stop(StopRequest.EMERGENCY_STOP)
 
+    @property
+    def _q(self) -> Array:
+        """Its measured positions, shape (7,) [rad]."""
+        return np.asarray(self.data.qpos[:7])
+
+    @property
+    def _dq(self) -> Array:
+        """Its velocities, shape (7,) [rad/s]."""
+        return np.asarray(self.data.qvel[:7])
+
 
 def stopping_time(plant: Plant, how: str) -> float:
     """How long a stop may take by its deceleration limit, from this tick on [s].

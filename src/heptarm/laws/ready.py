@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm._library import Unavailable, extension_file
+from heptarm._library import extension_file
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
@@ -48,14 +48,9 @@ def shared_library() -> Path:
     """The library with the laws: the compiled part of heptarm.
 
     Raises:
-        CommandRejected: it is missing.
+        Unavailable: it is missing.
     """
-    try:
-        return Path(extension_file())
-    except Unavailable as error:
-        raise CommandRejected(
-            f"the ready laws are not available: {error}", parameter="law", hint=error.hint
-        ) from None
+    return Path(extension_file())
 
 
 class ReadyLaw(LibraryLaw):

@@ -59,7 +59,7 @@ def one() -> ctypes.CDLL:
     Raises:
         Unavailable: the extension is missing.
     """
-    return _typed(library(holds_gil=True, has_twin=False))
+    return _typed(library(holds_gil=True))
 
 
 @cache
@@ -69,7 +69,7 @@ def many() -> ctypes.CDLL:
     Raises:
         Unavailable: the extension is missing.
     """
-    return _typed(library(has_twin=False))
+    return _typed(library())
 
 
 class Arm(ctypes.Structure):
