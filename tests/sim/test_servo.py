@@ -204,6 +204,20 @@ def test_the_override_and_a_pause_slow_it_down(kind: str) -> None:
     assert np.abs(commands(plant, 2500)[-1] - HERE - 0.2).max() < 1e-6
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_change_of_the_override_keeps_every_axis_within_its_acceleration(kind: str) -> None:
+    """An axis that accelerates or brakes already has no room for the whole change."""
+    plant, _ = serving(kind)
+    random = np.random.default_rng(12)
+    path = [np.array([HERE] * 3)]
+    for number, override in enumerate([0.3, 1.0, 0.0, 0.6, 1.0, 0.05, 1.0, 0.3, 1.0] * 2):
+        plant.override = override
+        plant.shared.post(7, HERE + random.uniform(-0.9, 0.9, 7))
+        path.append(commands(plant, 60 + 40 * (number % 4)))
+    within_limits(plant, np.vstack(path))
+    assert np.ptp(np.vstack(path), axis=0).min() > 0.1
+
+
 # ------------------------------------------------------------------------------- joint impedance
 
 
