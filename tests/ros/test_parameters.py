@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm import model
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, unknown_text
 from heptarm.ros.node.target_stream import TargetStream
+from heptarm.values.robot import robot
 from tests.conftest import RunningCabinet
 
+SPEED = 1.0  # targets by the clock of this machine
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 #: The same pose of the flange with the elbow to the side.
-ASIDE = ha.deg(60, 20, -30, -90, 30, 60, 0)
+ASIDE = model.solve(robot("iiwa14"), model.forward(robot("iiwa14"), HOME), e1=-0.5, near=HOME)
 
 
 def test_an_unknown_name_says_what_was_meant() -> None:
@@ -47,12 +50,12 @@ def test_twists_of_a_topic_follow_the_posture(cabinet: RunningCabinet) -> None:
             TargetStream(arm, posture=np.full(7, 3.0), **settings)
         stream = TargetStream(arm, posture=configuration.posture, **settings)
         deadline = time.monotonic() + 60.0
-        while abs(arm.state.q[2]) < 0.1 and time.monotonic() < deadline:
+        while abs(arm.state.q[2] + 0.5) > 0.05 and time.monotonic() < deadline:
             stream.twist(np.zeros(6))
             time.sleep(0.02)
         stream.close()
-        assert arm.state.q[2] < -0.1, "A3 turns towards the posture"
-        assert arm.state.pose.distance_to(start.pose) < 2e-3
+        assert np.abs(arm.state.q - ASIDE).max() < 0.1, "the joints go to the posture"
+        assert arm.state.pose.distance_to(start.pose) < 1e-2, "velocities hold no pose exactly"
         stream.pose(start.pose)
-        assert stream._opened["posture"] is configuration.posture
+        assert (stream._opened["posture"] == ASIDE).all()
         stream.close()
