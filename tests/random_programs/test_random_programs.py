@@ -39,6 +39,7 @@ FOUND: tuple[list[Step], ...] = (
     [Move("ptp pose", Posture(6, (15, 0, 0, 15, 15, 15, -15)), 1.0, "position", "pause", 0.8)],
     [Move("home", Posture(3, (0, 0, -15, 0, 15, -15, -60)), 1.0, "position", "protective_stop", 0.8)],
     [Move("lin_rel", Posture(7, (0, 15, 0, 0, 0, 0, 1)), 0.2, "position", "emergency_stop", 0.02)],
+    [Move("ptp pose", Posture(2, (0, 0, 60, -60, 0, -15, 0)), 0.2, "cartesian", "override", 0.8)] * 2,
     [Stream("joint", Posture(0, (60,) * 7), 1.0, "step", 60, "lost", "smart"), Outside("recover")],
 )
 

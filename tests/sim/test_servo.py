@@ -239,6 +239,24 @@ def test_without_stiffness_the_arm_floats_away_from_a_push() -> None:
     assert np.abs(plant.snapshot.q - HERE).max() > 0.05
 
 
+@pytest.mark.parametrize("push", [-1.0, 1.0])
+def test_behind_a_compliant_arm_at_its_limit_the_set_points_are_inside(push: float) -> None:
+    """The arm gives a hair beyond its limit, and position control began there."""
+    start = HERE.copy()
+    start[3] = ready().robot.q_min[3]
+    plant = Plant("iiwa14", q=tuple(start.tolist()))
+    plant.submit(MotionCommand(1, motions.hold(0.3), mode=JointImpedance(3000.0)))
+    plant.submit(MotionCommand(2, motions.ptp(tuple(HERE.tolist()))))
+    plant.apply_wrench((push, 0.0, 0.0))
+    given = []
+    while not plant.idle:
+        plant.tick()
+        given.append((plant.snapshot.q[3], plant.snapshot.q_cmd[3]))
+    q, set_points = np.array(given).T
+    assert (set_points >= plant.robot.q_min[3] - 1e-9).all()
+    assert (q.min() < plant.robot.q_min[3] - 1e-6) == (push < 0.0)
+
+
 @pytest.mark.parametrize("stiffness", [100.0, 1000.0, 5000.0])
 def test_impedance_follows_a_motion_and_rests(stiffness: float) -> None:
     plant, ear = ready(), Ear()
