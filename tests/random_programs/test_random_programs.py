@@ -5,6 +5,7 @@ hypothesis makes the programs, prints the seed of a run that fails, and shrinks 
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Iterator
@@ -29,6 +30,8 @@ SPEED = 10
 #: Simulated time and wall time after which no more programs are tried [s]: an hour in the long run, else what fits.
 SIMULATED, PATIENCE = longer(600.0, 3600.0), longer(45.0, 4 * 3600.0)
 EXAMPLES = longer(300, 20_000)
+#: How often a busy machine may lose the connection on the way home.
+_ATTEMPTS = 4
 #: Of the programs; printed, and given again by the environment variable HEPTARM_SEED. The long run takes new ones.
 SEED = int(os.environ.get("HEPTARM_SEED") or longer(38, time.time_ns() % 2**32))
 #: Programs that this test has found, and that moved the arm beyond its limits once.
@@ -78,7 +81,14 @@ class Rig:
         return f"HEPTARM_SEED={SEED}: {self.programs} programs, {self.simulated:.0f} s of simulated time"
 
     def restore(self) -> None:
-        """Bring the arm home, whatever a program has left."""
+        """Bring the arm home, whatever a program has left; again where this machine was too busy to stay connected."""
+        for _ in range(_ATTEMPTS):
+            with contextlib.suppress(ha.ConnectionLost, ha.Timeout, ha.MotionAborted):
+                self._go_home()
+                return
+        self._go_home()
+
+    def _go_home(self) -> None:
         arm = self.arm
         arm.operator.clear()
         arm.operator.choose("aut")
@@ -89,6 +99,7 @@ class Rig:
         arm.set_override(1.0)
         arm.detach_tool()
         arm.move(ha.ptp(HOME), speed=1.0)
+        arm.wait_for_rest(timeout=60.0)
 
     def run(self, program: list[Step]) -> list[Violation]:
         """Run a program from home; what the plant has shown meanwhile and on the way home."""
@@ -98,7 +109,6 @@ class Rig:
             with refusals():
                 step.run(self.arm)
         self.restore()
-        self.arm.wait_for_rest(timeout=60.0)
         assert np.abs(self.arm.state.q - HOME).max() < 0.02, self.arm.state.q  # a push may last
         found = self.judge.violations(compliant=any(step.is_compliant for step in program))
         self.has_found = self.has_found or bool(found)
