@@ -240,8 +240,9 @@ class Fri(Block):
         # taken now: the law runs once more when the overlay is off, and the guard limits that
         self._limited = client.limited
         try:
-            if self._number and self._is_open and self.kind in _EFFORTS:
-                self._release()
+            if self._start is not None and self._is_open and self.kind in _EFFORTS:
+                with contextlib.suppress(HeptarmError):  # the end of the session explains more
+                    self._release()
             if self._number and self._is_open:
                 with contextlib.suppress(CommandRejected):  # it has just ended by itself
                     self._connection.request(wire.FriClose(session=self._number))
