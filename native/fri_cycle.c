@@ -379,7 +379,7 @@ static void fill_state(struct fri_loop *l, word *slot, word latency) {
     numbers[S_E1] = has_pose ? m->e1 : NAN;
     put(numbers + S_Q_SENT, l->guard.q, AXES, l->sent_mode != ABSENT && !posed);
     put(numbers + S_TAU_SENT, l->guard.tau_sent, AXES, l->sent_mode == TORQUE);
-    put(numbers + S_WRENCH_SENT, l->guard.wrench, 6, l->sent_mode == WRENCH);
+    put(numbers + S_WRENCH_SENT, l->guard.wrench_sent, 6, l->sent_mode == WRENCH);
     put(numbers + S_POSE_IPO, l->ipo_pose.values, AXES, active && l->has_pose);
     put(numbers + S_POSE_SENT, l->pose_sent, AXES, posed);
     numbers[S_E1_IPO] = active ? l->pose_ipo_e1 : NAN;
@@ -493,16 +493,15 @@ static int command_joints(struct fri_loop *l, const double *target, const double
         is_limited |= g->was_limited;
     }
     joint_guard_position(g, target, reach);
-    if (mode == TORQUE) {
-        double unknown[AXES];
-        for (int i = 0; i < AXES; i++) unknown[i] = NAN;
-        joint_guard_torque(g, tau, (struct torque_guard *)l->seam->torque_guard, knows(l, S_Q) ? joints(l, S_Q) : unknown, l->dq, !target);
-    }
-    if (mode == WRENCH) joint_guard_force(g, wrench);
+    struct torque_guard *motion = (struct torque_guard *)l->seam->torque_guard;
+    static const double unknown[AXES] = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    const double *here = knows(l, S_Q) ? joints(l, S_Q) : unknown;
+    if (mode == TORQUE) joint_guard_torque(g, tau, motion, here, l->dq, !target);
+    if (mode == WRENCH) joint_guard_force(g, wrench, motion, here, l->dq, !target);
     g->was_limited |= is_limited;
     l->sent_mode = mode;
     count_setpoint(l, g->was_limited);
-    struct answer a = {.q = g->q, .tau = mode == TORQUE ? g->tau_sent : NULL, .wrench = mode == WRENCH ? g->wrench : NULL, .strategy = ABSENT};
+    struct answer a = {.q = g->q, .tau = mode == TORQUE ? g->tau_sent : NULL, .wrench = mode == WRENCH ? g->wrench_sent : NULL, .strategy = ABSENT};
     return write_answer(l, &a);
 }
 

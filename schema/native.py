@@ -61,7 +61,7 @@ def header() -> str:
     lines += _enum("a safety state, a control mode, a redundancy strategy, no value", alone)
     flags = ("ANSWERED", "FILLED", "LIMITED", "BRAKING", "ESTIMATED")
     lines += _enum("flags of a turn", _named(memory, *flags))
-    words = """STATES COMMANDS PARAMS EVENTS STOP BEAT MEMORY MEMORY_SET OVERRUNS COUNTS LIMITED_COUNTS LIMITED_WORST
+    words = """STATES COMMANDS PARAMS EVENTS STOP BEAT RELEASE MEMORY MEMORY_SET OVERRUNS COUNTS LIMITED_COUNTS LIMITED_WORST
         LIMITED_ALLOWED EPOCH STALE LATENCY JITTER POSE_COUNTS POSE_WORST POSE_ALLOWED COLLIDED COLLISION_TORQUE
         COLLISION_ALLOWED"""
     lines += _enum("words of the shared header", {f"H_{name}": layout[name] for name in words.split()})

@@ -76,7 +76,7 @@ class Ideal(Plant):
     def is_under_way(self) -> bool:
         """Whether the set-points move, or a motion brakes that has not come to its end."""
         run = self.interpolator.run
-        braking = run is not None and run.cancelled and not run.ended
+        braking = run is not None and run.cancelled and run.phase != "settling"
         return braking or bool(self._dq.any())
 
     def press(self) -> None:

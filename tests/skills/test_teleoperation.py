@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import devices, skills
+from heptarm import devices, model, skills
 from heptarm.errors import NotReady
 from tests.conftest import RunningCabinet
 from tests.retry import busy, retry
@@ -144,6 +144,22 @@ def test_a_device_that_is_gone_is_an_error_and_the_arm_rests(arm: ha.Arm) -> Non
     assert np.abs(arm.wait_for_rest().dq).max() < 2e-3
 
 
+def test_the_elbow_follows_a_posture(arm: ha.Arm) -> None:
+    start = arm.state.pose
+    posture = model.solve(arm.robot, start, e1=-0.5, near=HOME)
+    skills.teleoperate(
+        arm,
+        Person(lambda _: of([0.0] * 6, *(["START"] if arm.state.q[2] < -0.4 else []))),
+        dead_man="",
+        posture=posture,
+        watchdog=2.0,
+        duration=60.0,
+    )
+    assert arm.state.q[2] < -0.4 and arm.state.pose.distance_to(start) < 1e-2
+    with pytest.raises(ha.HeptarmError, match="elbow"):
+        skills.teleoperate(arm, Person(lambda _: of(LEFT)), elbow="sideways")  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("settings", "word"),
     [({"scale": 0.0}, "scale"), ({"turn_scale": 9.0}, "turn_scale"), ({"duration": -1.0}, "duration")],
@@ -157,6 +173,7 @@ def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict, word: str
 
 def test_heptarm_jog_moves_by_the_keys_of_a_terminal(arm: ha.Arm, cabinet: RunningCabinet) -> None:
     command = [sys.executable, "-m", "heptarm.cli.main", "jog", "--target", cabinet.target, "--scale", "0.1"]
+    command += ["--elbow", "center"]
 
     def attempt() -> subprocess.CompletedProcess[str]:
         y = arm.state.pose.y

@@ -283,6 +283,10 @@ class Client(Sealed, Reader):
         if not self._worker.is_alive():
             raise ConnectionLost(f"the FRI loop has ended: {self.trouble}")
 
+    def release(self) -> None:
+        """End all commands: the arm brakes, and torques and wrenches fade; the loop goes on answering."""
+        self._header[at.RELEASE] = 1
+
     def close(self, *, timeout: float = 5.0) -> None:
         """Brake the arm to a stop and end the loop. Closing twice is allowed."""
         within(timeout, "timeout", 0.0, LONGEST, unit="s")

@@ -20,7 +20,7 @@ from heptarm.io.shared import MemoryBlock, Note, Ring
 from heptarm.values.condition.collision import Collision
 
 # words of the header
-STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, _, HISTORY, SIZE = range(12)
+STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, RELEASE, HISTORY, SIZE = range(12)
 # of the law: number of words of its memory, heads of the rings of its memory, calls that took longer than their budget
 MEMORY_SIZE, MEMORY, MEMORY_SET, OVERRUNS = range(12, 16)
 COUNTS = 16

@@ -137,6 +137,7 @@ class Driver:
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
             elbow=values["servo.elbow"],
+            posture=configuration.posture,
         )
         self._destinations = DestinationKeeper(
             self._stream,

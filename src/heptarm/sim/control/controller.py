@@ -83,7 +83,8 @@ class ActiveLaw:
         if isinstance(mode, JointImpedance):
             if self.retune(mode):
                 return False
-            self._law, self._frames = JointImpedanceLaw(self._robot, mode.stiffness, mode.damping), None
+            law = JointImpedanceLaw(self._robot, self._flange, mode.stiffness, mode.damping, tcp=tcp[:3])
+            self._law, self._frames = law, None
         elif isinstance(mode, CartesianImpedance | SineImpedance):
             frame = mode.base.frame if isinstance(mode, SineImpedance) else mode.frame
             frames = (tcp, frame, axes)

@@ -15,6 +15,7 @@ from math import exp
 from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from heptarm._library import library
 from heptarm.planning.motion import TICK
@@ -85,6 +86,21 @@ class Superposition:
     q: Array
     tau: Array | None = None
     wrench: Array | None = None
+
+
+class FlangeMotion(Protocol):
+    """Where the flange is and how it moves with the joints, after `update`.
+
+    Attributes:
+        rotation: of the flange in the base, shape (3, 3).
+        jacobian: of the flange, base axes, shape (6, 7).
+    """
+
+    rotation: Array
+    jacobian: Array
+
+    def update(self) -> None:
+        """Compute them for the present positions."""
 
 
 class ControlLaw(Protocol):
@@ -209,12 +225,15 @@ class JointImpedanceLaw:
 
     The damping ratio is that of each joint alone, with its inertia at the present posture:
     d = 2 ζ √(k m).
-    A joint without stiffness is guided by hand: its damper is a real one, and its speed is bounded.
+    A joint without stiffness is guided by hand: its damper is a real one, and its speed is bounded, as is that of the
+    tool frame.
 
     Args:
         robot: the robot.
+        flange: of the simulated arm.
         stiffness: shape (7,) [Nm/rad].
         damping: ratio, shape (7,).
+        tcp: flange to tool frame, x y z [m].
     """
 
     is_stiff = False
@@ -222,8 +241,17 @@ class JointImpedanceLaw:
     stays = False
     violation = ""
 
-    def __init__(self, robot: RobotModel, stiffness: Array, damping: Array) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        flange: FlangeMotion,
+        stiffness: Array,
+        damping: Array,
+        *,
+        tcp: tuple[float, ...],
+    ) -> None:
         self._fastest = GUIDED_AXIS * robot.dq_max
+        self._flange, self._offset = flange, np.array(tcp)
         self._stiffness = self._from = self._goal = stiffness
         self._damping = damping
         self._ramp = RAMP
@@ -249,6 +277,18 @@ class JointImpedanceLaw:
             torque += damper * ((sensed.after - sensed.before) * 500.0)
         if free.any():
             slip = sensed.dq - (sensed.after - sensed.before) * 500.0
-            fast = np.where(free > 0.0, np.abs(slip) / self._fastest, 0.0)
-            torque += sensed.mass @ braking(slip, float(fast.max()))
+            torque += sensed.mass @ braking(slip, self._too_fast(slip, free > 0.0))
         return torque
+
+    def _too_fast(self, slip: Array, free: npt.NDArray[np.bool_]) -> float:
+        """The largest ratio of a speed to its bound: of the axes that are free, and of the tool frame."""
+        flange = self._flange
+        flange.update()
+        twist = flange.jacobian @ slip
+        along = twist[:3] + np.cross(twist[3:], flange.rotation @ self._offset)
+        fast = np.where(free, np.abs(slip) / self._fastest, 0.0)
+        return max(
+            float(fast.max()),
+            float(np.linalg.norm(along)) / GUIDED[0],
+            float(np.linalg.norm(twist[3:])) / GUIDED[1],
+        )
