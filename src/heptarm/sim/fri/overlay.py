@@ -159,13 +159,3 @@ class OverlayTarget(Protocol):
 
         The first None after an overlay brakes every axis within its limits; the interpolator continues from there.
         """
-
-
-class HoldingTarget(OverlayTarget, Protocol):
-    """An arm that can also hold its position in a control mode without an application."""
-
-    def hold(self, mode: Mode) -> None:
-        """Hold the present position in a control mode, until `release`."""
-
-    def release(self) -> None:
-        """End the hold; the arm rests in position control."""
