@@ -14,9 +14,9 @@ import heptarm.wire.Welcome;
 /**
  * The session of one client, from its Welcome to the end of its connection.
  *
- * <p><b>Parts.</b> {@link FrameReader} makes frames of the client's bytes and refuses each that is not the next one of that
+ * <p><b>Parts.</b> {@link ReceivedFrames} makes frames of the client's bytes and refuses each that is not the next one of that
  * client. {@link RequestDispatcher} handles them. {@link Outbox} has what waits to be sent and decides who may write;
- * {@link FrameWriter} writes it. {@link Silence} knows for how long the client has been silent, and {@link SessionDatagrams}
+ * {@link SentFrames} writes it. {@link Silence} knows for how long the client has been silent, and {@link SessionDatagrams}
  * is the UDP beside the connection. This class owns the socket and the two threads, and ends all of it once.
  *
  * <p><b>Stages.</b>
@@ -49,7 +49,7 @@ import heptarm.wire.Welcome;
  *
  * <p><b>Locks.</b> The outbox has one and calls nobody under it, so that the owner may call back and may hold locks of its
  * own. The datagrams have one for opening, and one under which a request by datagram is handled, so that its twin over TCP
- * comes after it. What only one thread uses has none: FrameReader belongs to the reader's thread, FrameWriter to the thread
+ * comes after it. What only one thread uses has none: ReceivedFrames belongs to the reader's thread, SentFrames to the thread
  * that has the outbox.
  *
  * <p><b>Why it does not simply queue everything.</b> Waking a second thread costs as much as all the rest of an answer, so
@@ -58,11 +58,11 @@ import heptarm.wire.Welcome;
 final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber, Outbox.Owner {
     private static final long LINGER_MS = 500;
 
-    final FrameWriter writer;
+    final SentFrames sent;
     final Outbox outbox;
     final Silence silence;
     final SessionDatagrams datagrams;
-    private final FrameReader reader;
+    private final ReceivedFrames received;
     private final int session;
     private final Socket socket;
     private final InputStream in;
@@ -96,9 +96,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         this.owner = owner;
         this.frames = frames;
         this.log = log;
-        this.reader = new FrameReader(newcomer.unread(), newcomer.received());
-        this.writer = new FrameWriter(socket.getOutputStream(), newcomer.sent(), clock);
-        this.outbox = new Outbox(writer, frames, this);
+        this.received = new ReceivedFrames(newcomer.unread(), newcomer.received());
+        this.sent = new SentFrames(socket.getOutputStream(), newcomer.sent(), clock);
+        this.outbox = new Outbox(sent, frames, this);
         this.silence = new Silence(in, clock);
         this.datagrams = new SessionDatagrams(this, socket.getInetAddress(), handshake, port, dispatcher, frames, clock);
     }
@@ -152,8 +152,8 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         try {
             welcome();
             handleFrames(); // a client without a key may say more than Hello at once
-            while (!outbox.isClosed() && reader.read(in)) {
-                silence.bytes(reader.isTagged());
+            while (!outbox.isClosed() && received.read(in)) {
+                silence.bytes(received.isTagged());
                 handleFrames();
             }
         } catch (IOException e) {
@@ -171,7 +171,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         if (!outbox.take()) {
             return;
         }
-        reader.require(handshake.clientTag()); // before the Welcome, after which the client sends tagged frames
+        received.require(handshake.clientTag()); // before the Welcome, after which the client sends tagged frames
         welcomed = true; // events are queued from here on
         byte[] body = handshake.prove(identity.welcome(session).body());
         outbox.writeFirst(frames.frame(Welcome.TYPE, body), handshake.cabinetTag());
@@ -180,17 +180,17 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private void handleFrames() {
         try {
             while (outbox.isOpen()) {
-                if (!reader.next()) {
+                if (!received.next()) {
                     return;
                 }
                 silence.frame();
-                datagrams.requested(reader.type, reader.request);
-                dispatcher.handle(this, reader.type, reader.request, reader.stamp, reader.data, reader.body, reader.length);
+                datagrams.requested(received.type, received.request);
+                dispatcher.handle(this, received.type, received.request, received.stamp, received.data, received.body, received.length);
             }
-        } catch (FrameReader.Refused e) {
+        } catch (ReceivedFrames.Refused e) {
             goodbye(e.code, e.getMessage());
         }
-        reader.discard();
+        received.discard();
     }
 
     // ------------------------------------------------------------------------------------------- the writer's thread

@@ -37,7 +37,7 @@ final class LinkWatchdog implements Watchdog.Check {
         for (ClientConnection client : clients) {
             client.datagrams.ping();
             double silence = client.silence.confirmed(client.datagrams.heard()) * scale;
-            long writing = client.writer.began();
+            long writing = client.sent.began();
             if (writing != 0 && (now - writing) * scale > MAX_WRITE) {
                 client.leave("it does not read what it subscribed to");
             } else if (silence > SILENT_HEARTBEATS * heartbeat) {
@@ -48,7 +48,7 @@ final class LinkWatchdog implements Watchdog.Check {
             } else if (authority.isController(client) && silence > authority.watchdog()) {
                 authority.lost(client, "silent for " + Math.round(silence * 1000) + " ms, its watchdog time is "
                         + Math.round(authority.watchdog() * 1000) + " ms");
-            } else if ((now - client.writer.lastSent()) * scale > heartbeat) {
+            } else if ((now - client.sent.lastSent()) * scale > heartbeat) {
                 client.outbox.event(Ping.TYPE, new Ping(now).body());
             }
         }

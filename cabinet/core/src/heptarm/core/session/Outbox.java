@@ -28,7 +28,7 @@ final class Outbox {
     private static final long SLOW_WRITE_NS = 5000000L;
     private static final long UNHURRIED_NS = 10000000000L;
 
-    private final FrameWriter writer;
+    private final SentFrames sent;
     private final FrameEncoder frames;
     private final Owner owner;
     private final ArrayDeque<byte[]> events = new ArrayDeque<byte[]>();
@@ -48,8 +48,8 @@ final class Outbox {
         void leave(String why);
     }
 
-    Outbox(FrameWriter writer, FrameEncoder frames, Owner owner) {
-        this.writer = writer;
+    Outbox(SentFrames sent, FrameEncoder frames, Owner owner) {
+        this.sent = sent;
         this.frames = frames;
         this.owner = owner;
     }
@@ -82,8 +82,8 @@ final class Outbox {
     /** Write a frame and give the outbox back, by the thread that has taken it; later frames have this tag. */
     void writeFirst(byte[] frame, FrameTag next) {
         try {
-            writer.write(frame);
-            writer.tagWith(next);
+            sent.write(frame);
+            sent.tagWith(next);
         } catch (IOException e) {
             owner.leave(broken(e));
         } finally {
@@ -126,7 +126,7 @@ final class Outbox {
             return;
         }
         try {
-            writer.write(frame);
+            sent.write(frame);
         } catch (IOException e) {
             owner.leave(broken(e));
         } finally {
@@ -170,7 +170,7 @@ final class Outbox {
             taken = true;
         }
         try {
-            writer.write(frame);
+            sent.write(frame);
         } catch (IOException e) { // the reader reports it
         } finally {
             giveBack();
@@ -193,7 +193,7 @@ final class Outbox {
     void writeAll() throws IOException, InterruptedException {
         byte[] frame = takeNext();
         while (frame != null) {
-            writer.write(frame);
+            sent.write(frame);
             synchronized (this) {
                 taken = false;
             }

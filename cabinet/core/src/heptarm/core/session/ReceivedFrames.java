@@ -12,7 +12,7 @@ import heptarm.wire.Protocol;
  *
  * <p>For one thread. The fields describe the current frame until the next call; its body is not copied.
  */
-final class FrameReader {
+final class ReceivedFrames {
     private static final int CAPACITY = 16384;
 
     /** Message type, number of the request, and cabinet time at which the client sent it. */
@@ -45,7 +45,7 @@ final class FrameReader {
      * @param unread bytes that the client has sent beside its Hello
      * @param expected sequence number of the next frame
      */
-    FrameReader(byte[] unread, int expected) {
+    ReceivedFrames(byte[] unread, int expected) {
         System.arraycopy(unread, 0, data, 0, unread.length);
         this.filled = unread.length;
         this.expected = expected;

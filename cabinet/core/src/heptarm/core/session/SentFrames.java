@@ -12,7 +12,7 @@ import heptarm.wire.Protocol;
  *
  * <p>For one thread at a time: the one that has the {@link Outbox}. Any thread may read the times.
  */
-final class FrameWriter {
+final class SentFrames {
     private final OutputStream out;
     private final Clock clock;
     private int seq;
@@ -22,7 +22,7 @@ final class FrameWriter {
     private volatile long began;
 
     /** @param seq number of the next frame */
-    FrameWriter(OutputStream out, int seq, Clock clock) {
+    SentFrames(OutputStream out, int seq, Clock clock) {
         this.out = out;
         this.seq = seq;
         this.clock = clock;
