@@ -44,7 +44,7 @@ class Reported(list[Any]):
 def controller(
     port: int, *arguments: str, version: str = "1.15", typed: bool = False
 ) -> Iterator[tuple[Any, Reported]]:
-    """`heptarm sim --fri`: its output, including its end."""
+    """`heptarm sim fri`: its output, including its end."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
     with ctrl_c_interrupts():
         started = subprocess.Popen(

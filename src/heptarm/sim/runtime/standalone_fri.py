@@ -1,4 +1,4 @@
-"""The controller side of FRI without a cabinet application, for any client: `heptarm sim --fri VERSION`.
+"""The controller side of FRI without a cabinet application, for any client: `heptarm sim fri VERSION`.
 
 It behaves like the usual FRI application on a cabinet: it opens a session, holds the position with an overlay as soon
 as the connection is good enough, and reports events. Unlike there, nobody has to restart it: after an error it waits
