@@ -122,7 +122,7 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     if name == "where":
         return name, [words.split()[1]]
     if name in ("set", "press"):
-        return name, _named(words, name)
+        return name, _word_values(words, name)
     if name == "clear":
         rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
         if rest and rest[0] not in _REQUESTS:
@@ -139,7 +139,7 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     return name, list(values)
 
 
-def _named(words: str, name: str) -> list[float | str]:
+def _word_values(words: str, name: str) -> list[float | str]:
     """Values of an action that names a signal or a bar of keys; these are case-sensitive."""
     first, *rest = words.split()[1:]
     if name == "press":
