@@ -396,7 +396,9 @@ def test_an_option_of_those_who_look_on_needs_them(lab: Path, options: tuple[str
     assert f"{options[0]} needs {needed}" in done.stderr
 
 
-@pytest.mark.parametrize("options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0"), ("--map", "a=b")])
+@pytest.mark.parametrize(
+    "options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0"), ("--map", "a=b")]
+)
 def test_an_option_of_an_application_needs_one(options: tuple[str, ...]) -> None:
     command = [sys.executable, "-m", "heptarm.cli.main", "sim", *options]
     done = subprocess.run(command, input="", capture_output=True, text=True, timeout=60, check=False)

@@ -65,7 +65,7 @@ def commands(app: App, prefix: str = "") -> Iterator[tuple[str, App]]:
             group = app[name]
             below = list(commands(group, f"{prefix}{name} "))
             yield from below
-            if not below or group.default_command is not None and prefix + name == "sim":
+            if not below or name == "sim":  # a command and a group of others
                 yield f"{prefix}{name}", group
 
 
