@@ -1,6 +1,6 @@
 """`heptarm sim`: virtual cabinets, foreign applications on one (`sim app`), a bare FRI controller (`sim fri`).
 
-Each of the three commands is one function with options of its own; what two of them share is a frozen value in
+Each of the three commands is one function with options of its own; what two of them have in common is a frozen value in
 `options`. `child` runs a cabinet as a process and lets a person at the terminal be its operator; `page` opens the
 view or the panel beside it.
 """

@@ -1,4 +1,4 @@
-"""A cabinet as a child process, and what a person at the terminal says to it as its operator."""
+"""A cabinet as a child process, and the words that a person at the terminal types as its operator."""
 
 from __future__ import annotations
 

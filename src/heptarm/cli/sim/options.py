@@ -1,4 +1,4 @@
-"""Options that the commands of `heptarm sim` share; the cabinet's own defaults are those of `SimulatorOptions`."""
+"""Options common to the commands of `heptarm sim`; the cabinet's own defaults are those of `SimulatorOptions`."""
 
 from __future__ import annotations
 

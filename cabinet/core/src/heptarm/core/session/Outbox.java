@@ -15,7 +15,7 @@ import heptarm.wire.StatesMissed;
  * writer's thread takes it for each queued frame. An answer and a state that a single client receives are written by the
  * thread that made them if nobody has the outbox and nothing waits: to wake the writer costs as much as all the rest.
  *
- * <p>Events go before states. Too many states drop the oldest, and one report tells the client how many it has missed; too
+ * <p>Events go before states. Too many states drop the oldest, and one report of their number goes to the client; too
  * many events end the connection. Nobody ever waits for the client but the writer and the thread that writes.
  *
  * <p>It goes through three stages: open; {@link #end ending}, in which what is queued and a Goodbye go out and nothing more is
