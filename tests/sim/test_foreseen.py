@@ -16,7 +16,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.sim import motions
 from tests.sim.driving import READY
 

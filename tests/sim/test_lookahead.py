@@ -12,7 +12,7 @@ import heptarm as ha
 from heptarm import model
 from heptarm.arm.translate.motions import item
 from heptarm.planning.lookahead import FramesOfArm, PlannedProgram, look_ahead
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot

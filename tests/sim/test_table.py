@@ -13,7 +13,7 @@ from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
 from heptarm.planning.time_scaling import TabulatedProfile
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 from tests.sim import motions
 from tests.sim.driving import READY

@@ -15,7 +15,7 @@ from heptarm.sim.fri.controller import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading
 from heptarm.sim.fri.settings import Event, OverlayEnded, Refused, SessionConfiguration, StateChanged
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode
 from heptarm.values.robot import RobotModel, robot
 from tests.oracles.fri.codec import decode_monitoring, encode_command

@@ -17,7 +17,7 @@ from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from tests.sim_fri.rig import READY, Client, Law, State, mirror

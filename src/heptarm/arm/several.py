@@ -29,8 +29,8 @@ from heptarm.arm.motion.handle import MotionHandle, check_timeout
 from heptarm.arm.verbs import camera_feed
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
-from heptarm.values.arrays import flag, instance, shown, within
 from heptarm.values.camera import Camera
+from heptarm.values.checks import flag, instance, shown, within
 from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion

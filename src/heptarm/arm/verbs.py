@@ -50,8 +50,8 @@ from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
-from heptarm.values.arrays import array, callback, instance, integer, shown, within, word
 from heptarm.values.camera import Camera
+from heptarm.values.checks import array, callback, instance, integer, shown, within, word
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition

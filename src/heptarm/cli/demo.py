@@ -25,7 +25,7 @@ from heptarm.cli.options import (
 )
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.files import refuse_existing
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.ptp import ptp

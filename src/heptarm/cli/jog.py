@@ -19,7 +19,7 @@ from heptarm.devices.keyboard import HELP, keyboard
 from heptarm.devices.spacemouse import spacemouse
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.skills.teleoperation import RATE, SCALE, TURN_SCALE, teleoperate
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 
 _ACCESS = Access()
 _DEVICES: dict[str, Callable[[], InputDevice]] = {

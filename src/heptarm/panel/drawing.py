@@ -16,7 +16,7 @@ from heptarm.sim.plant.scene import Scene, is_mounted
 from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape
 

@@ -27,7 +27,7 @@ from heptarm.planning.motion import (
 from heptarm.planning.path import CartesianPath, Sequential
 from heptarm.planning.plan import Plan, timed
 from heptarm.planning.targets import JointMotion, SplineSegment, joint_target, pose_of, segment_limits
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

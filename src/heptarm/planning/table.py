@@ -15,7 +15,7 @@ import numpy as np
 from heptarm._library import Unavailable, library
 from heptarm.planning.composite_path import CompositePath
 from heptarm.planning.jerk_profile import TimeLaw
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: So many set-points are computed at once in C, and without the extension, where each time takes half a millisecond.
 MANY, MANY_IN_PYTHON = 64, 1024

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.protocol.protobuf import BYTES, FIXED32, FIXED64, fields, key, put_bytes, put_varint, varint
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.wire.messages import STATE_LAYOUT
 
 Rows = npt.NDArray[Any]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.record.samples import labels
-from heptarm.values.arrays import flag
+from heptarm.values.checks import flag
 from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.robot import RobotModel
 

@@ -14,7 +14,7 @@ from heptarm.errors import CommandRejected, require
 from heptarm.record.journal import NOTE
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import to_frame
-from heptarm.values.arrays import Array, finite, flag, shown
+from heptarm.values.checks import Array, finite, flag, shown
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
 from heptarm.values.robot import RobotModel, known_robot

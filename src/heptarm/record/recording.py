@@ -19,7 +19,7 @@ from heptarm.record.pictures import Pictures
 from heptarm.record.plot import figure_of
 from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
 from heptarm.record.samples import signals_of
-from heptarm.values.arrays import Array, flag, frozen, instance, shown
+from heptarm.values.checks import Array, flag, frozen, instance, shown
 from heptarm.values.files import open_regular, path_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.record.layout import STATE, Rows, column
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import STATE_LAYOUT
 

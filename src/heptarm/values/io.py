@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Value, shown
+from heptarm.values.checks import Value, shown
 from heptarm.values.text import lines
 
 #: Value of a signal: boolean or number.

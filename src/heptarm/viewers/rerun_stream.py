@@ -25,7 +25,7 @@ from heptarm.record.samples import StateSample, labels, signals_of, state_rows
 from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.shapes import drawn_shapes
 from heptarm.sim.plant.world import compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 TIMELINE = "time"
 #: Signals of states and of FRI cycles that are drawn over time.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.triggers import output_message
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import finite, shown, within, word
+from heptarm.values.checks import finite, shown, within, word
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.sealed import Sealed
 from heptarm.values.state import State

@@ -14,7 +14,7 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError, Timeout
 from heptarm.model.kinematics import forward
-from heptarm.values.arrays import instance
+from heptarm.values.checks import instance
 from heptarm.values.clearance import CarriesTools
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name

@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.errors import CollisionForeseen
 from heptarm.model.velocity import FREE, Slowdown
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.clearance import Clearance, ClearanceModel, TouchOnPath
 
 #: Largest movement of a joint between two checks on the way from one target to the next [rad].

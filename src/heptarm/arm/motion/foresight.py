@@ -19,7 +19,7 @@ from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.checks import Array, frozen
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, TouchOnPath
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.motion import Motion

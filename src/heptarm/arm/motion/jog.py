@@ -33,7 +33,7 @@ from heptarm.model.velocity import (
     resolved_twist,
     wall_velocity,
 )
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 from heptarm.wire import messages as wire

@@ -13,7 +13,7 @@ import numpy as np
 from heptarm.errors import require
 from heptarm.io.plan_box import PlanOutline, hand_over
 from heptarm.record import plot as plots
-from heptarm.values.arrays import Array, Value, word
+from heptarm.values.checks import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision
 from heptarm.values.condition.condition import Condition
 from heptarm.values.pose import Pose

@@ -17,7 +17,7 @@ from heptarm.arm.translate.fields import value_of
 from heptarm.arm.translate.modes import read_mode
 from heptarm.errors import ConnectFailed, RemoteProtocolError
 from heptarm.values import state as values
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.io import Signal, SignalValues
 from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.result import Cause, Result

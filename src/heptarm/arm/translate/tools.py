@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from heptarm.arm.translate.fields import message_of, value_of
-from heptarm.values.arrays import frozen
+from heptarm.values.checks import frozen
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape, ShapeKind
 from heptarm.values.tool import KnownTool, Tool, Workpiece

@@ -20,7 +20,7 @@ from heptarm.cli.sim.options import ArmOptions
 from heptarm.errors import CommandRejected, ConnectFailed, require
 from heptarm.fri.protocol.messages import IoDirection, IoType, IoValue
 from heptarm.fri.protocol.version import Version
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.pose import deg

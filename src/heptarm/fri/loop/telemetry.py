@@ -13,7 +13,7 @@ from heptarm.fri.loop.user_api import Signals, State, Stats
 from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.events import Event, Kind
 from heptarm.io.shared import Floats
-from heptarm.values.arrays import instance, integer, within, word
+from heptarm.values.checks import instance, integer, within, word
 from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 

@@ -28,7 +28,7 @@ from heptarm.fri.protocol.messages import (
     SessionState,
 )
 from heptarm.fri.session.statistics import Counters, Histogram
-from heptarm.values.arrays import instance, numbers, scalar, shown
+from heptarm.values.checks import instance, numbers, scalar, shown
 from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.notebook import as_html

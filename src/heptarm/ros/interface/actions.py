@@ -36,7 +36,7 @@ from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.skills.replay import Replay
 from heptarm.skills.taps import TapWatch
 from heptarm.skills.teaching import trajectory_of
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.condition.contact import Contact, direction_of
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.compliance import compliance

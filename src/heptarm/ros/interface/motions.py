@@ -11,7 +11,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.events import with_triggers
 from heptarm.ros.node.driver import Driver
-from heptarm.values.arrays import Array, finite_entries
+from heptarm.values.checks import Array, finite_entries
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.circle import circ
 from heptarm.values.motion.hand_guiding import hand_guide

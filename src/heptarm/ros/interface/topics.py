@@ -25,7 +25,7 @@ from heptarm.ros.interface.motions import (
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.trajectory.send_times import PublishInfo
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
 

@@ -16,7 +16,7 @@ from heptarm.ros.trajectory.runner import ExecutionSettings
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.ros.trajectory.tolerances import StateTolerances, TrajectoryTolerances
 from heptarm.skills.gripper import PATIENCE, SETTLE
-from heptarm.values.arrays import frozen, within
+from heptarm.values.checks import frozen, within
 
 Plain = str | bool | int | float | list[str]
 

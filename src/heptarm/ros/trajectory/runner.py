@@ -27,7 +27,7 @@ from heptarm.ros.trajectory.trajectory import (
     PreviewSegment,
     TrajectorySample,
 )
-from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.checks import Array, Value, frozen
 from heptarm.values.robot import RobotModel
 
 #: Largest acceleration to join a stream and to settle after it, a fraction of each axis' maximum.

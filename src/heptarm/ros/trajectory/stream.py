@@ -16,7 +16,7 @@ import numpy as np
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
 from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Longest period of a stream of points [s], and longest window; what ends later is an ordinary trajectory.

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.checks import Array, frozen
 from heptarm.values.robot import RobotModel
 
 #: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's.

@@ -8,7 +8,7 @@ import numpy as np
 
 from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
 from heptarm.sim.controller.servo import ServoLimits, SmartFollower
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Jerk of braking relative to that of a motion.

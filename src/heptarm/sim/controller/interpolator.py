@@ -35,7 +35,7 @@ from heptarm.sim.controller.servo import (
 )
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import RobotModel
 

@@ -21,7 +21,7 @@ from heptarm.planning.geometry import Quat, product
 from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK, ServoMotion, fractions
 from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 

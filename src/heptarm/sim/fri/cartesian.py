@@ -13,7 +13,7 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.fri.protocol import messages as m
 from heptarm.model.kinematics import flange, forward, jacobian
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import quaternion, rotation
 from heptarm.values.robot import RobotModel
 

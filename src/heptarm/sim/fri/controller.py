@@ -43,7 +43,7 @@ from heptarm.sim.fri.settings import (
     SessionConfiguration,
     StateChanged,
 )
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Receive periods for which a session is in MONITORING_READY before an overlay takes it on.

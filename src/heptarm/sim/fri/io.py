@@ -10,7 +10,7 @@ from heptarm.errors import CommandRejected
 from heptarm.fri.protocol import messages as m
 from heptarm.planning.seam import FriSignal, SignalType
 from heptarm.sim.fri.settings import Event, FrameProvided, OutputWritten, Refused, SessionConfiguration
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 class SessionIo:

@@ -7,7 +7,7 @@ from math import inf
 import mujoco
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Damping of the least squares near singularities.
 _DAMPED = 1e-6 * np.eye(6)

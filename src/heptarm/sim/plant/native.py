@@ -20,7 +20,7 @@ from heptarm.planning.table import Cursor, MotionTable
 from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 AXES = 7

@@ -33,7 +33,7 @@ from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import Body, RobotModel, robot
 

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from xml.etree import ElementTree
 
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.files import read_xml, unreadable
 
 Value = str | int | float | bool

@@ -16,7 +16,7 @@ from heptarm.model.kinematics import forward
 from heptarm.testing.measure import NotShown, above, baseline, below, near
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
 

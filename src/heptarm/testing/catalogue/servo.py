@@ -11,7 +11,7 @@ from heptarm.arm.motion.servo import JointServo, PoseServo, Servo
 from heptarm.errors import CollisionForeseen, HeptarmError, MissingExtra, MotionAborted, Starved
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause
 from heptarm.values.state import State

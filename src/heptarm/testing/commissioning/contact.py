@@ -13,7 +13,7 @@ from heptarm.testing.commissioning.person import PATIENCE, Person, PersonTask, e
 from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, near, step
 from heptarm.testing.measure import Unfit, watch
 from heptarm.testing.stage import DEEPEST
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.motion import hold

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, fractions, frozen, instance, optional, shown, within
+from heptarm.values.checks import Array, Value, fractions, frozen, instance, optional, shown, within
 from heptarm.values.motion.motion import Triggered
 from heptarm.values.robot import RobotModel
 

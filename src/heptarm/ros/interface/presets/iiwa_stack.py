@@ -24,7 +24,7 @@ from heptarm.ros.interface.motions import pose_of, stamped_pose
 from heptarm.ros.interface.service import ServiceResponse
 from heptarm.ros.node.target_stream import StreamLimits
 from heptarm.ros.trajectory.goal import GoalOutcome
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 from heptarm.values.frames import FLANGE, TOOL
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
