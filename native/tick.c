@@ -1,4 +1,4 @@
-/* The arithmetic of a tick of the plant in C. The Python modules are the reference: heptarm.sim.control.laws,
+/* The arithmetic of a tick of the plant in C. The Python modules are the reference: heptarm.sim.control_laws.laws,
    heptarm.sim.plant.plant, heptarm.sim.plant.external_load and heptarm.sim.plant.drive_monitor. This file does the same; sums of
    products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
 

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from heptarm._library import SWITCH
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState
 from heptarm.sim.runtime import cabinet as virtual
 
 #: Delay of an arm that lags, in ticks.

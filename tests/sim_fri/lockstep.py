@@ -15,7 +15,7 @@ from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration

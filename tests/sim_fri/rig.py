@@ -10,8 +10,8 @@ import numpy as np
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.planning.seam import TICK_NS, HeaderWords
-from heptarm.sim.control.laws import Superposition
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.control_laws.laws import Superposition
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading
 from heptarm.sim.fri.settings import Event, OverlayEnded, Refused, SessionConfiguration, StateChanged
 from heptarm.sim.plant.shared_state import SharedState

@@ -12,7 +12,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
+from heptarm.sim.control_laws.hand_guiding_law import HandGuidingLaw
 from heptarm.sim.controller.servo import ServoLimits, SmartFollower
 from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel

@@ -12,7 +12,7 @@ from typing import Protocol
 from heptarm.errors import CommandRejected, ModeConflict
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import Mode, Position

@@ -16,7 +16,7 @@ from heptarm.fri.protocol.messages import DriveState
 from heptarm.fri.protocol.version import MAX_DATAGRAM
 from heptarm.io.udp import own_address
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import MOST_REFUSALS, Controller
+from heptarm.sim.fri.controller_side import MOST_REFUSALS, Controller
 from heptarm.sim.fri.faults import FaultScenario, FaultyLink
 from heptarm.sim.fri.overlay import MotionOverlay, OverlayTarget, Reading
 from heptarm.sim.fri.settings import Event, Refused, SessionConfiguration

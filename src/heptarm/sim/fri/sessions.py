@@ -13,7 +13,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, IoValue
 from heptarm.fri.protocol.version import Version
 from heptarm.planning.seam import Hold
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.controller.command import MotionCommand, MotionListener
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.fri.io import IoImageSync, SessionSignal

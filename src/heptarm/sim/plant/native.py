@@ -1,7 +1,7 @@
 """The arithmetic of a tick in C: position control, sensors, supervision of the drives, and the published state.
 
-The Python modules are the reference, and compute wherever there is no compiler: `heptarm.sim.control.laws`, and `Plant`
-with its parts. tests/sim/test_native_tick.py compares the two.
+The Python modules are the reference, and compute wherever there is no compiler: `heptarm.sim.control_laws.laws`, and
+`Plant` with its parts. tests/sim/test_native_tick.py compares the two.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from heptarm._library import Unavailable, library
 from heptarm.model.native import constants
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
-from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
+from heptarm.sim.control_laws.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.checks import Array

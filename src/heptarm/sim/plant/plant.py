@@ -17,8 +17,8 @@ from heptarm.model.inverse_kinematics import status_of
 from heptarm.model.kinematics import flange
 from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.plant.carried import CarriedShapes, FlangeShapes

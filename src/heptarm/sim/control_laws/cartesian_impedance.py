@@ -16,7 +16,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import joints
 from heptarm.planning.motion import TICK
-from heptarm.sim.control.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
+from heptarm.sim.control_laws.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
 from heptarm.values.checks import Array
 from heptarm.values.frames import BASE, TOOL
 from heptarm.values.mode.impedance import CartesianImpedance
