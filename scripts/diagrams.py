@@ -45,7 +45,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
         ("Your program", "Cabinet application (Java 6)", "Doubles (Java 17)", "Simulator (Python)"),
         (
             Step(0, "Arm.move, Arm.start", f"{PY}/arm/verbs.py", "ProgramTerms"),
-            Step(0, "check and time-limit the program", f"{PY}/arm/motion/program.py", "values"),
+            Step(0, "check and time-limit the program", f"{PY}/arm/motion/program_request.py", "values"),
             Step(0, "values to messages", f"{PY}/arm/translate/motions.py", "wire.Run"),
             Step(0, "frame, send, await the answer", f"{PY}/arm/link/link.py", "TCP"),
             Step(1, "read a frame", f"{CORE}/session/ClientConnection.java", "Run"),

@@ -10,7 +10,7 @@ import pytest
 
 from heptarm import devices
 from heptarm.devices.device import without_dead_zone
-from heptarm.devices.stream import RecordedDevice, RecordingDevice, SyntheticDevice
+from heptarm.devices.virtual import RecordedDevice, RecordingDevice, SyntheticDevice
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.io.clock import StepClock
 
