@@ -238,7 +238,7 @@ def states_together(*arms: Arm) -> StatesOfArms:
         raise ShapeError("arms must be one or more arms, got none", parameter="arms")
     moment = min(state.sampled for state in newest)
     histories = [(state, *arm.history()) for arm, state in zip(arms, newest, strict=True)]
-    chosen = tuple(min(one, key=lambda state: abs(state.sampled - moment)) for one in histories)
+    chosen = tuple(min(history, key=lambda state: abs(state.sampled - moment)) for history in histories)
     times = [state.sampled for state in chosen]
     return StatesOfArms(moment * 1e-9, chosen, (max(times) - min(times)) * 1e-9)
 

@@ -131,8 +131,8 @@ class Tooling:
     def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
         """Shapes of what is attached, each with its pose in the flange frame."""
         tool, held, at = self._carried()
-        own = () if tool is None else tuple((one, one.pose) for one in tool.shapes)
-        return own if held is None else own + tuple((one, at @ one.pose) for one in held.shapes)
+        own = () if tool is None else tuple((shape, shape.pose) for shape in tool.shapes)
+        return own if held is None else own + tuple((shape, at @ shape.pose) for shape in held.shapes)
 
     # ------------------------------------------------------------------------------- attaching
 

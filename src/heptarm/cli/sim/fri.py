@@ -270,7 +270,7 @@ def numbers(text: str, name: str, *counts: int) -> tuple[float, ...]:
         CommandRejected: they are not as many, or not finite numbers.
     """
     try:
-        values = tuple(float(one) for one in text.split(","))
+        values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
     if len(values) not in counts or not all(map(isfinite, values)):
@@ -292,7 +292,7 @@ def link_faults(texts: tuple[str, ...]) -> LinkFaults:
     """
     from heptarm.sim.fri.faults import LinkFaults
 
-    known = [one.name for one in fields(LinkFaults) if one.name not in ("silence", "seed")]
+    known = [field.name for field in fields(LinkFaults) if field.name not in ("silence", "seed")]
     values = {}
     for text in texts:
         name, _, value = text.partition("=")

@@ -60,7 +60,7 @@ class Signals:
 
     def __init__(self, signals: Iterable[Signal] = ()) -> None:
         self._signals = tuple(signals)
-        self.names = tuple(one.name for one in self._signals)
+        self.names = tuple(signal.name for signal in self._signals)
 
     @classmethod
     def of(cls, offer: Iterable[tuple[str, int, int]]) -> Signals:

@@ -219,7 +219,7 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
         return ptp(positions(driver, message.joint_names, message.position), **plain, **blending)
     moving = message.moving or TOOL
     if kind == SPLINE:
-        segments = [segment_of(one) for one in message.segments]
+        segments = [segment_of(segment) for segment in message.segments]
         return spline(segments, moving=moving, **_given(message, _PATH), **joints)
     near: dict[str, Any] = {"near": list(message.near)} if len(message.near) else {}
     if len(message.redundancy):

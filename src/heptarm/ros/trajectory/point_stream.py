@@ -195,7 +195,7 @@ class PointStream:
     def _fit(self, period: float, window: float) -> tuple[Array, Array]:
         """Present position [rad] and velocity [rad/s] of the stream, shape (7,): a straight line through its points."""
         end, last = self._points[-1]
-        recent = [one for one in self._points if end - one[0] <= window]
+        recent = [point for point in self._points if end - point[0] <= window]
         times = np.array([time for time, _ in recent]) - end
         if times[0] > -period / 2.0:
             return last, np.zeros(7)

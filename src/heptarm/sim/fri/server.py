@@ -42,7 +42,7 @@ def connected_to(port: int) -> int | None:
     """The remote port of a connected UDP socket on a port of this machine; None: there is none, or it is not Linux."""
     with contextlib.suppress(OSError), open("/proc/net/udp", encoding="ascii") as table:
         for line in list(table)[1:]:
-            local, remote = (int(one.partition(":")[2], 16) for one in line.split()[1:3])
+            local, remote = (int(part.partition(":")[2], 16) for part in line.split()[1:3])
             if local == port and remote:
                 return remote
     return None

@@ -190,7 +190,7 @@ class Sessions:
             self._version,
             period_ms=period_ms,
             multiplier=multiplier,
-            signals=tuple(one.value(float(image[one.place])) for one in signals),
+            signals=tuple(signal.value(float(image[signal.place])) for signal in signals),
             transformations=transformations,
         )
         arm = _Arm(self._plant)

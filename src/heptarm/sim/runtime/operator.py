@@ -132,7 +132,7 @@ def understood(words: str) -> tuple[str, list[float | str]]:
         values = [float(one) for one in rest]
     except ValueError:
         raise ValueError(f"{words!r}: the values of {name} must be numbers") from None
-    if name in ("drive_error", "joint_limit") and any(one not in range(1, 8) for one in values):
+    if name in ("drive_error", "joint_limit") and any(value not in range(1, 8) for value in values):
         raise ValueError(f"{words!r}: axis must be 1 to 7, got {values[0]:g}")
     if name == "override" and not 0.0 <= values[0] <= 1.0:
         raise ValueError(f"{words!r}: override must be in [0, 1], got {values[0]:g}")

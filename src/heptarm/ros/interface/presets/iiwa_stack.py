@@ -383,7 +383,7 @@ def move_to_pose_straight(context: NodeContext, goal: Any) -> GoalWork:
 def move_along_spline(context: NodeContext, goal: Any) -> GoalWork:
     """Move along a spline of poses, lines and arcs."""
     settings = context.iiwa_stack
-    segments = [_segment(context, one) for one in goal.spline.segments]
+    segments = [_segment(context, segment) for segment in goal.spline.segments]
     return _start(context, spline(segments, moving=settings.moving, **settings.path))
 
 
