@@ -12,7 +12,7 @@ import pytest
 import heptarm as ha
 from heptarm import do, model, modes
 from heptarm.io.plan_box import PlanBox
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot

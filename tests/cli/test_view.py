@@ -20,8 +20,8 @@ pytest.importorskip("viser")
     [
         (("--meshes", "."), "--meshes needs --view or --panel"),
         (("--view", "--meshes", "/nowhere"), "meshes must be a folder with link_0.stl to link_7.stl"),
-        (("--fri", "2.5", "--meshes", "."), "--meshes cannot be used with --fri"),
-        (("--app", ".", "--meshes", "."), "--meshes cannot be used with --app"),
+        (("--fri", "2.5", "--meshes", "."), "--meshes cannot be used with heptarm sim fri"),
+        (("--app", ".", "--meshes", "."), "--meshes needs --view"),
     ],
 )
 def test_meshes_that_nobody_could_see_are_refused(words: tuple[str, ...], text: str) -> None:

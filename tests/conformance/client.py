@@ -7,7 +7,7 @@ from typing import Protocol
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal
 from heptarm.ros.trajectory.trajectory import KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 @dataclass(frozen=True)

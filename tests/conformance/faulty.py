@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState
 from heptarm.sim.runtime import cabinet as virtual
 
 #: Delay of an arm that lags, in ticks.

@@ -14,7 +14,7 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.planning.seam import Hold
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant

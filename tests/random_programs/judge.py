@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from heptarm.planning.seam import TICK_NS, SafetyFlags, StateWords
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Rounding of a difference of two set-points, relative to the limit.

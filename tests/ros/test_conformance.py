@@ -13,7 +13,7 @@ from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalRefused, GoalResult, TrajectoryGoal
 from heptarm.ros.trajectory.runner import GoalFeedback, MeasuredJoints, TrajectoryRunner
 from heptarm.ros.trajectory.trajectory import KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 from tests.conformance.case import HOME
 from tests.conformance.cases import CASES

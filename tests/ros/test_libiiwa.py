@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, ShapeError
-from heptarm.ros.interface.libiiwa import NO_ERROR, VALUE_ERROR, LibiiwaServer
 from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.interface.offered import offered
+from heptarm.ros.interface.presets.libiiwa import NO_ERROR, VALUE_ERROR, LibiiwaServer
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 

@@ -27,7 +27,7 @@ from heptarm.ros.interface.services import SERVICES
 from heptarm.ros.interface.topics import TOPICS
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, joint_parameters
 from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
-from heptarm.ros.trajectory.stream import is_streamed
+from heptarm.ros.trajectory.point_stream import is_streamed
 from heptarm.values.robot import ROBOTS
 from tests.conformance.stage import Stage
 from tests.interrupts import ctrl_c_interrupts

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control_laws.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
+from heptarm.sim.control_laws.laws import MeasuredState
 from heptarm.sim.plant.world import specification
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose

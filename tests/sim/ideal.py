@@ -10,7 +10,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.interpolator import FAST_JERK
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
 from tests.sim import motions

@@ -17,7 +17,7 @@ from heptarm.sim.picture import ArmPicture, Viewpoint
 from heptarm.sim.plant.appearance import DRAWN_GROUP, HIDDEN_GROUP, LINKS, ArmMeshes
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.world import MODELS, compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import ROBOTS
 
 ROOT = Path(__file__).parents[2]

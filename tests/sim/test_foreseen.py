@@ -13,7 +13,7 @@ from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.sim import motions
 from tests.sim.driving import READY
 

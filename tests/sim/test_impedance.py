@@ -12,7 +12,7 @@ import pytest
 
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.model.kinematics import jacobian
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import CartesianImpedance

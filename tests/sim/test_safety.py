@@ -11,7 +11,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.interpolator import REDUCED_SPEED
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run

@@ -12,7 +12,7 @@ from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.planning.table import MANY, MotionTable, SetPointRows
 from heptarm.planning.time_scaling import TabulatedProfile
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 from tests.oracles.set_points import ahead
 from tests.sim import motions

@@ -10,12 +10,12 @@ import numpy as np
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.planning.seam import TICK_NS, HeaderWords
-from heptarm.sim.control.laws import Superposition
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.control_laws.laws import Superposition
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading
 from heptarm.sim.fri.settings import Event, OverlayEnded, Refused, SessionConfiguration, StateChanged
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode
 from heptarm.values.robot import RobotModel, robot
 from tests.oracles.fri.codec import decode_monitoring, encode_command

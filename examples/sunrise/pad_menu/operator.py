@@ -20,7 +20,7 @@ SCRIPT = [
     ("Next job?", "answer 4"),
 ]
 
-command = [sys.executable, "-m", "heptarm.cli.main", "sim", "--app", *sys.argv[1:]]
+command = [sys.executable, "-m", "heptarm.cli.main", "sim", "app", *sys.argv[1:]]
 sim = subprocess.Popen(
     command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1
 )

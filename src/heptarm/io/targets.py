@@ -24,7 +24,7 @@ from typing import Any
 
 from heptarm.errors import CommandRejected
 from heptarm.io.folders import private_folder, settings_folder
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.files import read_text
 from heptarm.values.robot import flange
 

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
-from heptarm.values.arrays import array, finite, instance, scalar, within
+from heptarm.values.checks import array, finite, instance, scalar, within
 from heptarm.values.robot import RobotModel
 
 AXES = 7

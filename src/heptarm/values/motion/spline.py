@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, finite_entries, shown, within
+from heptarm.values.checks import Array, Value, array, finite_entries, shown, within
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.circle import Circ, normal_of
 from heptarm.values.motion.dynamics import (
