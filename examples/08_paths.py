@@ -2,15 +2,17 @@
 
 import os
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 
 import heptarm as ha
+from heptarm.values.motion.motion import Motion
 
 SPEED, ZONE = 0.25, 0.02  # m/s, m
 
 
-def drawn(arm: ha.Arm, motion) -> np.ndarray:
+def drawn(arm: ha.Arm, motion: Motion | Sequence[Motion]) -> np.ndarray:
     """Execute a motion and return the positions of the flange, shape (n, 3) [m]."""
     handle = arm.start(motion)
     places = []
