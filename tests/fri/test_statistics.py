@@ -59,4 +59,4 @@ def test_words_are_those_that_were_given_and_all_of_them_are_cleared() -> None:
     assert (words[0], words[1], words[BINS - 1], words[BINS]) == (1, 1, 1, 10**12)
     histogram.clear()
     assert set(words[: BINS + 1]) == {0} and words[BINS + 1] == 7
-    assert len(Histogram()._words) == BINS + 1
+    assert len(list(Histogram()._words)) == BINS + 1

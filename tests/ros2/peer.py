@@ -42,7 +42,7 @@ from tests.conformance.stage import Stage
 #: Discovery can take some seconds, and a busy machine many more [s].
 PATIENCE = 120.0
 #: Time limits of a node on a busy machine.
-PATIENT: dict[str, object] = {"servo__watchdog": 2.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
+PATIENT: dict[str, Any] = {"servo__watchdog": 2.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
 #: Parameters that cases change.
 DEFAULTS: dict[str, object] = {
     "max_deceleration_on_cancel": 2.0,

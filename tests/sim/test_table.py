@@ -11,6 +11,7 @@ from heptarm._library import SWITCH
 from heptarm.planning.motion import TICK
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
+from heptarm.planning.seam import PlantMotion
 from heptarm.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
 from heptarm.planning.time_scaling import TabulatedProfile
 from heptarm.values.arrays import Array
@@ -22,7 +23,7 @@ IIWA = robot("iiwa14")
 START = np.array(READY)
 FAR, NEAR = (1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8), (0.002, 0.5, 0.0, -1.3, 0.0, 0.9, 0.001)
 NO_LIMIT = np.full(7, 10.0)
-MOTIONS = {
+MOTIONS: dict[str, PlantMotion] = {
     "ptp": motions.ptp(FAR),
     "slow": motions.ptp(FAR, joint_velocity=(0.3,) * 7),
     "short": motions.ptp(NEAR),
