@@ -53,6 +53,7 @@ PACKAGES = (
         (
             *("tests/sim/test_table.py", "tests/sim/test_spline.py", "tests/sim/test_circ.py"),
             *("tests/sim/test_lookahead.py", "tests/sim/test_straight.py", "tests/sim/test_motions.py"),
+            "tests/sim/test_geometry.py",
         ),
     ),
     Package(
