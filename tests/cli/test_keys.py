@@ -17,6 +17,7 @@ import pytest
 from cyclopts import App
 
 import heptarm as ha
+from heptarm.arm.link.target import parse_target
 from heptarm.cli import main, options
 from heptarm.io import keys
 from heptarm.sim.runtime.project import read_process_data
@@ -154,7 +155,7 @@ def test_every_command_uses_the_key(
     used: list[str | None] = []
 
     def connect(target: str, *, key_file: Path | None, **_: object) -> None:
-        parsed = ha.arm.link.target.parse_target(target)
+        parsed = parse_target(target)
         used.append(keys.find_key(key_file=key_file, host=parsed.host, port=parsed.port))
         raise Connected
 
@@ -236,6 +237,7 @@ def test_a_cabinet_that_is_open_to_all_reports_it_on_the_smartpad_and_in_doctor(
 def verdict(target: str, *more: str) -> dict[str, str]:
     """What `heptarm doctor` finds about the protection of a cabinet."""
     done = run("doctor", "--target", target, "--json", *more)
+    found: dict[str, str]
     (found,) = (one for one in map(json.loads, done.stdout.splitlines()) if one["what"] == "protection")
     return found
 

@@ -94,7 +94,7 @@ if __name__ == "__main__":
         """Torque of the law for the modified set-points."""
         return unruly.torque(control, sensed)
 
-    ActiveLaw.torque = torque  # type: ignore[method-assign]
-    virtual.VirtualCabinet = _Cabinet  # type: ignore[misc]
+    ActiveLaw.torque = torque  # type: ignore[method-assign, assignment]
+    virtual.VirtualCabinet = _Cabinet  # type: ignore[misc, assignment]
     threading.Thread(target=_listen, daemon=True).start()
     sys.exit(virtual.main())

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,11 +31,11 @@ UPDATE = 16 * 8
 
 
 def recipe(updates: int = 6, **changes: object) -> Recipe:
-    given: dict = {"steps": updates * UPDATE, "settings": SMALL, "seed": 3, **changes}
+    given: dict[str, Any] = {"steps": updates * UPDATE, "settings": SMALL, "seed": 3, **changes}
     return Recipe(ReachTask(steps=20, feature="kinematic"), **given)
 
 
-def curve(trained: Trained) -> list[tuple[float, ...]]:
+def curve(trained: Trained) -> list[tuple[float | None, ...]]:
     """The learning curve without wall times; NaN as None."""
     rows = [{k: v for k, v in asdict(row).items() if k != "seconds"} for row in trained.history]
     return [tuple(None if v != v else v for v in row.values()) for row in rows]

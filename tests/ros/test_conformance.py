@@ -25,7 +25,7 @@ PERIOD = 0.01
 class Bare:
     """A client of a runner; the arm is a few numbers."""
 
-    preempted = (GoalOutcome.PREEMPTED,)
+    preempted: tuple[GoalOutcome, ...] = (GoalOutcome.PREEMPTED,)
     timely = True
     empty_stops = True
 

@@ -56,7 +56,14 @@ class Arm:
         self.mass = np.zeros((nv, nv))
         self.start = np.array(q, dtype=np.float64)
         self.sensed = MeasuredState(
-            d.qpos[:7], d.qvel[:7], self.mass[:7, :7], d.qfrc_bias[:7], d.qfrc_passive[:7], *[self.start] * 3
+            d.qpos[:7],
+            d.qvel[:7],
+            self.mass[:7, :7],
+            d.qfrc_bias[:7],
+            d.qfrc_passive[:7],
+            self.start,
+            self.start,
+            self.start,
         )
         self.push = np.zeros(6)  # on the motion frame, base axes
         self.time = 0.0

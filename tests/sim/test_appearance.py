@@ -202,7 +202,7 @@ def test_a_picture_shows_the_arm_where_the_kinematics_has_it() -> None:
     for q in POSTURES[:1] + ((-0.8, 0.4, 0.0, -1.6, 0.0, 1.0, 0.0),):
         image = picture.draw(np.array(q))
         assert image.shape == (200, 240, 3)
-        arm = (image < 245).any(axis=2)
+        arm = np.asarray((image < 245).any(axis=2))
         assert 0.02 < arm.mean() < 0.3
         pose = forward(ROBOTS["iiwa14"], np.array(q))
         inside = pose[:3, 3] - 0.03 * pose[:3, 2]  # in the middle of link 7

@@ -50,7 +50,7 @@ def square(start: Pose, blending: tuple[float, float, float]) -> tuple[PlantMoti
 
 
 def speeds(track: Track, plant: Plant) -> Array:
-    return np.linalg.norm(np.diff(points(plant, track.q_cmd), axis=0), axis=1) * 1e3
+    return np.asarray(np.linalg.norm(np.diff(points(plant, track.q_cmd), axis=0), axis=1) * 1e3)
 
 
 def check_limits(track: Track, plant: Plant) -> None:

@@ -43,6 +43,12 @@ class Parts:
     def __init__(self, plant: Plant) -> None:
         self._plant, self.ticks = plant, list[int]()
 
+    def started(self) -> None:
+        """The motion begins."""
+
+    def finished(self, cause: str, text: str) -> None:
+        """The motion has ended."""
+
     def reached(self, part: int) -> None:
         """A part begins."""
         self.ticks.append(self._plant.tick_count)

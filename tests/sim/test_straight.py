@@ -20,7 +20,10 @@ from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
 
-LIMITS = {"velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5), "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0)}
+LIMITS: dict[str, Any] = {
+    "velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5),
+    "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0),
+}
 TCP = Pose.xyz_abc(0.02, 0.0, 0.15, 0.3, 0.0, 0.2)
 
 

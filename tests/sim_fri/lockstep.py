@@ -100,7 +100,8 @@ class Lockstep:
 
     def burst(self, ticks: int) -> None:
         """Hold messages back, then let them arrive together."""
-        self._held = held = []
+        held: list[bytes] = []
+        self._held = held
         self.run(ticks * 1e-3)
         self._held, now = None, self.plant.time_ns
         for datagram in held:

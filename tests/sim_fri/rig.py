@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ class Arm:
     @property
     def leaps(self) -> Array:
         """Largest step of each axis in a tick, shape (7,) [rad]."""
-        return np.abs(np.diff(np.array(self.track), axis=0)).max(axis=0)
+        return np.asarray(np.abs(np.diff(np.array(self.track), axis=0)).max(axis=0))
 
 
 def mirror(message: m.Monitoring) -> m.Command:
@@ -183,6 +184,6 @@ class Rig:
     def reported(self) -> list[str]:
         return [event.text for event in self.events if isinstance(event, (Refused, OverlayEnded))]
 
-    def command(self, **fields: object) -> None:
+    def command(self, **fields: Any) -> None:
         """From now on the client commands the mirrored values, except for these fields."""
         self.client.law = lambda message: replace(mirror(message), **fields)

@@ -31,7 +31,7 @@ from heptarm.values.robot import flange
 try:
     import tomllib
 except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib  # type: ignore[import-not-found,no-redef]
+    import tomli as tomllib  # type: ignore[no-redef]
 
 #: Names of targets: no name of a host that has a dot, and no address.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")

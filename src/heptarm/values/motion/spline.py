@@ -236,12 +236,12 @@ def _segment(one: object, index: int) -> Segment:
 
 @keywords(JointSplineSettings)
 def spline_joints(
-    points: Sequence[npt.ArrayLike | Ptp], **limits: Unpack[JointSplineSettings]
+    points: Sequence[npt.ArrayLike | Ptp | PtpPose], **limits: Unpack[JointSplineSettings]
 ) -> JointSpline:
     """Smooth curve in joint space through joint positions.
 
     Args:
-        points: joint positions, shape (7,) [rad], or ptp(...) for a point with limits of its own.
+        points: joint positions, shape (7,) [rad], or ptp(...) of joint positions for a point with limits of its own.
         **limits: dynamics, speed, acceleration and jerk, see `ptp`.
 
     Raises:
