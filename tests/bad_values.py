@@ -126,6 +126,15 @@ ARGUMENTS: dict[str, dict[str, object]] = {
         "near": np.array([HOME]),
     },
     "CollisionModel.first_on": {"path": (HOME, HOME)},
+    "CollisionModel.distances": {"q": (HOME, HOME)},
+    "CollisionModel.add": {"name": "post", "shape": heptarm.shapes.sphere(0.1), "at": POSE},
+    "CollisionModel.add_points": {"cloud": [[0.5, 0.0, 0.5]]},
+    "CollisionModel.remove": {"body": "cube"},
+    "Mesh": {
+        "vertices": np.vstack([np.zeros(3), 0.1 * np.eye(3)]),
+        "faces": np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
+    },
+    "height_map": {"heights": [[0.1, 0.2]], "cell": 0.1},
     **{f"CollisionModel.{verb}": {"body": "cube"} for verb in ("place", "hold", "release")},
     "Workspace": {"box": ((0.3, -0.5, 0.05), (0.8, 0.5, 0.9))},
     "spiral": {"radius": 0.003},
@@ -185,6 +194,8 @@ ACCEPTED: dict[tuple[str, str], str] = {
     },
     ("Trajectory.positions", "empty list"): "no times",
     ("Trajectory.positions", "too long"): "any number of times",
+    ("height_map.heights", "matrix"): "two rows",
+    ("CollisionModel.add_points.cloud", "matrix"): "two points",
 }
 #: Operators of conditions and poses; the others are those that every object has.
 OPERATORS: dict[str, Callable[[Any, Any], object]] = {

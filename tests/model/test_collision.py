@@ -195,8 +195,6 @@ def test_refusals(bare: ha.CollisionModel) -> None:
         ha.CollisionModel("kr6")
     with pytest.raises(ha.ShapeError, match="shape"):
         bare.first_on(HOME)
-    with pytest.raises(ha.LimitError, match="step"):
-        bare.first_on([HOME], step=0.0)
     with pytest.raises(ha.ShapeError, match="tool must be a Tool or KnownTool, got 'pen'"):
         bare.carrying("pen")  # type: ignore[arg-type]
 
