@@ -139,6 +139,11 @@ class CollisionModel(Sealed):
         """Names of all bodies: of the arm, its tool and the scene."""
         return self._distances.names
 
+    @property
+    def checks(self) -> int:
+        """Postures whose distances were computed since the world was changed last."""
+        return self._distances.checks
+
     # --------------------------------------------------------------------------------- the world
 
     def add(self, name: str, shape: Shape | Mesh | Sequence[Shape | Mesh], *, at: Pose = ORIGIN) -> None:

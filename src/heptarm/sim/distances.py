@@ -36,7 +36,7 @@ class Distances:
     Attributes:
         names: of all bodies, without the world.
         free: names of the free bodies of the world.
-        ncheck: postures computed so far.
+        checks: postures computed so far.
     """
 
     def __init__(self, model: mujoco.MjModel, allowed: Collection[frozenset[str]]) -> None:
@@ -54,7 +54,7 @@ class Distances:
             if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         }
         self.free = tuple(self._free_at)
-        self.ncheck = 0
+        self.checks = 0
         root = int(model.body("link_0").id)  # the arm and what is mounted on it are of the tree of the base
         bodies = model.geom_bodyid.astype(int)
         is_own = model.body_rootid[bodies] == root
@@ -148,7 +148,7 @@ class Distances:
         if self._held:
             self._carry()
         mujoco.mj_collision(model, data)
-        self.ncheck += 1
+        self.checks += 1
         if not data.ncon:
             return _NO_PAIRS
         contact = data.contact
