@@ -1,4 +1,4 @@
-"""Paths around bodies on an arm: found from where it rests, executed by the cabinet, checked again before they are sent."""
+"""Paths around bodies on an arm: found from where it rests, followed by the cabinet, checked again before that."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ import heptarm.do
 import heptarm.fri
 import heptarm.model
 import heptarm.modes
+import heptarm.planning
 import heptarm.shapes
 import heptarm.testing
 import heptarm.when
@@ -26,6 +27,7 @@ from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_o
 
 MODULES = (
     *(heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model, heptarm.shapes),
+    heptarm.planning,
     heptarm.testing,
 )
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.

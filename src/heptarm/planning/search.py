@@ -194,7 +194,8 @@ class _Tree:
 
     def at(self, index: int) -> Array:
         """Joint positions, shape (7,) [rad]."""
-        return self._q[index].copy()
+        found: Array = self._q[index].copy()
+        return found
 
     def back(self, index: int) -> list[Array]:
         """Joint positions from there to the root."""
@@ -304,7 +305,7 @@ class _Search:
             self._robot.check(goal, "goal")
             return goal[None]
         back = self._tcp.inverse()
-        poses = [goal] if isinstance(goal, Pose) else goal.sampled(_POSES, self._random)
+        poses = [goal] if isinstance(goal, Pose) else _sampled(goal, self._random)
         # a region has many poses, of which each needs fewer elbows
         elbows = _ELBOWS if isinstance(goal, Pose) else _ELBOWS // 6
         angles = np.linspace(self._robot.q_min[2], self._robot.q_max[2], elbows + 2)[1:-1]
@@ -374,9 +375,10 @@ class _Search:
                 return index
             there = target if length <= self._step else here + self._step / length * gap
             if self._cone is not None:
-                there = self._projected(here, there, target)
-                if there is None:
+                obeying = self._projected(here, there, target)
+                if obeying is None:
                     return result
+                there = obeying
             if self._world.first_on(np.array([here, there])) is not None:
                 return result
             self._budget.reached += 1
@@ -554,6 +556,20 @@ class _Cone:
         return None
 
 
+def _sampled(region: Region, random: np.random.Generator) -> list[Pose]:
+    """Poses of a region: its middle, and others at random."""
+    found = [region.pose]
+    for _ in range(_POSES):
+        place = random.uniform(-0.5, 0.5, 3) * region.box
+        # directions spread evenly over the cap of the cone
+        tilt = float(np.arccos(1.0 - random.uniform() * (1.0 - np.cos(region.cone))))
+        about, turn = random.uniform(0.0, 2.0 * np.pi), random.uniform(-region.turn, region.turn)
+        lean = (np.sin(tilt / 2) * np.cos(about), np.sin(tilt / 2) * np.sin(about), 0.0, np.cos(tilt / 2))
+        twist = Pose.of((0.0, 0.0, 0.0), (0.0, 0.0, np.sin(turn / 2), np.cos(turn / 2)))
+        found.append(region.pose @ Pose.of(place, lean) @ twist)
+    return found
+
+
 def _each(goal: object) -> list[Array | Pose | Region]:
     """The goals that are given as one or as several.
 
@@ -572,7 +588,7 @@ def _each(goal: object) -> list[Array | Pose | Region]:
     if isinstance(goal, np.ndarray) and goal.ndim == 2:
         return [one for row in goal for one in _each(row)]
     if isinstance(goal, np.ndarray | Sequence) and not isinstance(goal, str):
-        return [array(goal, 7, "goal")]  # type: ignore[arg-type]
+        return [array(goal, 7, "goal")]
     raise ShapeError(
         f"goal must be joint positions, a Pose, a Region or a list of these, got {shown(goal)}",
         parameter="goal",

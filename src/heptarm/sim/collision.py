@@ -162,7 +162,7 @@ class CollisionModel(Sealed):
         given = (shape,) if isinstance(shape, Shape | Mesh) else _listed(shape, "shape")
         if not given:
             raise ShapeError("shape must have at least one shape, got none", parameter="shape", value=shape)
-        parts = tuple(instance(one, (Shape, Mesh), "shape") for one in given)
+        parts: tuple[Shape | Mesh, ...] = tuple(instance(one, (Shape, Mesh), "shape") for one in given)
         self._add(name, parts, np.zeros((0, 3)), 0.0, at)
 
     def add_points(

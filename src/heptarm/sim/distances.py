@@ -170,7 +170,8 @@ class Distances:
         """Which of n pairs of shapes may not touch, shape (n,)."""
         if self._forbidden is None:
             return np.ones(len(geoms), bool)
-        return self._forbidden[geoms[:, 0], geoms[:, 1]]
+        counted: npt.NDArray[np.bool_] = self._forbidden[geoms[:, 0], geoms[:, 1]]
+        return counted
 
     def nearest(self, q: Array, below: float) -> float:
         """Distance of the nearest two bodies that may not touch [m]; infinite: none are nearer than `below`."""

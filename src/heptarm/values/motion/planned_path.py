@@ -140,17 +140,3 @@ class Region(Value):
     ) -> Region:
         """A region around a pose; see the attributes. Raises as they state."""
         return Region(pose, array(box, 3, "box"), cone, turn)
-
-    def sampled(self, count: int, random: np.random.Generator) -> list[Pose]:
-        """Poses of the region: its middle, and as many others at random."""
-        found = [self.pose]
-        for _ in range(count):
-            place = random.uniform(-0.5, 0.5, 3) * self.box
-            # directions spread evenly over the cap of the cone
-            tilt = float(np.arccos(1.0 - random.uniform() * (1.0 - np.cos(self.cone))))
-            about = random.uniform(0.0, 2.0 * pi)
-            turn = random.uniform(-self.turn, self.turn)
-            lean = (np.sin(tilt / 2) * np.cos(about), np.sin(tilt / 2) * np.sin(about), 0.0, np.cos(tilt / 2))
-            twist = Pose.of((0.0, 0.0, 0.0), (0.0, 0.0, np.sin(turn / 2), np.cos(turn / 2)))
-            found.append(self.pose @ Pose.of(place, lean) @ twist)
-        return found
