@@ -33,6 +33,8 @@ _ORIGIN = Pose.of((0.0, 0.0, 0.0))
 _SLIGHT = 0.005
 #: Longest step of a tree [rad], of all joints together; under a constraint.
 _STEP, _SHORT_STEP = 0.8, 0.15
+#: Part of a step up to bodies in the way that is taken.
+_PART = 0.5
 #: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
 _ELBOWS, _POSES = 36, 24
 #: Most joint positions that stand for the goals.
@@ -379,7 +381,14 @@ class _Search:
                 if obeying is None:
                     return result
                 there = obeying
-            if self._world.first_on(np.array([here, there])) is not None:
+            touch = self._world.first_on(np.array([here, there]))
+            if touch is not None:
+                if self._cone is None:  # up to the bodies in the way, but not against them
+                    near = here + _PART * touch.at * (there - here)
+                    far = float(np.linalg.norm(near - here))
+                    if far > _SHORT_STEP and self._world.first_on(np.array([here, near])) is None:
+                        self._budget.reached += 1
+                        return tree.add(near, index)
                 return result
             self._budget.reached += 1
             index = result = tree.add(there, index)
