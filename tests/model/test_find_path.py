@@ -147,6 +147,28 @@ def test_what_is_held_is_carried_around(wall: ha.CollisionModel) -> None:
     assert is_free(world, path)
 
 
+#: The tool's z axis forwards.
+FORWARDS = (0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))
+
+
+@pytest.mark.parametrize(
+    ("scene", "tip", "goals"),
+    [
+        ("shelf", 0.16, [(0.8, 0.05, 0.4), (0.8, -0.02, 0.74)]),
+        ("narrow-slot", 0.0, [(0.65, 0.0, 0.5)]),
+    ],
+)
+def test_paths_lead_into_the_compartments_of_a_shelf_and_through_a_slot(
+    scene: str, tip: float, goals: list[tuple[float, float, float]]
+) -> None:
+    world, tcp = ha.CollisionModel("iiwa14", scene=scene), Pose.at(0, 0, tip)
+    here = deg(0, -20, 0, -110, 0, 0, 0)
+    for xyz in goals:
+        path = planning.find_path(world, start=here, goal=Pose.of(xyz, FORWARDS), tcp=tcp, timeout=120.0)
+        assert np.linalg.norm(tool_at(path.end, tcp).xyz - xyz) < 1e-6 and is_free(world, path)
+        here = path.end
+
+
 @pytest.mark.parametrize(
     ("goal", "reason", "match"),
     [

@@ -33,8 +33,6 @@ _ORIGIN = Pose.of((0.0, 0.0, 0.0))
 _SLIGHT = 0.005
 #: Longest step of a tree [rad], of all joints together; under a constraint.
 _STEP, _SHORT_STEP = 0.8, 0.15
-#: Part of a step up to bodies in the way that is taken.
-_PART = 0.5
 #: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
 _ELBOWS, _POSES = 36, 24
 #: Most joint positions that stand for the goals.
@@ -381,18 +379,22 @@ class _Search:
                 if obeying is None:
                     return result
                 there = obeying
-            touch = self._world.first_on(np.array([here, there]))
-            if touch is not None:
-                if self._cone is None:  # up to the bodies in the way, but not against them
-                    near = here + _PART * touch.at * (there - here)
-                    far = float(np.linalg.norm(near - here))
-                    if far > _SHORT_STEP and self._world.first_on(np.array([here, near])) is None:
-                        self._budget.reached += 1
-                        return tree.add(near, index)
+            if not self._is_free(here, there):
+                half = 0.5 * (here + there)  # nearer to the bodies in the way, but not against them
+                if self._cone is None and self._is_free(here, half):
+                    self._budget.reached += 1
+                    return tree.add(half, index)
                 return result
             self._budget.reached += 1
             index = result = tree.add(there, index)
         return result
+
+    def _is_free(self, here: Array, there: Array) -> bool:
+        """Whether a step is free; its end is checked first, which is most often where it is not."""
+        world = self._world
+        if world.distances(there[None], below=world.margin)[0] < world.margin:
+            return False
+        return world.first_on(np.array([here, there])) is None
 
     def _projected(self, here: Array, there: Array, target: Array) -> Array | None:
         """A step that obeys the constraint; None: it leads nowhere."""
