@@ -144,13 +144,18 @@ class _Budget:
         """Time since the search began [s]."""
         return time.monotonic() - self._begin
 
+    @property
+    def is_late(self) -> bool:
+        """Whether its time has run out."""
+        return self.elapsed > self._timeout
+
     def check(self, nearest: float) -> None:
         """End a search that has taken too much.
 
         Raises:
             NoPath: it has.
         """
-        is_late = self.elapsed > self._timeout
+        is_late = self.is_late
         is_stopped = self._stop is not None and self._stop()
         if not (is_late or is_stopped or self.reached >= self.states):
             return
@@ -426,7 +431,7 @@ class _Search:
                     index = further
                     break
         for _ in range(_SHORTCUTS):
-            if len(kept) < 3 or self._budget.elapsed > self._budget._timeout:
+            if len(kept) < 3 or self._budget.is_late:
                 break
             kept = self._cut(kept)
         return kept
