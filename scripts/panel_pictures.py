@@ -117,6 +117,7 @@ def main(folder: Path) -> int:
     """Take all pictures."""
     with cabinet() as ready, chromium() as browser:
         browser.get(ready["panel"])
+        browser.switch_to.frame("view")
         settled(browser)
         for note in browser.find_elements("css selector", ".mantine-Notification-closeButton"):
             note.click()  # there is no graphics card

@@ -44,7 +44,9 @@ class Page:
         self.browser = browser
         browser.set_window_size(1280, 900)
         browser.get(url)
-        until(lambda: "STOP" in self.text and "A7" in self.text, "the panel never appeared")
+        assert browser.title == "heptarm"
+        browser.switch_to.frame("view")
+        until(lambda: "A7" in self.text, "the panel never appeared")
 
     @property
     def text(self) -> str:
@@ -69,6 +71,18 @@ class Page:
             time.sleep(0.1)
             places.append(button.rect)
         button.click()
+
+    @contextmanager
+    def around(self) -> Iterator[Any]:
+        """In the page around viser's, where the bar is; the button STOP."""
+        self.browser.switch_to.default_content()
+        yield self.browser.find_element("id", "stop")
+        self.browser.switch_to.frame("view")
+
+    def stop(self) -> None:
+        """Press STOP with the mouse."""
+        with self.around() as button:
+            button.click()
 
     def check(self, label: str) -> None:
         self.browser.find_element("xpath", f"//label[normalize-space()={label!r}]").click()
@@ -140,7 +154,7 @@ def test_every_control_does_what_it_is_labelled(browser: Any, observer: Callable
             page.shows("in control: program")
             handle = program.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.02))
             arm.wait_until(lambda state: state.motion is not None and state.motion.active, timeout=PATIENCE)
-            page.press("STOP")
+            page.stop()
             with pytest.raises(ha.MotionAborted):
                 handle.wait(timeout=PATIENCE)
 
@@ -151,6 +165,7 @@ def test_every_control_does_what_it_is_labelled(browser: Any, observer: Callable
         page.browser.switch_to.new_window("tab")
         first, second = page.browser.window_handles
         page.browser.switch_to.window(first)
+        page.browser.switch_to.frame("view")
         start = arm.state.q[0]
         webdriver.ActionChains(browser).click_and_hold(page.button("A1 −")).perform()
         arm.wait_until(lambda state: state.q[0] < start - 0.01, timeout=PATIENCE)
@@ -166,13 +181,101 @@ def test_a_panel_that_only_shows_has_a_stop_and_nothing_else(
         page = Page(browser, ready["view"])
         page.shows("only shows")
         labels = {one.text for one in browser.find_elements("tag name", "button") if one.is_displayed()}
-        assert "STOP" in labels and not labels & {"Take control", "A1 +", "Teach here", "Emergency stop"}
+        assert labels and not labels & {"Take control", "A1 +", "Teach here", "Emergency stop"}
         with ha.connect(ready["target"], watchdog=5.0, timeout=PATIENCE) as arm:
             handle = arm.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.02))
             assert handle.wait_started(PATIENCE)
-            page.press("STOP")
+            page.stop()
             with pytest.raises(ha.MotionAborted):
                 handle.wait(timeout=PATIENCE)
+
+
+#: A phone, the smallest window in which STOP once scrolled away, and two others [pixels].
+SIZES = ((390, 844), (1024, 700), (1280, 900), (2560, 1440))
+#: Scrolls whatever can be scrolled, to its end.
+SCROLL = (
+    """for (const one of document.querySelectorAll("*")) { one.scrollTop = 1e6; one.scrollLeft = 1e6; }"""
+)
+#: Clicks what is labelled so.
+CLICK = """const all = [...document.querySelectorAll("button, span, p")];
+all.find((one) => one.textContent.trim() === arguments[0])?.click();"""
+#: Whether the button is what is seen at its middle and near its corners, and within the window.
+SEEN = """const box = arguments[0].getBoundingClientRect();
+return box.top >= 0 && box.left >= 0 && box.bottom <= innerHeight && box.right <= innerWidth && box.height >= 44 &&
+  [[.5, .5], [.05, .1], [.95, .1], [.05, .9], [.95, .9]].every(([x, y]) =>
+    document.elementFromPoint(box.left + x * box.width, box.top + y * box.height) === arguments[0]);"""
+
+
+def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel, PanelArm]) -> None:
+    panel, model = own
+    page = Page(browser, panel.url)
+    cabinet = model.arm.connection.cabinet
+    assert cabinet is not None
+    target = f"sim://{cabinet.host}:{cabinet.port}"
+
+    def check(where: str) -> None:
+        """STOP is there, and pressed at its place it stops the arm."""
+        browser.execute_script(SCROLL)
+        with page.around() as button:
+            browser.execute_script(SCROLL)
+            assert browser.execute_script(SEEN, button), where
+
+    def stops(press: Callable[[], object]) -> None:
+        with ha.connect(target, name="program", watchdog=5.0, timeout=PATIENCE) as program:
+            handle = program.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.02))
+            assert handle.wait_started(PATIENCE)
+            press()
+            with pytest.raises(ha.MotionAborted):
+                handle.wait(timeout=PATIENCE)
+
+    def touch() -> None:
+        with page.around() as button:
+            browser.execute_script(
+                "arguments[0].dispatchEvent(new PointerEvent('pointerdown', {pointerType: 'touch', bubbles: true}))",
+                button,
+            )
+
+    def key(key: str, *, into: str) -> Callable[[], None]:
+        def press() -> None:
+            with page.around() as button:
+                (button if into == "button" else browser.find_element("tag name", "body")).send_keys(key)
+
+        return press
+
+    for width, height in SIZES:
+        browser.set_window_size(width, height)
+        for tab in ("Jog", "Program", "IO, tools", "Operator"):
+            browser.execute_script(CLICK, tab)  # a narrow page may have it behind a fold
+            check(f"{tab} at {width} x {height}")
+    page = Page(browser, panel.url)
+    page.tab("Operator")
+    page.press("Emergency stop")
+    page.shows("press Clear under Operator")
+    check("after an emergency stop")
+    page.press("Clear")
+    page.press("Recover")
+    until(
+        lambda: not model.arm.state.safety.emergency_stop and model.arm.state.safety.ready_to_move,
+        "it stands",
+    )
+    model.release_control()
+    for press in (page.stop, touch, key("s", into="body"), key("\ue007", into="button")):
+        stops(press)
+    with page.around():
+        until(
+            lambda: "stopped" in browser.find_element("id", "said").text,
+            "it does not say that the arm is stopped",
+        )
+
+    # the cabinet is gone: the bar says so
+    cabinet.close()
+    page.stop()
+    with page.around():
+        said = browser.find_element("id", "said")
+        until(
+            lambda: "NOT stopped" in said.text and "emergency stop" in said.text,
+            "it hides that nothing stopped",
+        )
 
 
 @pytest.fixture

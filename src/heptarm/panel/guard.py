@@ -7,6 +7,7 @@ if it has one (against other pages), and it must bring the token, in the URL or 
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import errno
 import hmac
@@ -14,15 +15,17 @@ import http
 import ipaddress
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from http.cookies import CookieError, SimpleCookie
-from typing import Any
+from typing import Any, TypeAlias
 from urllib.parse import parse_qs, urlsplit
 
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.values.arrays import integer
 
 LAST_PORT = 65535
+#: Makes an answer, in a thread of its own: status, media type, text.
+Page: TypeAlias = Callable[[], tuple[http.HTTPStatus, str, str]]
 #: Names under which a browser on this machine reaches a panel that listens on an address of it.
 _LOCAL = ("127.0.0.1", "localhost", "[::1]")
 #: A remote address, to look up which own one is used for it; nothing is sent to it (RFC 5737, TEST-NET-1).
@@ -168,8 +171,11 @@ class PageGuard:
     # ------------------------------------------------------------------------------------ in viser's server
 
     @contextlib.contextmanager
-    def installed(self) -> Iterator[None]:
+    def installed(self, pages: Mapping[str, Page]) -> Iterator[None]:
         """Guard the servers of websockets that are started in this block.
+
+        Args:
+            pages: what they serve beside viser's files, by path.
 
         Raises:
             HeptarmError: none was started: this version of viser works in another way, and all could open the panel.
@@ -182,7 +188,7 @@ class PageGuard:
         def serve(*arguments: Any, process_request: Any = None, **keywords: Any) -> Any:
             nonlocal guarded
             guarded = True
-            return original(*arguments, process_request=self._checked(process_request), **keywords)
+            return original(*arguments, process_request=self._checked(process_request, pages), **keywords)
 
         server.serve = serve  # type: ignore[assignment,misc]
         try:
@@ -194,10 +200,12 @@ class PageGuard:
                 "the panel cannot be protected with this version of viser", hint="pip install 'viser>=1,<2'"
             )
 
-    def _checked(self, then: Callable[[Any, Any], Any] | None) -> Callable[[Any, Any], Any]:
-        """Check a request, and hand it on to viser; its answer sets the cookie."""
+    def _checked(
+        self, then: Callable[[Any, Any], Any] | None, pages: Mapping[str, Page]
+    ) -> Callable[[Any, Any], Any]:
+        """Check a request, and answer it with a page of ours, or hand it on to viser; the answer sets the cookie."""
 
-        def process(connection: Any, request: Any) -> Any:
+        async def process(connection: Any, request: Any) -> Any:
             headers = request.headers
             try:
                 several = [name for name in ("Host", "Origin") if len(headers.get_all(name)) > 1]
@@ -215,7 +223,16 @@ class PageGuard:
                 reason = "the request is malformed"
             if reason:
                 return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
-            response = None if then is None else then(connection, request)
+            page = None if "Upgrade" in headers else pages.get(urlsplit(request.path).path)
+            if page is not None:
+                status, kind, text = await asyncio.get_running_loop().run_in_executor(None, page)
+                response = connection.respond(status, text)
+                del response.headers["Content-Type"]
+                response.headers["Content-Type"] = f"{kind}; charset=utf-8"
+                response.headers["Cache-Control"] = "no-store"
+                response.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
+            else:
+                response = None if then is None else then(connection, request)
             if response is not None and self.is_token(self.token_in(request.path)):
                 response.headers["Set-Cookie"] = (
                     f"{self.cookie}={self.token}; Path=/; HttpOnly; SameSite=Strict"

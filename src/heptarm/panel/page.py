@@ -55,7 +55,6 @@ class ArmPage:
         ghost: shows its plan.
         root: node of viser's scene that is the base of the arm; empty: the world.
         tab: where the readouts go.
-        atop: makes the buttons of all arms; called between the state and the tabs.
     """
 
     def __init__(
@@ -68,7 +67,6 @@ class ArmPage:
         *,
         root: str,
         tab: Any,
-        atop: Callable[[], None],
     ) -> None:
         self.model = model
         self._server, self._gui = server, server.gui
@@ -98,7 +96,6 @@ class ArmPage:
             if model.may_control:
                 self._make_recording()
         self._head = self._gui.add_html("")
-        atop()
         self._safety = self._gui.add_html("")
         self._plan = self._gui.add_html("")
         self._hide = self._gui.add_button("Hide plan", color="gray", visible=False)

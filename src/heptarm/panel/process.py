@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import http
 import io
 import json
 import math
@@ -29,7 +30,7 @@ from heptarm.errors import CommandRejected, HeptarmError, require
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.plan_box import PlanBox
-from heptarm.panel import texts
+from heptarm.panel import frame, texts
 from heptarm.panel.guard import PageGuard, free_port, is_local
 from heptarm.panel.model import PanelArm, groups_for
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
@@ -116,7 +117,9 @@ class Panel:
         port = free_port(options.host, options.port)  # viser would wait for ever for an address that is none
         guard = PageGuard(options.host)
         # viser's own lines have a URL without the token, which lets nobody in
-        with contextlib.redirect_stdout(io.StringIO()), guard.installed():
+        pages = {"/": self._frame, frame.STOP_PATH: self._answer_stop}
+        self._is_light = options.light
+        with contextlib.redirect_stdout(io.StringIO()), guard.installed(pages):
             server = viser.ViserServer(host=options.host, port=port, verbose=False)
         self.server = server
         self._arms = tuple(arms)
@@ -145,8 +148,6 @@ class Panel:
         server.initial_camera.look_at = (0.15, middle, 0.5)
         readouts = server.gui.add_panel()
         tabs = server.gui.add_tab_group() if len(self._arms) > 1 else None
-        if tabs is not None:
-            self._make_stop()
         for number, model in enumerate(self._arms):
             root = f"/arm{number + 1}"
             server.scene.add_frame(root, show_axes=False, position=(0.0, _APART * number, 0.0))
@@ -171,7 +172,6 @@ class Panel:
                     DrawnGhost(server, model.arm.robot.name, meshes, root),
                     root=root,
                     tab=tab,
-                    atop=self._make_stop if tabs is None else lambda: None,
                 )
             self._pages.append(page)
         readouts.dock_left()
@@ -183,29 +183,31 @@ class Panel:
         self.url = guard.url
         self._box = PlanBox([model.arm.robot.name for model in self._arms])
 
-    def _make_stop(self) -> None:
-        """The button that stops all arms, as soon as it is pressed."""
-        gui = self.server.gui
-        gui.add_html(texts.STOP)
-        button = gui.add_button("STOP", color="red")
-        command = gui.add_command("Stop the arm", hotkey="S", description="stops every arm of this panel")
+    def _frame(self) -> tuple[http.HTTPStatus, str, str]:
+        """The page around viser's."""
+        return http.HTTPStatus.OK, "text/html", frame.page(light=self._is_light)
 
-        async def stop(
-            _: Any,
-        ) -> None:  # in a thread of its own: those of viser may all be waiting for something
-            threading.Thread(target=self.stop, name="heptarm-panel-stop", daemon=True).start()
+    def _answer_stop(self) -> tuple[http.HTTPStatus, str, str]:
+        """Stop all arms, and say which of them did not answer."""
+        failed = self.stop()
+        if not failed:
+            return http.HTTPStatus.OK, "text/plain", "stopped"
+        reasons = "; ".join(failed)
+        return http.HTTPStatus.BAD_GATEWAY, "text/plain", f"NOT stopped: {reasons}: press the emergency stop"
 
-        button.on_hold(stop, callback_hz=2.0)  # when it is pressed, not when it is released
-        button.on_click(stop)
-        command.on_trigger(stop)
+    def stop(self) -> list[str]:
+        """Stop all arms at once, each in a thread of its own: one that does not answer delays no other.
 
-    def stop(self) -> None:
-        """Stop all arms at once, each in a thread of its own: one that does not answer delays no other."""
-        threads = [threading.Thread(target=_stop, args=(model,), daemon=True) for model in self._arms]
+        Returns:
+            Why arms were not stopped, by their robots' names; empty: all were.
+        """
+        failed: list[str] = []
+        threads = [threading.Thread(target=_stop, args=(model, failed), daemon=True) for model in self._arms]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
+        return failed
 
     async def _forget(self, client: Any) -> None:
         """End what a page has started that was closed."""
@@ -268,10 +270,11 @@ class Panel:
             self.server.stop()
 
 
-def _stop(model: PanelArm) -> None:
+def _stop(model: PanelArm, failed: list[str]) -> None:
     try:
         model.stop()
     except HeptarmError as error:
+        failed.append(f"{model.arm.robot.name}: {error}")
         model.report(error)
 
 

@@ -49,11 +49,8 @@ div:has(> div > .ha-grid) > div:has(> button){margin-left:4px;margin-right:4px}
 div:has(> div > .ha-grid) > div > button{height:2.4em !important;touch-action:none;user-select:none;
 -webkit-user-select:none;-webkit-touch-callout:none}
 div:has(> .ha-wide) + div:has(> button){grid-column:1/-1}
-div:has(> .ha-stop) + div{position:sticky;top:0;z-index:9}
-div:has(> .ha-stop) + div > button{height:3.1em !important;font-size:22px;font-weight:800;letter-spacing:.25em;
-touch-action:none;user-select:none;-webkit-touch-callout:none}
 </style>"""
-GRID, WIDE, STOP = (f'<div class="ha-{name}"></div>' for name in ("grid", "wide", "stop"))
+GRID, WIDE = (f'<div class="ha-{name}"></div>' for name in ("grid", "wide"))
 _LEVELS = {"info": "good", "warning": "warn", "error": "bad"}
 
 
