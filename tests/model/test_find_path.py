@@ -43,7 +43,7 @@ def tool_at(q: Array, tcp: Pose) -> Pose:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_path_leads_around_a_wall(wall: ha.CollisionModel, seed: int) -> None:
+def test_a_path_goes_around_a_wall(wall: ha.CollisionModel, seed: int) -> None:
     assert wall.first_on([LEFT, RIGHT]) is not None
     path = planning.find_path(wall, start=LEFT, goal=RIGHT, seed=seed, timeout=60.0)
     assert (path.start == LEFT).all() and (path.end == RIGHT).all()
@@ -66,7 +66,7 @@ def test_a_path_in_one_line(wall: ha.CollisionModel) -> None:
     free = planning.find_path(wall, start=LEFT, goal=LEFT + 0.1)
     assert free.stats.planner == "straight" and len(free.points) == 1
     text = str(free)
-    assert text.startswith(f"{free.duration:.2f} s, 1 way point, clearance ") and "(straight)" in text
+    assert text.startswith(f"{free.duration:.2f} s, 1 waypoint, clearance ") and "(straight)" in text
     assert "\n" not in text
 
 
@@ -158,7 +158,7 @@ FORWARDS = (0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))
         ("narrow-slot", 0.0, [(0.65, 0.0, 0.5)]),
     ],
 )
-def test_paths_lead_into_the_compartments_of_a_shelf_and_through_a_slot(
+def test_paths_into_the_compartments_of_a_shelf_and_through_a_slot(
     scene: str, tip: float, goals: list[tuple[float, float, float]]
 ) -> None:
     world, tcp = ha.CollisionModel("iiwa14", scene=scene), Pose.at(0, 0, tip)

@@ -402,7 +402,7 @@ class _Search:
         return world.first_on(np.array([here, there])) is None
 
     def _projected(self, here: Array, there: Array, target: Array) -> Array | None:
-        """A step that obeys the constraint; None: it leads nowhere."""
+        """A step that obeys the constraint; None: there is none that gets nearer."""
         assert self._cone is not None
         found = self._cone.projected(there)
         if found is None or (found < self._robot.q_min).any() or (found > self._robot.q_max).any():

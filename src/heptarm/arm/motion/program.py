@@ -161,7 +161,7 @@ def _with_kept(motion: Ptp, known: Array | None, index: int) -> Ptp:
 
 
 def _check_begin(path: Path, here: Array) -> None:
-    """Refuse a path that begins elsewhere: what leads there was not checked."""
+    """Refuse a path that begins elsewhere: the joints would move there unchecked."""
     gap = float(np.abs(path.start - here).max())
     if gap > _AT_BEGIN:
         raise CommandRejected(

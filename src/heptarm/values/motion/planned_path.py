@@ -67,13 +67,13 @@ class Path(JointSpline):
         return JointSpline(self.points, dynamics=self.dynamics, triggers=self.triggers)
 
     def __str__(self) -> str:
-        """In one line: "1.84 s, 5 way points, clearance 21 mm at link_5 ..."."""
+        """In one line: "1.84 s, 5 waypoints, clearance 21 mm at link_5 ..."."""
         near = self.clearance
         room = "nothing nearer than 200 mm"
         if near is not None:
             room = f"clearance {near.distance * 1e3:.0f} mm at {near.first} ({near.second})"
         count = len(self.points)
-        points = "1 way point" if count == 1 else f"{count} way points"
+        points = "1 waypoint" if count == 1 else f"{count} waypoints"
         took = f"found in {self.stats.seconds * 1e3:.0f} ms ({self.stats.planner})"
         return f"{self.duration:.2f} s, {points}, {room}, {took}"
 
