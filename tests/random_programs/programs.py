@@ -210,7 +210,7 @@ class Fri:
             "torque": JointImpedance(stiffness=100.0),
             "wrench": CartesianImpedance(stiffness=(500.0, 500.0, 500.0, 50.0, 50.0, 50.0)),
         }[self.kind]
-        with arm.fri(self.kind, period_ms=self.period, mode=mode) as rt:  # type: ignore[call-overload]
+        with arm.fri(self.kind, period_ms=self.period, mode=mode) as rt:  # type: ignore[arg-type]
             for s in rt:
                 rt.command(**self.command(rt.start.q_ipo, s.t))
                 if s.t > self.seconds:
