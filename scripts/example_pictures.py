@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "src")]
 
 import heptarm as ha  # noqa: E402
-from heptarm.values.arrays import Array  # noqa: E402
+from heptarm.values.checks import Array  # noqa: E402
 
 EXAMPLES = ROOT / "examples"
 PICTURES = ROOT / "docs" / "_static" / "examples"
@@ -80,7 +80,7 @@ def watched(arm):
         def closed():
             recorder.__exit__(None, None, None)
             close()
-        arm.close = closed
+        object.__setattr__(arm, "close", closed)  # an arm is sealed against names that it has not
 
 def connected(*arguments, **keywords):
     arm = connect(*arguments, **keywords)

@@ -14,7 +14,7 @@ from heptarm.sim.plant.scene import Scene, Wiring, names
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.sim.runtime.operator import SimulatedOperator
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import Body
 from tests.sim import motions
@@ -181,7 +181,7 @@ def test_a_scene_of_your_own_may_include_the_ready_gripper_and_wire_it(tmp_path:
 @pytest.mark.parametrize(
     ("text", "because"),
     [
-        ("nowhere.xml", "one of bins, peg-in-hole, table"),
+        ("nowhere.xml", "one of bins, narrow-slot, peg-in-hole, shelf, table"),
         ("two-finger-gripper", "must be a file"),
         ("../scenes/table", "must be a file"),
     ],

@@ -28,12 +28,12 @@ from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
-from heptarm.arm.motion import program
+from heptarm.arm.motion import program_request
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
 from heptarm.arm.motion.preview import ProgramPreview
-from heptarm.arm.motion.program import ProgramTerms
+from heptarm.arm.motion.program_request import ProgramTerms
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
@@ -48,11 +48,12 @@ from heptarm.arm.motion.servo import (
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
+from heptarm.planning.search import STATES, TIMEOUT, Goal
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
-from heptarm.values.arrays import array, callback, instance, integer, shown, within, word
 from heptarm.values.camera import Camera
-from heptarm.values.clearance import CollisionCheck
+from heptarm.values.checks import array, callback, instance, integer, shown, within, word
+from heptarm.values.clearance import CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -60,6 +61,8 @@ from heptarm.values.files import path_of
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.planned_path import Path as FoundPath
+from heptarm.values.motion.planned_path import Upright
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
@@ -531,13 +534,63 @@ class ArmVerbs(Sealed):
             StaleState: the newest state is too old, or lacks the joints.
             MissingExtra: the planner is not installed.
         """
-        motions = program.listed(motion)
+        motions = program_request.listed(motion)
         return self._foresight.preview(
             motions,
             self._terms(mode=mode, speed=speed, until=until, then=then),
             start=None if start is None else array(start, 7, "start"),
             step=within(step, "step", 0.001, 1.0, unit="s"),
             check=None if collision_check is None else _checked(collision_check),
+        )
+
+    def find_path(
+        self,
+        goal: Goal,
+        *,
+        avoid: PlanningWorld | None = None,
+        keep: Upright | None = None,
+        speed: float | None = None,
+        timeout: float = TIMEOUT,
+        states: int = STATES,
+        seed: int = 0,
+        stop: Callable[[], bool] | None = None,
+    ) -> FoundPath:
+        """Find a path around bodies, from where the arm rests, with what is attached to it. Nothing moves.
+
+        The path is a motion: `move(path)` lets the cabinet follow it as a joint spline, also in a program with others.
+        It is checked again before it is sent, against `avoid` as it is then. Needs `pip install 'heptarm[sim]'`.
+
+        It is an aid for programs, no safety function: it knows only the bodies of the model.
+
+        Args:
+            goal: joint positions, shape (7,) [rad]; a pose of the tool frame in the base, with any elbow; a `Region`;
+                or several of these, of which the path reaches one.
+            avoid: model of the bodies, such as a `heptarm.CollisionModel`, whose margin is kept; None:
+                `arm.collision_check`.
+            keep: constraint along the path, such as `Upright("z", within=0.1)`; None: none.
+            speed: ceiling for which its duration is computed, (0, 1]; the lower one of this and `arm.speed`.
+            timeout: longest search [s].
+            states: most joint positions that the search reaches.
+            seed: of its random numbers: the same one finds the same path in the same world.
+            stop: called again and again; the search ends when it returns true.
+
+        Raises:
+            NoPath: none was found; the text has the bodies in the way, or how near it came.
+            ModeConflict: a motion runs.
+            StaleState: the newest state is too old, or lacks the joints.
+            CommandRejected: the model is of another robot; LimitError and ShapeError are such errors.
+            MissingExtra: the planner is not installed.
+        """
+        terms = self._terms(mode=None, speed=speed, until=None, then=None)
+        return self._foresight.find_path(
+            goal,
+            avoid=avoid,
+            keep=keep,
+            speed=terms.speed,
+            timeout=timeout,
+            states=states,
+            seed=seed,
+            stop=stop,
         )
 
     @property
@@ -602,12 +655,12 @@ class ArmVerbs(Sealed):
             ModeConflict: this thread is in the block of a servo motion or an FRI session.
             LocalProtocolError: called from a callback.
         """
-        motions = program.listed(motion)
+        motions = program_request.listed(motion)
         if timeout is not None:
             check_timeout(timeout)
         self._connection.check_may_wait("arm.move()")
         self._connection.check_no_block("arm.move()")
-        if timeout is None and program.is_endless(motions, self._connection.robot):
+        if timeout is None and program_request.is_endless(motions, self._connection.robot):
             raise ShapeError(
                 "this program ends only when it is cancelled, so that move() would never return",
                 parameter="timeout",
@@ -647,7 +700,7 @@ class ArmVerbs(Sealed):
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            motions = program.listed(motion)
+            motions = program_request.listed(motion)
             return self._send(motions, self._terms(mode=mode, speed=speed, until=until, then=then, when=when))
 
     @contextlib.contextmanager
@@ -737,9 +790,9 @@ class ArmVerbs(Sealed):
         return check_reaction(then)
 
     def _send(self, motions: tuple[Motion, ...], terms: ProgramTerms) -> MotionHandle:
-        made = program.checked(self._connection, self._tooling, motions, terms)
+        made = program_request.checked(self._connection, self._tooling, motions, terms)
         self._foresight.examine(made)
-        return program.send(self._connection, made)
+        return program_request.send(self._connection, made)
 
     @overload
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...

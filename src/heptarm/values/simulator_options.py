@@ -10,6 +10,7 @@ from heptarm.values.robot import flange
 
 #: When a virtual cabinet asks for real-time priority: while an FRI client has to answer each tick, always, never.
 RealTime: TypeAlias = Literal["fri", "on", "off"]
+REAL_TIME: RealTime = "fri"
 
 
 def _about(
@@ -97,7 +98,7 @@ class SimulatorOptions:
     scene: str = field(
         default="",
         metadata=_about(
-            "what is around the arm and on its flange: table, peg-in-hole, bins, or a file in MuJoCo's format",
+            "what is around the arm and on its flange: table, peg-in-hole, bins, shelf, narrow-slot, or a file (MJCF)",
             metavar="NAME|FILE",
             in_target=True,
         ),
@@ -153,7 +154,7 @@ class SimulatorOptions:
         ),
     )
     real_time: str = field(
-        default="fri",
+        default=REAL_TIME,
         metadata=_about(
             'real-time priority: "fri": while an FRI session is open; "on": always, and Java compiled for the lowest '
             'latency; "off": never',
