@@ -48,7 +48,7 @@ static void feed_back(const double *gains, const double *points, const double *q
     }
 }
 
-/* Position control without a preload; heptarm.sim.control.laws.PositionLaw explains it and has the gains. */
+/* Position control without a preload; heptarm.sim.control_laws.laws.PositionLaw explains it and has the gains. */
 static void position(const double *gains, const double *points, const double *q, const double *dq, const double *mass, word stride,
                      const double *bias, const double *passive, double *torque) {
     double slip[AXES], acceleration[AXES];

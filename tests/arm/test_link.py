@@ -99,10 +99,10 @@ def test_silence_is_noticed() -> None:
 def test_heartbeats_go_both_directions() -> None:
     peer = Peer(heartbeat=0.2)
     with peer.arm(rate=0.0) as arm:
-        count = arm.connection.link.offset.count  # type: ignore[union-attr]
+        count = arm.connection.link.offset.count
         peer.tell(wire.Ping(sent=77))
         deadline = time.monotonic() + 20.0
-        while arm.connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
+        while arm.connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:
             assert time.monotonic() < deadline
             time.sleep(0.01)
         with pytest.raises(ha.StaleState):
@@ -288,7 +288,9 @@ def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:
 
 
 def test_an_interrupted_request_leaves_a_sound_link(peer: Peer) -> None:
-    timer = threading.Timer(0.1, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT))
+    timer = threading.Timer(
+        0.1, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    )
     # the first stop is never answered, so the caller waits in receive_into
     peer.expect(wire.Stop, lambda *_: timer.start())
     with peer.arm() as arm:

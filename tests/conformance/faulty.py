@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState
 from heptarm.sim.runtime import cabinet as virtual
 
 #: Delay of an arm that lags, in ticks.
@@ -94,7 +94,7 @@ if __name__ == "__main__":
         """Torque of the law for the modified set-points."""
         return unruly.torque(control, sensed)
 
-    ActiveLaw.torque = torque  # type: ignore[method-assign]
-    virtual.VirtualCabinet = _Cabinet  # type: ignore[misc]
+    ActiveLaw.torque = torque  # type: ignore[method-assign, assignment]
+    virtual.VirtualCabinet = _Cabinet  # type: ignore[misc, assignment]
     threading.Thread(target=_listen, daemon=True).start()
     sys.exit(virtual.main())

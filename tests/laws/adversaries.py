@@ -14,7 +14,7 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.planning.seam import Hold
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
@@ -91,7 +91,7 @@ class Trial:
         start = rng.uniform(0.9 * arm.q_min, 0.9 * arm.q_max)
         plant = Plant(model, q=tuple(start.tolist()), errors=errors)
         plant.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # a clash turns an axis by itself
-        load = Body(float(rng.uniform(0.0, 0.3 * float(rng.choice((1.0, 30.0))))), (0.0, 0.0, 0.08))
+        load = Body(float(rng.uniform(0.0, 0.3 * float(rng.choice((1.0, 30.0))))), np.array((0.0, 0.0, 0.08)))
         plant.set_load_data(load)
         known = load if load.mass > 0.3 else None  # a light one that nobody declared
         self.name = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -67,10 +69,19 @@ def test_without_the_guard_such_laws_do_break_the_arm() -> None:
 def test_torques_of_a_calm_law_pass_unchanged() -> None:
     tau = [20.0, -30.0, 10.0, 15.0, -5.0, 4.0, -2.0]
     made = guard()
+    assert not made.was_limited
     for _ in range(20):
         assert made.limit(tau, q=HOME, dq=STILL, period=PERIOD) == tau
         assert not made.was_limited
     assert made.report.lines == []
+
+
+def test_a_torque_beyond_its_limit_is_cut_and_reported_by_axis() -> None:
+    made = TorqueGuard(replace(Limits.of(ARM), tau_max=(5.0,) * 7), rigid_bodies(ARM, rotor=ROTOR))
+    made.start()
+    sent = made.limit([8.0, *[0.0] * 6], q=HOME, dq=STILL, period=PERIOD)
+    assert made.was_limited and sent[0] == pytest.approx(5.0)
+    assert made.report.lines == ["A1: torque limited in 1 cycle: 8 Nm requested, 5 allowed"]
 
 
 def test_an_axis_near_its_limit_brakes_and_the_others_keep_their_accelerations() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.planning.table import MANY, MotionTable
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 AXES = 7
 

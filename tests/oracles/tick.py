@@ -12,12 +12,12 @@ import mujoco
 import numpy as np
 
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
-from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING, MeasuredState
+from heptarm.sim.control_laws.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING, MeasuredState
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.native import ELSEWHERE
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 from tests.oracles.inverse_kinematics import status_of
 from tests.oracles.kinematics import flange

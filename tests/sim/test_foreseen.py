@@ -13,7 +13,7 @@ from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.sim import motions
 from tests.sim.driving import READY
 
@@ -42,6 +42,12 @@ class Parts:
 
     def __init__(self, plant: Plant) -> None:
         self._plant, self.ticks = plant, list[int]()
+
+    def started(self) -> None:
+        """The motion begins."""
+
+    def finished(self, cause: str, text: str) -> None:
+        """The motion has ended."""
 
     def reached(self, part: int) -> None:
         """A part begins."""

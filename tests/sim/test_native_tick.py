@@ -15,12 +15,12 @@ import pytest
 from heptarm._library import Unavailable
 from heptarm.planning.seam import StateWords
 from heptarm.planning.table import MANY, MotionTable, SetPointRows
-from heptarm.sim.control.laws import MeasuredState, PositionLaw
+from heptarm.sim.control_laws.laws import MeasuredState, PositionLaw
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant import native
 from heptarm.sim.plant import plant as plant_module
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import ROBOTS
 from tests.oracles.set_points import ahead
 from tests.oracles.tick import PythonTick, position_torque

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from heptarm.model.kinematics import forward
@@ -15,6 +14,7 @@ from heptarm.planning.motion import PlanError
 from heptarm.planning.seam import PlantMotion
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
+from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, deg
 from tests.sim import motions
 from tests.sim.driving import READY, numbers, run
@@ -29,8 +29,8 @@ ROUND = {
 }
 
 
-def ready(q: npt.ArrayLike = READY) -> Plant:
-    return Plant("iiwa14", q=q)
+def ready(q: Sequence[float] | Array = READY) -> Plant:
+    return Plant("iiwa14", q=tuple(map(float, q)))
 
 
 @pytest.mark.parametrize("degrees", ROUND.values(), ids=ROUND)

@@ -14,13 +14,16 @@ from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
 
-LIMITS = {"velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5), "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0)}
+LIMITS: dict[str, Any] = {
+    "velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5),
+    "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0),
+}
 TCP = Pose.xyz_abc(0.02, 0.0, 0.15, 0.3, 0.0, 0.2)
 
 

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from heptarm.planning.motion import TICK
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
+from heptarm.planning.seam import PlantMotion
 from heptarm.planning.table import MANY, MotionTable, SetPointRows
 from heptarm.planning.time_scaling import TabulatedProfile
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 from tests.oracles.set_points import ahead
 from tests.sim import motions
@@ -22,7 +23,7 @@ IIWA = robot("iiwa14")
 START = np.array(READY)
 FAR, NEAR = (1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8), (0.002, 0.5, 0.0, -1.3, 0.0, 0.9, 0.001)
 NO_LIMIT = np.full(7, 10.0)
-MOTIONS = {
+MOTIONS: dict[str, PlantMotion] = {
     "ptp": motions.ptp(FAR),
     "slow": motions.ptp(FAR, joint_velocity=(0.3,) * 7),
     "short": motions.ptp(NEAR),
@@ -98,6 +99,15 @@ def test_the_first_that_an_axis_cannot_follow_is_none_of_them() -> None:
     count = int((steps[:, 5] > leap[5]).argmax())
     assert 0 < count < len(steps) / 2
     assert len(follow(planned, TICK, leap)[1]) == count
+
+
+def test_a_place_at_the_end_of_the_path_is_the_end(language: str) -> None:
+    pieces = np.array([[0.0, 0.0, 1.0, 0.0, 0.0]])  # s = t
+    lines = np.array([[0.0, 1.0, *START, *np.full(7, 0.1)]])
+    rows = SetPointRows(NO_LIMIT)
+    assert rows.compute(MotionTable(pieces, lines, 3.0), 0.0, 0.25, START) == 3 and rows.is_last
+    assert list(rows.places[:3]) == [0.25, 0.5, 0.75]
+    assert rows.joints[:3] == pytest.approx(START + 0.1 * np.array([[0.25], [0.5], [0.75]]))
 
 
 def test_paths_in_space_have_no_table() -> None:

@@ -11,8 +11,8 @@ import pytest
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
-from heptarm.sim.fri import cartesian, controller
-from heptarm.sim.fri.controller import MIRRORED
+from heptarm.sim.fri import cartesian, controller_side
+from heptarm.sim.fri.controller_side import MIRRORED
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.pose import Pose
@@ -251,7 +251,7 @@ def test_the_next_overlay_begins_where_the_arm_is() -> None:
 def test_a_client_that_does_not_mirror_never_commands(
     overlay: MotionOverlay, fields: dict[str, object], text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(controller, "SYNCHRONISATION", 200_000_000)
+    monkeypatch.setattr(controller_side, "SYNCHRONISATION", 200_000_000)
     rig = Rig(Version.V2_5)
     rig.client.waiting = lambda message: replace(mirror(message), **fields)  # type: ignore[arg-type]
     rig.waiting(overlay).until(State.MONITORING_READY)

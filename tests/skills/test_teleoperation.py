@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,7 +96,8 @@ def test_the_arm_moves_while_the_dead_man_button_is_held_and_ends_by_the_quit_bu
 
 
 def test_a_dead_man_button_that_is_stuck_moves_nothing_until_it_was_released(arm: ha.Arm) -> None:
-    y, released = arm.state.pose.y, []
+    y = arm.state.pose.y
+    released: list[float] = []
 
     def decide(reading: int) -> devices.DeviceInput:
         if reading < 30:
@@ -164,7 +166,7 @@ def test_the_elbow_follows_a_posture(arm: ha.Arm) -> None:
     ("settings", "word"),
     [({"scale": 0.0}, "scale"), ({"turn_scale": 9.0}, "turn_scale"), ({"duration": -1.0}, "duration")],
 )
-def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict, word: str) -> None:
+def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict[str, Any], word: str) -> None:
     with pytest.raises(ha.LimitError, match=word):
         skills.teleoperate(arm, Person(lambda _: of(LEFT)), **settings)
     with pytest.raises(ha.ShapeError, match="device must be an input device"):

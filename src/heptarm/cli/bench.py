@@ -33,7 +33,7 @@ from heptarm.fri.loop.client import Client
 from heptarm.fri.loop.echo import floor
 from heptarm.fri.loop.user_api import State
 from heptarm.fri.protocol.messages import Quality
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 from heptarm.values.files import refuse_existing
 
 #: Messages kept for the picture.

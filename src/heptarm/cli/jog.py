@@ -20,7 +20,7 @@ from heptarm.devices.spacemouse import spacemouse
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.model.velocity import Elbow
 from heptarm.skills.teleoperation import RATE, SCALE, TURN_SCALE, teleoperate
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 
 _ACCESS = Access()
 _DEVICES: dict[str, Callable[[], InputDevice]] = {

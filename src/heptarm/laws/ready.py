@@ -20,7 +20,7 @@ from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.fri.loop.parameters import Param
 from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.values.arrays import Array, array, frozen, instance, integer, numbers, scalar, within, word
+from heptarm.values.checks import Array, array, frozen, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 

@@ -11,7 +11,7 @@ import numpy as np
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import Vec, flange
 from heptarm.planning.motion import PlanError
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.circle import arc_of
 from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose, multiply, quaternion, towards

@@ -35,7 +35,7 @@ from heptarm.planning.targets import (
     pose_of,
     segment_limits,
 )
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, is_half_turn, towards
 from heptarm.values.robot import RobotModel
 

@@ -16,7 +16,7 @@ import numpy as np
 from heptarm._library import library
 from heptarm.planning.composite_path import CompositePath
 from heptarm.planning.jerk_profile import TimeLaw
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: So many set-points are computed at once.
 MANY = 64

@@ -28,7 +28,7 @@ from heptarm.planning.motion import (
     orientation_of,
 )
 from heptarm.planning.path import CartesianPath
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 

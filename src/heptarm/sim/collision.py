@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, require
-from heptarm.values.arrays import Array, array, finite_entries, instance, numbers, shown, within
+from heptarm.values.checks import Array, array, finite_entries, instance, numbers, shown, within
 from heptarm.values.clearance import Clearance, TouchOnPath
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.sealed import Sealed

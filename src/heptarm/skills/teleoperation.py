@@ -10,7 +10,7 @@ from heptarm.arm.verbs import ArmVerbs
 from heptarm.devices.device import DeviceInput, InputDevice
 from heptarm.errors import OutsideWorkspace, ShapeError
 from heptarm.skills.gripper import Gripper
-from heptarm.values.arrays import shown, within
+from heptarm.values.checks import shown, within
 from heptarm.values.frames import BASE
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, scalar, shown, within
+from heptarm.values.checks import Array, Value, array, frozen, one_or_each, scalar, shown, within
 from heptarm.values.pose import Pose, deg
 from heptarm.values.text import columns, fixed, lines
 

@@ -50,7 +50,7 @@ from heptarm.fri.protocol.messages import Quality, Safety, SessionState
 from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
 from heptarm.record.journal import FRI
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose

@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm._library import library
 from heptarm.fri.guard.joint_guard import AXES, JointReport, Limited, Limits
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Members of `struct torque_guard` and their sizes, all doubles.
 MEMBERS: tuple[tuple[str, int], ...] = (

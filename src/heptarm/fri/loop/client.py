@@ -24,7 +24,7 @@ from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
-from heptarm.values.arrays import array, finite, instance, integer, within
+from heptarm.values.checks import array, finite, instance, integer, within
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose

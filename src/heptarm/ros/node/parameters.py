@@ -17,7 +17,7 @@ from heptarm.ros.trajectory.runner import ExecutionSettings
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.ros.trajectory.tolerances import StateTolerances, TrajectoryTolerances
 from heptarm.skills.gripper import PATIENCE, SETTLE
-from heptarm.values.arrays import Array, frozen, within
+from heptarm.values.checks import Array, frozen, within
 from heptarm.values.sealed import meant
 
 Plain = str | bool | int | float | list[str]

@@ -17,7 +17,7 @@ from heptarm.io.clock import RealClock
 from heptarm.model.kinematics import forward
 from heptarm.model.velocity import MARGIN, Elbow, ElbowTask, VelocityPath, limited_twist, resolved_twist
 from heptarm.ros.trajectory.servo_execution import ServoOptions
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import TOOL
 from heptarm.values.pose import Pose

@@ -60,8 +60,8 @@ from heptarm.planning.path import JointLine, JointPath
 from heptarm.planning.plan import Plan
 from heptarm.planning.seam import HandGuide, Hold, OperationMode
 from heptarm.planning.table import MotionTable
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState, Superposition
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState, Superposition
 from heptarm.sim.controller.ahead import SetPointsAhead
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstimate, WatchedCondition
@@ -79,7 +79,7 @@ from heptarm.sim.controller.servo import (
 )
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import RobotModel
 

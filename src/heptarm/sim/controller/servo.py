@@ -22,7 +22,7 @@ from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK
 from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
 from heptarm.planning.targets import goes_on
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, is_half_turn, rotation, turn_between
 from heptarm.values.robot import RobotModel
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Set-points this far beyond a limit are rounding errors [rad].

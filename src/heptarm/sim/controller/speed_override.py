@@ -10,7 +10,7 @@ from heptarm.model.kinematics import flange, jacobian
 from heptarm.planning.jerk_profile import JerkProfile, ProfileLimits, change
 from heptarm.planning.motion import TICK
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Rate at which overrides and pauses change the speed: [1/s], [1/s²], [1/s³].

@@ -14,7 +14,7 @@ import numpy as np
 from heptarm.fri.protocol import messages as m
 from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import flange
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, quaternion, rotation
 from heptarm.values.robot import RobotModel
 

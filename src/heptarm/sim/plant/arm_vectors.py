@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 AXES = 7
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.native import NativeTick
 from heptarm.sim.plant.sensor_errors import SensorErrors
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after this many ticks.
 BRAKE_SPEED = 0.02

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.arm_vectors import ArmVectors
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Damping of the least squares near singularities.
 _DAMPED = 1e-6 * np.eye(6)

@@ -12,7 +12,7 @@ import mujoco
 from heptarm.sim.plant.carried import CarriedShapes, FlangeShapes
 from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.safety_monitor import ExternalTorqueMonitor, SafetyLimits
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import Body
 
 

@@ -14,11 +14,11 @@ from heptarm._library import Unavailable, library
 from heptarm.model.native import constants
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
-from heptarm.sim.control.laws import GAINS
+from heptarm.sim.control_laws.laws import GAINS
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 AXES = 7

@@ -6,14 +6,14 @@ import numpy as np
 
 from heptarm import model
 from heptarm.arm.arm import Arm
-from heptarm.sim.control.cartesian_impedance import GUIDED_STIFFNESS
-from heptarm.sim.control.laws import GUIDED, STIFFNESS
+from heptarm.sim.control_laws.cartesian_impedance import GUIDED_STIFFNESS
+from heptarm.sim.control_laws.laws import GUIDED, STIFFNESS
 from heptarm.skills.touch import touch
 from heptarm.testing.commissioning.person import PATIENCE, Person, PersonTask, expect
 from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, near, step
 from heptarm.testing.measure import Unfit, watch
 from heptarm.testing.stage import DEEPEST
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.motion.line import lin_rel

@@ -6,10 +6,16 @@ import mujoco
 import numpy as np
 
 from heptarm.planning.seam import HandGuide
-from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
-from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
-from heptarm.sim.control.laws import ControlLaw, JointImpedanceLaw, MeasuredState, PositionLaw, Superposition
-from heptarm.values.arrays import Array
+from heptarm.sim.control_laws.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
+from heptarm.sim.control_laws.hand_guiding_law import HandGuidingLaw
+from heptarm.sim.control_laws.laws import (
+    ControlLaw,
+    JointImpedanceLaw,
+    MeasuredState,
+    PositionLaw,
+    Superposition,
+)
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
 from heptarm.values.mode.sine import SineImpedance

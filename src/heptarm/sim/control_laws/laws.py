@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from heptarm._library import library
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.checks import Array, frozen
 from heptarm.values.robot import RobotModel
 
 #: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's.
