@@ -76,7 +76,7 @@ class Move:
 
     @property
     def is_compliant(self) -> bool:
-        """Whether the arm gives way."""
+        """Whether the arm is compliant."""
         return self.mode != "position"
 
     def motion(self, arm: ha.Arm) -> Any:
@@ -201,7 +201,7 @@ class Fri:
 
     @property
     def is_compliant(self) -> bool:
-        """Whether the arm gives way, or its set-points are the client's, which the judge of motions does not know."""
+        """Whether the arm is compliant, or its set-points are the client's, which the judge of motions does not know."""
         return True
 
     def run(self, arm: ha.Arm) -> None:

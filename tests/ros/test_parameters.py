@@ -21,7 +21,7 @@ HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 ASIDE = model.solve(robot("iiwa14"), model.forward(robot("iiwa14"), HOME), e1=-0.5, near=HOME)
 
 
-def test_an_unknown_name_says_what_was_meant() -> None:
+def test_an_unknown_name_states_what_was_meant() -> None:
     with pytest.raises(
         CommandRejected, match=r"unknown parameter 'servo\.elbo'.*did you mean 'servo\.elbow'\?"
     ):
