@@ -235,7 +235,7 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
         (("plan", "lin", *"000000", "--frame", "/Table"), ("one of base, got '/Table'",)),
         (("plan", "to", *"0000"), ("seven joint positions or the six numbers of a pose, got 4 numbers",)),
         (
-            ("plan", "to", "0.6", "0", "0.05", *"000", "--box", "0.6,0,0.1,0.6,0.8,0.2"),
+            ("plan", "to", "0.6", "0", "0.15", "180", "0", "180", "--deg", "--box", "0.6,0,0.1,0.6,0.8,0.2"),
             ("goal is in collision",),
         ),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
