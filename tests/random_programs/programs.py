@@ -201,7 +201,7 @@ class Fri:
 
     @property
     def is_compliant(self) -> bool:
-        """Whether the arm is compliant, or its set-points are the client's, which the judge of motions does not know."""
+        """Whether the arm is compliant, or its set-points are the client's, unknown to the judge of motions."""
         return True
 
     def run(self, arm: ha.Arm) -> None:
