@@ -22,7 +22,7 @@ _load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
-    """A public name at its first use; a module or a mistyped name is told apart in the error."""
+    """A public name at its first use; the error distinguishes a module from a mistyped name."""
     try:
         return _load(name)
     except AttributeError as error:

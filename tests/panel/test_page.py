@@ -256,7 +256,7 @@ def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel
     page.press("Recover")
     until(
         lambda: not model.arm.state.safety.emergency_stop and model.arm.state.safety.ready_to_move,
-        "it stands",
+        "it is not ready again",
     )
     model.release_control()
     for press in (page.stop, touch, key("s", into="body"), key("\ue007", into="button")):
@@ -267,7 +267,7 @@ def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel
             "it does not say that the arm is stopped",
         )
 
-    # the cabinet is gone: the bar says so
+    # the cabinet is gone: the bar shows it
     cabinet.close()
     page.stop()
     with page.around():

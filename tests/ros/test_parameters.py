@@ -21,7 +21,7 @@ HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 ASIDE = model.solve(robot("iiwa14"), model.forward(robot("iiwa14"), HOME), e1=-0.5, near=HOME)
 
 
-def test_an_unknown_name_says_what_was_meant() -> None:
+def test_an_unknown_name_states_what_was_meant() -> None:
     with pytest.raises(
         CommandRejected, match=r"unknown parameter 'servo\.elbo'.*did you mean 'servo\.elbow'\?"
     ):
@@ -45,10 +45,10 @@ def test_twists_of_a_topic_follow_the_posture(cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(HOME), speed=1.0)
         start = arm.state
-        settings = {"timeout": 2.0, "options": configuration.servo}
+        servo = configuration.servo
         with pytest.raises(LimitError, match="A1 must be in"):
-            TargetStream(arm, posture=np.full(7, 3.0), **settings)
-        stream = TargetStream(arm, posture=configuration.posture, **settings)
+            TargetStream(arm, posture=np.full(7, 3.0), timeout=2.0, options=servo)
+        stream = TargetStream(arm, posture=configuration.posture, timeout=2.0, options=servo)
         deadline = time.monotonic() + 60.0
         while abs(arm.state.q[2] + 0.5) > 0.05 and time.monotonic() < deadline:
             stream.twist(np.zeros(6))

@@ -7,7 +7,6 @@ from math import pi
 
 import numpy as np
 import pytest
-from heptarm.values.arrays import Array
 
 from heptarm.model.kinematics import forward
 from heptarm.planning.geometry import Slerp
@@ -15,6 +14,7 @@ from heptarm.planning.motion import PlanError
 from heptarm.planning.seam import PlantMotion
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from tests.sim import motions
 from tests.sim.driving import READY, numbers, run

@@ -259,7 +259,7 @@ def test_the_repr_leaves_out_what_is_at_its_default() -> None:
     assert repr(Dynamics()) == "Dynamics()"
 
 
-def test_a_percentage_is_told_from_a_fraction() -> None:
+def test_a_percentage_is_distinguished_from_a_fraction() -> None:
     with pytest.raises(
         LimitError, match=r"speed must be in \(0, 1\], got 50 \(it is a fraction: did you mean 0.5\?"
     ):

@@ -138,7 +138,7 @@ class TorqueGuard:
         period: float,
         is_braking: bool = False,
     ) -> list[float]:
-        """Limit a wrench on the flange by the motion to which it leads.
+        """Limit a wrench on the flange by the motion that it causes.
 
         Args:
             wrench: target wrench, base axes, finite, shape (6,) [N, Nm].

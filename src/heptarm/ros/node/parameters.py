@@ -315,7 +315,7 @@ class NodeConfiguration:
 
     @property
     def posture(self) -> Array | None:
-        """What the elbow follows in servo topics, shape (7,) [rad]; None: `servo.elbow` says it.
+        """What the elbow follows in servo topics, shape (7,) [rad]; None: `servo.elbow` decides.
 
         Raises:
             ShapeError: not seven numbers.

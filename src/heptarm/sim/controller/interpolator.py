@@ -12,7 +12,7 @@ after this tick. Everything else happens in the phase of that command, `RunningM
             ├─> guided ────────────────────┼─> braking ──────┘
             └─> servoing <──> stopped ─────┘
 
-timed      moves along the path of its plan. The path's own time passes as the speed override says; where axes cannot
+timed      moves along the path of its plan. The path's own time passes at the speed override; where axes cannot
            follow a change of it, only a part of the change is made (`_step`).
 holding    has no path: a hold waits until its time is over, anything else without a path has nothing to do.
 overlaid   a hold whose set-points an FRI client gives. It has no way back: once the client is silent, the axes brake.
@@ -25,8 +25,8 @@ braking    comes to rest at full motion time, whatever the override is: on the p
            present direction off it (`RunningMotion.halt`), or by a follower. There is no way back to a motion.
 settling   the set-points have ended; it is closed when the measured joints have arrived, or rest.
 
-Why the command is over is no phase. `failure`, `cancelled` and `broken` say it from the moment when it is decided; the
-phase says where the set-points come from, until the arm is at rest. A cancelled command usually brakes in the same
+Why the command is over is no phase. `failure`, `cancelled` and `broken` say it from the moment of the decision; the
+phase determines where the set-points come from, until the arm is at rest. A cancelled command usually brakes in that
 tick, but not while a safety stop brakes it already: it stays in its phase, and settles when the override rests, or
 brakes when the stop ends before that. A failure inside a tick brakes in this same tick (`_break_off`), since one tick
 of rest would be a jump.
@@ -512,7 +512,7 @@ class Interpolator:
         return 0.0 if held else safety.manual * min(1.0, max(0.0, self._inputs.override))
 
     def _follow(self, run: RunningMotion) -> tuple[float, float]:
-        """Set the next set-point as the phase says; returns progress and remaining time."""
+        """Set the next set-point according to the phase; returns progress and remaining time."""
         if run.cancelled and run.phase in ("timed", "holding", "servoing"):  # a safety stop brakes it
             if self._speed_override.rests:
                 run.settle()
