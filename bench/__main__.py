@@ -44,7 +44,7 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="list the benchmarks")
     parser.add_argument("--store", action="store_true", help="store the figures in bench/results")
     options = parser.parse_args()
-    groups = sorted({one.group for one in BENCHMARKS.values()})
+    groups = sorted({benchmark.group for benchmark in BENCHMARKS.values()})
     for kind, asked, known in (
         ("benchmark", options.only, list(BENCHMARKS)),
         ("group", options.group, groups),

@@ -8,6 +8,7 @@ import heptarm as ha
 
 command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--port", "0", "--parent-pipe"]
 cabinet = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+assert cabinet.stdin and cabinet.stdout
 target = f"sim://127.0.0.1:{json.loads(cabinet.stdout.readline())['port']}"
 
 with (

@@ -2,11 +2,13 @@
 
 import math
 import os
+from typing import Any
 
 import heptarm as ha
+from heptarm.fri import Output, State
 
 
-def swing(s, out, p):
+def swing(s: State, out: Output, p: Any) -> None:
     out.q[6] += p.amplitude * (1.0 - math.cos(2.0 * math.pi * p.frequency * s.t)) / 2.0
 
 

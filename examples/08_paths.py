@@ -2,15 +2,17 @@
 
 import os
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 
 import heptarm as ha
+from heptarm.values.motion.motion import Motion
 
 SPEED, ZONE = 0.25, 0.02  # m/s, m
 
 
-def drawn(arm: ha.Arm, motion) -> np.ndarray:
+def drawn(arm: ha.Arm, motion: Motion | Sequence[Motion]) -> np.ndarray:
     """Execute a motion and return the positions of the flange, shape (n, 3) [m]."""
     handle = arm.start(motion)
     places = []
@@ -30,7 +32,7 @@ with ha.connect(os.environ.get("HEPTARM_TARGET", "sim://iiwa14")) as arm:
         return ha.Pose.of(start.xyz + [x, y, z], start.quat)
 
     corners = [at(0, 0.12), at(-0.1, 0.12), at(-0.1, 0), start]
-    paths = {
+    paths: dict[str, Motion | Sequence[Motion]] = {
         "arc": [ha.circ(at(0.05, 0.05), at(0, 0.1), speed_mps=SPEED), ha.lin(start, speed_mps=SPEED)],
         "square, blended": [ha.lin(corner, speed_mps=SPEED, blend_m=ZONE) for corner in corners],
         "spline": ha.spline([at(-0.05, 0.05), at(0, 0.1, 0.03), at(-0.05, 0.15), start], speed_mps=SPEED),

@@ -5,17 +5,19 @@ import shutil
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import heptarm as ha
 from heptarm import laws
-from heptarm.fri import include_dir
+from heptarm.fri import CompiledLaw, Output, State, include_dir
 from heptarm.modes import JointImpedance
 
 
 @ha.law(memory={"x": np.zeros(7), "started": 0.0})
-def spring(s, out, p, m):
+def spring(s: State, out: Output, p: Any, m: Any) -> None:
     if m.started == 0.0:
         m.x = s.q
         m.started = 1.0
@@ -34,8 +36,14 @@ with (
 ):
     home = ha.deg(0, 30, 0, -90, 0, 60, 0)
     arm.move(ha.ptp(home), speed=0.6)
-    settings = {"goal": home, "stiffness": 100.0, "damping": 10.0, "tau": 0.2, "most": 20.0}
-    forms = {"Numba": spring}
+    settings: dict[str, npt.ArrayLike] = {
+        "goal": home,
+        "stiffness": 100.0,
+        "damping": 10.0,
+        "tau": 0.2,
+        "most": 20.0,
+    }
+    forms: dict[str, CompiledLaw] = {"Numba": spring}
     if compiler := shutil.which("c++"):
         made = Path(folder) / "spring.so"
         source = HERE / "laws" / "spring.cpp"

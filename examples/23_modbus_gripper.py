@@ -9,6 +9,7 @@ import heptarm as ha
 
 try:
     from pymodbus.client import ModbusTcpClient
+    from pymodbus.pdu import ModbusPDU
     from pymodbus.server import ModbusTcpServer
     from pymodbus.simulator import DataType, SimData, SimDevice
 except ImportError:
@@ -84,7 +85,7 @@ class ModbusGripper:
     def _write(self, register: int, value: int) -> None:
         self._checked(self._client.write_register(register, value))
 
-    def _checked(self, answer):
+    def _checked(self, answer: ModbusPDU) -> ModbusPDU:
         if answer.isError():
             raise ha.ConnectionLost(f"{self._name} answers {answer}", hint="check its registers")
         return answer
@@ -114,9 +115,18 @@ class SimulatedGripper:
             SimDevice(1, simdata=[data], action=self._access), address=("127.0.0.1", 0)
         )
         await self._server.listen()
-        return self._server.transport.sockets[0].getsockname()[1]
+        assert isinstance(self._server.transport, asyncio.Server)
+        return int(self._server.transport.sockets[0].getsockname()[1])
 
-    async def _access(self, function, start, address, count, registers, written) -> None:
+    async def _access(
+        self,
+        function: int,
+        start: int,
+        address: int,
+        count: int,
+        registers: list[int],
+        written: list[int] | list[bool] | None,
+    ) -> None:
         """Called by the server with every request, before it is answered."""
         now = time.monotonic()
         step, self._seen = self.SPEED * (now - self._seen), now

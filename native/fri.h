@@ -111,7 +111,7 @@ struct joint_guard {
     struct limit_report report;
     double period, coast; /* command period [s]; steps that the cabinet may go on without a command */
     double q[AXES], v[AXES], a[AXES], r[AXES], tau[AXES], wrench[6]; /* sent last; its differences; last target */
-    double tau_sent[AXES]; /* of `tau` what the guard of the motion lets through */
+    double tau_sent[AXES], wrench_sent[6]; /* of `tau` and `wrench` what the guard of the motion lets through */
     double low[AXES], high[AXES], top_v[AXES], top_a[AXES], top_j[AXES], near[AXES];
     int is_started, was_limited;
 };
@@ -121,7 +121,7 @@ void joint_guard_position(struct joint_guard *g, const double *target, const dou
 struct torque_guard;
 void joint_guard_torque(struct joint_guard *g, const double *target, struct torque_guard *motion, const double *q, const double *dq, int is_braking);
 void fri_start_torque_guard(struct torque_guard *guard);
-void joint_guard_force(struct joint_guard *g, const double *target);
+void joint_guard_force(struct joint_guard *g, const double *target, struct torque_guard *motion, const double *q, const double *dq, int is_braking);
 int joint_guard_is_still(const struct joint_guard *g);
 
 struct pose_guard {

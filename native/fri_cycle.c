@@ -2,7 +2,9 @@
 
    Theory of operation. One process per client, one thread in it, runs the cycle for every datagram; there are no locks. The
    user's process reads and writes the shared memory only: rings and notes whose sequence words a reader checks before and after
-   it copies (odd: being written). Who calls what, in this order:
+   it copies (odd: being written). So nothing that the user's program does can delay an answer, which has to be back within a
+   part of the cabinet's cycle. Python starts this process, and is called only for a law in Python and to collect garbage while
+   nothing arrives (fri_loop.c). Who calls what, in this order:
 
      fri_turn      one datagram: the session takes it (fri_session.c); then velocity, wrench, collision; then `follow` updates the
                    guards for the state of the session; then the answer, unless a law in Python has to be called first
@@ -20,6 +22,14 @@
 
    Lost messages are no lost time: the cabinet goes on meanwhile. After a short gap the skipped cycles are done evenly towards the
    target; after a long one the guard restarts from an estimate of the setpoint (fri_guard.c).
+
+   Where a command comes from, the first that there is: a law; what the user's process wrote last, if it is of this `epoch` and
+   young enough; otherwise the policy for missing commands (hold, or go on and brake). Each passes the same guard, which alone
+   decides what is sent: it limits, and never refuses, since an answer is due in any case. What it limited is counted, and
+   reported where a user sees it.
+
+   Everything that a datagram changes is changed before its answer, and published after it was sent: an answer waits for no
+   bookkeeping, and a reader sees a cycle either whole or not at all.
 
    `is_ending` ends all commands: a law that failed, a collision or the end of the client. Each cycle then brakes within the
    guard's limits, whatever else is commanded, and then holds the arm until the process ends.
@@ -369,7 +379,7 @@ static void fill_state(struct fri_loop *l, word *slot, word latency) {
     numbers[S_E1] = has_pose ? m->e1 : NAN;
     put(numbers + S_Q_SENT, l->guard.q, AXES, l->sent_mode != ABSENT && !posed);
     put(numbers + S_TAU_SENT, l->guard.tau_sent, AXES, l->sent_mode == TORQUE);
-    put(numbers + S_WRENCH_SENT, l->guard.wrench, 6, l->sent_mode == WRENCH);
+    put(numbers + S_WRENCH_SENT, l->guard.wrench_sent, 6, l->sent_mode == WRENCH);
     put(numbers + S_POSE_IPO, l->ipo_pose.values, AXES, active && l->has_pose);
     put(numbers + S_POSE_SENT, l->pose_sent, AXES, posed);
     numbers[S_E1_IPO] = active ? l->pose_ipo_e1 : NAN;
@@ -483,16 +493,15 @@ static int command_joints(struct fri_loop *l, const double *target, const double
         is_limited |= g->was_limited;
     }
     joint_guard_position(g, target, reach);
-    if (mode == TORQUE) {
-        double unknown[AXES];
-        for (int i = 0; i < AXES; i++) unknown[i] = NAN;
-        joint_guard_torque(g, tau, (struct torque_guard *)l->seam->torque_guard, knows(l, S_Q) ? joints(l, S_Q) : unknown, l->dq, !target);
-    }
-    if (mode == WRENCH) joint_guard_force(g, wrench);
+    struct torque_guard *motion = (struct torque_guard *)l->seam->torque_guard;
+    static const double unknown[AXES] = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    const double *here = knows(l, S_Q) ? joints(l, S_Q) : unknown;
+    if (mode == TORQUE) joint_guard_torque(g, tau, motion, here, l->dq, !target);
+    if (mode == WRENCH) joint_guard_force(g, wrench, motion, here, l->dq, !target);
     g->was_limited |= is_limited;
     l->sent_mode = mode;
     count_setpoint(l, g->was_limited);
-    struct answer a = {.q = g->q, .tau = mode == TORQUE ? g->tau_sent : NULL, .wrench = mode == WRENCH ? g->wrench : NULL, .strategy = ABSENT};
+    struct answer a = {.q = g->q, .tau = mode == TORQUE ? g->tau_sent : NULL, .wrench = mode == WRENCH ? g->wrench_sent : NULL, .strategy = ABSENT};
     return write_answer(l, &a);
 }
 

@@ -181,18 +181,22 @@ static void slew(struct joint_guard *g, double *last, const double *target, cons
     }
 }
 
-/* Limit magnitude and rate of torques [Nm], then the motion to which they lead (torque_guard.h); the result is in `tau_sent`. Call
-   it after the position; q and dq are measured. */
-void joint_guard_torque(struct joint_guard *g, const double *target, struct torque_guard *motion, const double *q, const double *dq, int is_braking) {
+/* Report what the guard of the motion has limited. */
+static void limited_by_motion(struct joint_guard *g, const struct torque_guard *motion, int found) {
     static const struct {
         int bit, kind;
     } parts[] = {{GUARD_SPEED_BIT, LIMITED_VELOCITY}, {GUARD_POSITION_BIT, LIMITED_POSITION}, {GUARD_TORQUE_BIT, LIMITED_TORQUE}};
-    slew(g, g->tau, target, g->limits.tau_max, g->limits.dtau_max, AXES, LIMITED_TORQUE);
-    memcpy(g->tau_sent, g->tau, sizeof g->tau_sent);
-    int found = guard_torques(motion, q, dq, g->period, is_braking, g->tau_sent);
     for (int part = 0; part < 3 && found; part++)
         for (int i = 0; i < AXES; i++)
             if (found >> (parts[part].bit + i) & 1) limited(g, parts[part].kind, i, motion->asked[i], motion->allowed[i]);
+}
+
+/* Limit magnitude and rate of torques [Nm], then the motion to which they lead (torque_guard.h); the result is in `tau_sent`. Call
+   it after the position; q and dq are measured. */
+void joint_guard_torque(struct joint_guard *g, const double *target, struct torque_guard *motion, const double *q, const double *dq, int is_braking) {
+    slew(g, g->tau, target, g->limits.tau_max, g->limits.dtau_max, AXES, LIMITED_TORQUE);
+    memcpy(g->tau_sent, g->tau, sizeof g->tau_sent);
+    limited_by_motion(g, motion, guard_torques(motion, q, dq, g->period, is_braking, g->tau_sent));
 }
 
 void fri_start_torque_guard(struct torque_guard *guard) { start_torque_guard(guard); }
@@ -201,9 +205,16 @@ int fri_guard_torques(struct torque_guard *guard, const double *q, const double 
     return guard_torques(guard, q, dq, dt, is_braking, tau);
 }
 
-/* Limit magnitude and rate of a wrench [N, Nm]; the result is in `wrench`. Call it after the position. */
-void joint_guard_force(struct joint_guard *g, const double *target) {
+int fri_guard_wrench(struct torque_guard *guard, const double *q, const double *dq, double dt, int is_braking, const double *most, double *wrench) {
+    return guard_wrench(guard, q, dq, dt, is_braking, most, wrench);
+}
+
+/* Limit magnitude and rate of a wrench [N, Nm], then the motion to which it leads; the result is in `wrench_sent`. Call it after the
+   position; q and dq are measured. */
+void joint_guard_force(struct joint_guard *g, const double *target, struct torque_guard *motion, const double *q, const double *dq, int is_braking) {
     slew(g, g->wrench, target, g->limits.wrench_max, g->limits.dwrench_max, 6, LIMITED_WRENCH);
+    memcpy(g->wrench_sent, g->wrench, sizeof g->wrench_sent);
+    limited_by_motion(g, motion, guard_wrench(motion, q, dq, g->period, is_braking, g->limits.wrench_max, g->wrench_sent));
 }
 
 /* ------------------------------------------------------------------------------------------------- vectors and poses */

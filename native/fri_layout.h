@@ -147,6 +147,7 @@ enum {
     H_EVENTS = 3,
     H_STOP = 4,
     H_BEAT = 7,
+    H_RELEASE = 9,
     H_MEMORY = 13,
     H_MEMORY_SET = 14,
     H_OVERRUNS = 15,

@@ -132,6 +132,7 @@ static int conclude(struct fri_loop *l, int answer) {
     word now = clock_now(CLOCK_MONOTONIC);
     fri_finish(l, now);
     if (l->seam->law_status != LAW_OK && !l->seam->law_reported) return LAW_FAILED;
+    if (l->header[H_RELEASE]) fri_end(l);
     if ((l->header[H_STOP] || ++l->checked % CHECK_EVERY == 0) && is_over(l, now)) return ENDED;
     return 0;
 }

@@ -1,6 +1,6 @@
-/* The arithmetic of a tick of the plant in C. The Python modules are the reference: heptarm.sim.control.laws,
-   heptarm.sim.plant.plant, heptarm.sim.plant.external_load and heptarm.sim.plant.drive_monitor. This file does the same; sums of
-   products may differ from numpy's in their rounding. The dynamics are MuJoCo's, whose functions are called through pointers.
+/* The arithmetic of a tick of the plant: position control, sensors, supervision of the drives, and the written state.
+   heptarm.sim.plant.plant says when each function is called. The dynamics are MuJoCo's, whose functions are called through
+   pointers.
 
    tick_layout.h is generated from heptarm.sim.plant.native: the constants, and `struct tick`, whose members all have eight
    bytes. */
@@ -13,9 +13,9 @@ static void copy(double *to, const double *from, word count) {
     for (word i = 0; i < count; i++) to[i] = from[i];
 }
 
-/* Row of the inertia matrix of the controller's model times a vector. */
-static double row(const struct tick *t, int index, const double *vector) {
-    const double *at = t->mass + index * t->stride;
+/* Row of an inertia matrix times a vector. */
+static double row(const double *mass, word stride, int index, const double *vector) {
+    const double *at = mass + index * stride;
     double sum = 0.0;
     for (int i = 0; i < AXES; i++) sum += at[i] * vector[i];
     return sum;
@@ -26,44 +26,70 @@ word ht_size(void) { return sizeof(struct tick); }
 /* A clock for MuJoCo's profiler that stands still: to read a real one twenty times takes a twentieth of a tick. */
 double ht_no_clock(void) { return 0.0; }
 
-/* Accelerations that the set-points ask for, and how much faster than the arm they are. */
-static void aim(const struct tick *t, double *slip, double *acceleration) {
-    const double *before = t->points, *now = before + AXES, *after = now + AXES;
+/* What `gains` of position control contains: the stiffness of the axes, and then these. */
+enum { MASS_DAMPING = AXES, STIFFNESS_DAMPING };
+
+/* Accelerations that the set-points of three ticks ask for, and how much faster than the arm they are. */
+static void aim(const double *gains, const double *points, const double *dq, double *slip, double *acceleration) {
+    const double *before = points, *now = before + AXES, *after = now + AXES;
     for (int i = 0; i < AXES; i++) {
-        slip[i] = (after[i] - before[i]) * 500.0 - t->dq[i];
-        acceleration[i] = (after[i] - 2.0 * now[i] + before[i]) * 1e6 + t->mass_damping * slip[i];
+        slip[i] = (after[i] - before[i]) * 500.0 - dq[i];
+        acceleration[i] = (after[i] - 2.0 * now[i] + before[i]) * 1e6 + gains[MASS_DAMPING] * slip[i];
     }
 }
 
-/* Torques of the motors, to the actuators; inertial: inertia matrix times the accelerations. */
-static void drive(struct tick *t, const double *slip, const double *inertial) {
-    const double *now = t->points + AXES;
+/* Torques of position control; they arrive as the inertia matrix times the accelerations of `aim`. */
+static void feed_back(const double *gains, const double *points, const double *q, const double *bias, const double *passive,
+                      const double *slip, double *torque) {
+    const double *now = points + AXES;
     for (int i = 0; i < AXES; i++) {
-        double torque = inertial[i] + t->bias[i] - t->passive[i];
-        torque += t->stiffness[i] * (now[i] - t->q[i] + t->stiffness_damping * slip[i]);
+        double spring = now[i] - q[i] + gains[STIFFNESS_DAMPING] * slip[i];
+        torque[i] = torque[i] + bias[i] - passive[i] + gains[i] * spring;
+    }
+}
+
+/* Position control without a preload; heptarm.sim.control_laws.laws.PositionLaw explains it and has the gains. */
+static void position(const double *gains, const double *points, const double *q, const double *dq, const double *mass, word stride,
+                     const double *bias, const double *passive, double *torque) {
+    double slip[AXES], acceleration[AXES];
+    aim(gains, points, dq, slip, acceleration);
+    for (int i = 0; i < AXES; i++) torque[i] = row(mass, stride, i, acceleration);
+    feed_back(gains, points, q, bias, passive, slip, torque);
+}
+
+/* The same for one that has its numbers in Python: set-points of three ticks, q, dq, bias and passive, and then the torques. */
+void ht_position(const double *gains, double *given, const double *mass, word stride) {
+    const double *q = given + 3 * AXES, *dq = q + AXES, *bias = dq + AXES, *passive = bias + AXES;
+    position(gains, given, q, dq, mass, stride, bias, passive, given + 7 * AXES);
+}
+
+/* The motors exert `torque`, as far as they can. */
+void ht_drive(struct tick *t) {
+    for (int i = 0; i < AXES; i++) {
+        double torque = t->torque[i];
         if (torque > t->most[i]) torque = t->most[i];
         if (torque < -t->most[i]) torque = -t->most[i];
         t->torque[i] = t->tau_cmd[i] = t->actuators[i] = torque;
     }
 }
 
-/* Position control: `PositionLaw.torque` without preload. */
+/* Position control of a tick. */
 void ht_command(struct tick *t) {
-    double slip[AXES], acceleration[AXES], inertial[AXES];
-    aim(t, slip, acceleration);
-    for (int i = 0; i < AXES; i++) inertial[i] = row(t, i, acceleration);
-    drive(t, slip, inertial);
+    position(t->gains, t->points, t->q, t->dq, t->mass, t->stride, t->bias, t->passive, t->torque);
+    ht_drive(t);
 }
 
 /* What the torque sensors show and what acts from outside, after the dynamics. Returns LOADED if there is such a load. */
 word ht_sense(struct tick *t) {
+    /* forces on bodies and unknown payloads appear in no vector of MuJoCo, only in the residual of the controller's model */
     word explained = !t->is_misjudged, found = 0;
     for (word i = 0; explained && i < t->pulls; i++) explained = t->pulled[i] == 0.0;
     for (int i = 0; i < AXES; i++) {
         double acceleration = t->acceleration[i], passive = t->passive[i];
+        /* the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction */
         t->tau[i] = t->torque[i] - t->armature[i] * acceleration + passive;
         double load = explained ? t->applied[i] + t->constraint[i]
-                                : row(t, i, t->acceleration) + t->bias[i] - passive - t->torque[i];
+                                : row(t->mass, t->stride, i, t->acceleration) + t->bias[i] - passive - t->torque[i];
         t->load[i] = load;
         if (load != 0.0) found = LOADED;
     }
@@ -120,7 +146,7 @@ void ht_write(struct tick *t, word tick, double progress, double remaining) {
     words[TURN] = turns;
 }
 
-/* A tick in position control of an arm that nothing pushes, whose load data are true: `Plant.compute` after its set-point.
+/* A tick in position control of an arm that nothing pushes, whose load data are true: `Plant._compute` after its set-point.
    Returns DONE, or what is left: ELSEWHERE: all of it; LOADED: from the wrench on; STRAINED: from the supervision of the
    drives on. */
 word ht_tick(struct tick *t, word tick, double progress, double remaining) {
@@ -128,9 +154,11 @@ word ht_tick(struct tick *t, word tick, double progress, double remaining) {
     for (word i = 0; i < t->pulls; i++)
         if (t->pulled[i] != 0.0) return ELSEWHERE;
     t->step1(t->model, t->data);
-    aim(t, slip, t->vector);
-    t->multiply(t->model, t->data, t->product, t->vector);
-    drive(t, slip, t->product);
+    aim(t->gains, t->points, t->dq, slip, t->vector);
+    t->multiply(t->model, t->data, t->product, t->vector); /* without forming the matrix, which is slower */
+    copy(t->torque, t->product, AXES);
+    feed_back(t->gains, t->points, t->q, t->bias, t->passive, slip, t->torque);
+    ht_drive(t);
     t->step2(t->model, t->data);
     if (ht_sense(t)) return LOADED;
     for (int i = 0; i < 6; i++) t->wrench[i] = 0.0;

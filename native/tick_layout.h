@@ -53,6 +53,7 @@ struct tick {
     double *armature;
     double *ranges;
     double *shown;
+    double *gains;
     double *torque;
     double *tau_cmd;
     double *tau;
@@ -66,8 +67,6 @@ struct tick {
     word order;
     word left;
     word is_awaited;
-    double mass_damping;
-    double stiffness_damping;
     const struct table *table;
     struct cursor cursor;
     double *leap;
@@ -75,7 +74,6 @@ struct tick {
     double part_begin;
     double part_end;
     double mark;
-    double stiffness[7];
     double most[7];
     double points[21];
     void *arm;

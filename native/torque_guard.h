@@ -43,6 +43,11 @@ struct torque_guard {
 /* An unknown acceleration that holds an axis back may end at any moment: so much of the largest speed may come of it. */
 #define RELEASED 0.08
 
+/* While the arm brakes: time constant with which a motion decays [s], and fraction of the largest speed with which a spring that the
+   torques have wound may unwind: without them it would throw the arm. */
+#define UNWINDING_TIME 0.1
+#define UNWINDING_SPEED 0.3
+
 /* What was limited, by axis: bit i for the speed, bit 8 + i for the position, bit 16 + i for the torque. */
 enum { GUARD_SPEED_BIT = 0, GUARD_POSITION_BIT = 8, GUARD_TORQUE_BIT = 16 };
 
@@ -90,13 +95,21 @@ static inline void start_torque_guard(struct torque_guard *g) {
     for (int i = 0; i < N; i++) g->sent[i] = g->earlier[i] = g->oldest[i] = g->unknown[i] = g->before[i] = 0.0;
 }
 
+/* Fraction of the largest speed, distance from a position limit [rad], and fraction of the planned deceleration with which the arm is
+   guarded. A wrench cannot brake every axis by itself, so it keeps more. */
+struct reserve {
+    double speed, distance, deceleration;
+};
+static const struct reserve of_torques = {GUARDED_SPEED, GUARDED_DISTANCE, 1.0}, of_wrench = {0.5, 0.03, 0.4};
+
 /* Limit torques.
 
    q, dq: measured positions and their difference to the previous message by the period.
-   dt: command period. is_braking: bring the arm to rest, whatever the torques are.
+   dt: command period. is_braking: bring the arm to rest where its spring is not wound, whatever the torques are.
    tau: target torques [Nm], finite; replaced by those to send.
    Returns the bits of what was limited; g->asked and g->allowed have the values of these axes. */
-static inline int guard_torques(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, double *tau) {
+static inline int guard_motion(struct torque_guard *g, const struct reserve *kept, const double *q, const double *dq, double dt, int is_braking,
+                               double *tau) {
     struct posture posture;
     double mass[N][N], factor[N * N], deceleration[N], a[N], low[N], high[N], change[N], rest[N], v[N], there[N], least[N], most[N];
     int found = 0, by_position, is_high_by_position[N], is_low_by_position[N];
@@ -115,6 +128,7 @@ static inline int guard_torques(struct torque_guard *g, const double *q, const d
         return 0;
     }
     torques_left(g, &posture, dq, mass, least, most, deceleration);
+    for (int i = 0; i < N; i++) deceleration[i] *= kept->deceleration;
     for (int i = 0; i < N; i++) {
         if (g->is_started != 0.0) {
             double unexplained = (dq[i] - g->before[i]) / dt - 0.5 * (g->earlier[i] + g->oldest[i]);
@@ -125,21 +139,21 @@ static inline int guard_torques(struct torque_guard *g, const double *q, const d
     }
     solve(factor, N, a);
     for (int i = 0; i < N; i++) {
-        double full = GUARDED_SPEED * g->dq_max[i], release = RELEASED * g->dq_max[i] / (UNKNOWN_TIME + dt);
+        double full = kept->speed * g->dq_max[i], release = RELEASED * g->dq_max[i] / (UNKNOWN_TIME + dt);
         double above = fmax(g->unknown[i], -release), below = fmin(g->unknown[i], release);
         /* when the answer acts */
         double now = dq[i] + 0.5 * dt * (g->earlier[i] + g->unknown[i]);
         v[i] = now + dt * (g->sent[i] + g->unknown[i]);
         there[i] = q[i] + 0.5 * dt * (now + v[i]);
-        g->cap[i] = is_braking ? fmax(0.0, fmin(g->cap[i], fabs(v[i])) - deceleration[i] * dt) : full;
-        double top = fmin(full, g->cap[i]), gap = GUARDED_DISTANCE + dt * fabs(v[i]);
+        g->cap[i] = is_braking ? fmax(UNWINDING_SPEED * g->dq_max[i], fmin(g->cap[i], fabs(v[i])) - deceleration[i] * dt) : full;
+        if (is_braking) a[i] = -v[i] / UNWINDING_TIME;
+        double top = fmin(full, g->cap[i]), gap = kept->distance + dt * fabs(v[i]);
         high[i] = highest_acceleration(g->high[i] - gap - there[i], v[i], top, deceleration[i], time, &by_position) - above;
         is_high_by_position[i] = by_position;
         low[i] = -highest_acceleration(there[i] - gap - g->low[i], -v[i], top, deceleration[i], time, &by_position) - below;
         is_low_by_position[i] = by_position;
         if (low[i] > high[i]) low[i] = high[i] = 0.5 * (low[i] + high[i]);
-        double kept = guard_clamp(a[i], low[i], high[i]);
-        change[i] = kept - a[i];
+        change[i] = guard_clamp(a[i], low[i], high[i]) - a[i];
         rest[i] = guard_clamp(0.0, low[i], high[i]);
         if (change[i] != 0.0 && !is_braking) {
             int is_high = change[i] < 0.0, is_position = is_high ? is_high_by_position[i] : is_low_by_position[i];
@@ -149,6 +163,7 @@ static inline int guard_torques(struct torque_guard *g, const double *q, const d
             g->allowed[i] = is_position ? (is_high ? g->high[i] : g->low[i]) : (is_high ? full : -full);
         }
     }
+    for (int i = 0; i < N && is_braking; i++) tau[i] = dot(mass[i], a, N);
     double braking[N], fraction = 1.0, strength = 1.0;
     for (int i = 0; i < N; i++) {
         braking[i] = dot(mass[i], rest, N);
@@ -172,6 +187,81 @@ static inline int guard_torques(struct torque_guard *g, const double *q, const d
         g->sent[i] = a[i];
     }
     g->is_started = 1.0;
+    return found;
+}
+
+static inline int guard_torques(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, double *tau) {
+    return guard_motion(g, &of_torques, q, dq, dt, is_braking, tau);
+}
+
+/* Weight of a small correction against an exact one, relative to the mean effect of a wrench. */
+#define WRENCH_DAMPING 2e-4
+/* Weight of the axes that the guard leaves as they are, relative to those that it has to change. */
+#define WRENCH_OTHERS 0.5
+
+/* Fraction of the largest speed above its bound over which a damper takes over, and that damper [N s/m], [N m s/rad]. */
+#define DAMPED_SPEED 0.1
+#define DAMPER_ALONG 150.0
+#define DAMPER_ABOUT 5.0
+
+/* Limit a wrench on the flange [N, Nm], base axes, by the motion to which its torques lead; arguments and result as above.
+
+   A wrench has one direction less than the arm has joints. What the guard changes is made by the wrench whose accelerations come
+   nearest to those allowed, relative to the speed of each axis; the cabinet's spring holds the rest.
+   most: largest components of the wrench. */
+static inline int guard_wrench(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, const double *most,
+                               double *wrench) {
+    struct posture posture;
+    double mass[N][N], factor[N * N], j[6][N], asked[N], tau[N], change[N], effect[6][N], weight[N], square[36], correction[6], mean = 0.0;
+    find_posture(&g->robot, q, &posture);
+    jacobian(posture.axis, posture.origin, posture.place, j);
+    for (int i = 0; i < N; i++) {
+        asked[i] = 0.0;
+        for (int r = 0; r < 6; r++) asked[i] += j[r][i] * wrench[r];
+        tau[i] = asked[i];
+    }
+    int found = guard_motion(g, &of_wrench, q, dq, dt, is_braking, tau);
+    if (g->is_started == 0.0) { /* without a position there is no safe wrench */
+        for (int r = 0; r < 6; r++) wrench[r] = 0.0;
+        return 0;
+    }
+    if (memcmp(asked, tau, sizeof tau) == 0) return found;
+    moved_mass(&g->robot, &posture, mass);
+    memcpy(factor, mass, sizeof factor);
+    if (!factorise(factor, N)) return 0; /* the torques are zero then, and so is the memory of them */
+    for (int i = 0; i < N; i++) change[i] = tau[i] - asked[i];
+    solve(factor, N, change);
+    for (int i = 0; i < N; i++) {
+        weight[i] = (fabs(change[i]) > 1e-9 ? 1.0 : WRENCH_OTHERS) / g->dq_max[i];
+        change[i] *= weight[i];
+    }
+    for (int r = 0; r < 6; r++) {
+        memcpy(effect[r], j[r], sizeof effect[r]);
+        solve(factor, N, effect[r]);
+        for (int i = 0; i < N; i++) effect[r][i] *= weight[i];
+        mean += dot(effect[r], effect[r], N) / 6.0;
+    }
+    for (int r = 0; r < 6; r++) {
+        for (int c = 0; c < 6; c++) square[6 * r + c] = dot(effect[r], effect[c], N) + (r == c ? WRENCH_DAMPING * mean : 0.0);
+        correction[r] = dot(effect[r], change, N);
+    }
+    if (!factorise(square, 6)) {
+        for (int r = 0; r < 6; r++) correction[r] = -wrench[r];
+    } else {
+        solve(square, 6, correction);
+    }
+    /* where that does not bound an axis, the wrench of a damper takes over: it never adds energy */
+    double excess = 0.0;
+    for (int i = 0; i < N; i++) excess = fmax(excess, (fabs(dq[i]) / g->dq_max[i] - of_wrench.speed) / DAMPED_SPEED);
+    excess = fmin(excess, 1.0);
+    for (int r = 0; r < 6; r++) {
+        double damper = -(r < 3 ? DAMPER_ALONG : DAMPER_ABOUT) * dot(j[r], dq, N);
+        wrench[r] = guard_clamp((1.0 - excess) * (wrench[r] + correction[r]) + excess * damper, -most[r], most[r]);
+    }
+    for (int i = 0; i < N; i++) {
+        g->sent[i] = 0.0;
+        for (int r = 0; r < 6; r++) g->sent[i] += effect[r][i] / weight[i] * wrench[r];
+    }
     return found;
 }
 

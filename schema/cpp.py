@@ -192,11 +192,12 @@ def _note(one: Field) -> str:
 def _body(spec: Spec, fields: list[Field]) -> list[str]:
     """Members of a class and the function that visits them in their order."""
     lines = [
-        f"    {_type(spec, one.type)} {_name(one.name)}{_initial(spec, one)};{_note(one)}" for one in fields
+        f"    {_type(spec, field.type)} {_name(field.name)}{_initial(spec, field)};{_note(field)}"
+        for field in fields
     ]
     lines += ["" for _ in fields[:1]]
     args = "Self& self, Visit& visit" if fields else "Self&, Visit&"
-    visits = [f'        visit(self.{_name(one.name)}, "{one.name}"{_limits(one)});' for one in fields]
+    visits = [f'        visit(self.{_name(field.name)}, "{field.name}"{_limits(field)});' for field in fields]
     return [
         *lines,
         "    template <class Self, class Visit>",

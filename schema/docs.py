@@ -12,12 +12,12 @@ def _table(fields: list[Field]) -> list[str]:
     if not fields:
         return ["No fields.", ""]
     lines = ["| field | type | unit | range | meaning |", "|---|---|---|---|---|"]
-    for one in fields:
-        note = one.doc + ("; NaN keeps the default" if one.nan and "NaN" not in one.doc else "")
-        if one.has_default:
-            note += f"; default {one.default}"
+    for field in fields:
+        note = field.doc + ("; NaN keeps the default" if field.nan and "NaN" not in field.doc else "")
+        if field.has_default:
+            note += f"; default {field.default}"
         lines.append(
-            f"| `{one.name}` | `{one.type.text}` | {one.unit} | {one.range_text} | {note.lstrip('; ')} |"
+            f"| `{field.name}` | `{field.type.text}` | {field.unit} | {field.range_text} | {note.lstrip('; ')} |"
         )
     return [*lines, ""]
 

@@ -162,29 +162,29 @@ class Writer:
 def _class(spec: Spec, name: str, doc: str, fields: list[Field], head: str, extra: list[str]) -> str:
     writer = Writer(spec)
     lines = [BANNER, f"/** {doc} */", f"public final class {name}{head} {{"]
-    for one in fields:
-        note = " ".join(part for part in (one.doc, f"[{one.unit}]" if one.unit else "") if part)
+    for field in fields:
+        note = " ".join(part for part in (field.doc, f"[{field.unit}]" if field.unit else "") if part)
         lines += ([f"    /** {note} */"] if note else []) + [
-            f"    public final {java_type(one.type)} {one.name};"
+            f"    public final {java_type(field.type)} {field.name};"
         ]
-    args = ", ".join(f"{java_type(one.type)} {one.name}" for one in fields)
+    args = ", ".join(f"{java_type(field.type)} {field.name}" for field in fields)
     lines += [
         "",
         f"    public {name}({args}) {{",
-        *[f"        this.{one.name} = {one.name};" for one in fields],
+        *[f"        this.{field.name} = {field.name};" for field in fields],
         "    }",
         "",
     ]
     lines += [*extra, "    public void write(Encoder out) {"]
-    for one in fields:
-        lines += writer.write(one.type, one.name, "        ")
+    for field in fields:
+        lines += writer.write(field.type, field.name, "        ")
     lines += ["    }", "", f"    public static {name} read(Decoder in) throws WireException {{"]
-    for one in fields:
-        lines += writer.read(one)
-    lines += [f"        return new {name}({', '.join(one.name for one in fields)});", "    }", ""]
+    for field in fields:
+        lines += writer.read(field)
+    lines += [f"        return new {name}({', '.join(field.name for field in fields)});", "    }", ""]
     lines += ["    public void validate(String path) throws Violation {"]
-    for one in fields:
-        lines += writer.check(one)
+    for field in fields:
+        lines += writer.check(field)
     return "\n".join([*lines, "    }", "}", ""])
 
 
@@ -220,8 +220,8 @@ def _enum(enum: Enum) -> str:
 
 def _common(spec: Spec, union: Union) -> dict[str, Field]:
     """The common fields of a union, as one of its members has them."""
-    fields = [one for _, member in union.members for one in spec.structs[member].fields]
-    return {name: next(one for one in fields if one.name == name) for name in union.common}
+    fields = [field for _, member in union.members for field in spec.structs[member].fields]
+    return {name: next(field for field in fields if field.name == name) for name in union.common}
 
 
 def _union(spec: Spec, union: Union) -> str:
@@ -327,10 +327,10 @@ def files(spec: Spec) -> dict[str, str]:
             parent, tag = above[struct.name]
             head = f" extends {parent}"
             extra = ["    public int tag() {", f"        return {tag};", "    }", ""]
-            for one in struct.fields:
-                if one.name in spec.unions[parent].common:
-                    extra += ["    @Override", f"    public {java_type(one.type)} {one.name}() {{"]
-                    extra += [f"        return {one.name};", "    }", ""]
+            for field in struct.fields:
+                if field.name in spec.unions[parent].common:
+                    extra += ["    @Override", f"    public {java_type(field.type)} {field.name}() {{"]
+                    extra += [f"        return {field.name};", "    }", ""]
         out[f"{struct.name}.java"] = _class(spec, struct.name, struct.doc, struct.fields, head, extra)
     for message in spec.messages.values():
         if message.groups:

@@ -128,7 +128,9 @@ One handshake with its first two frames, as hexadecimal bytes; an implementation
 def _datagrams(spec: Spec) -> list[str]:
     """The section of the protocol page about datagrams."""
     p = spec.protocol
-    names = ", ".join(f"[{one.name}](#{one.name.lower()})" for one in spec.messages.values() if one.datagram)
+    names = ", ".join(
+        f"[{message.name}](#{message.name.lower()})" for message in spec.messages.values() if message.datagram
+    )
     return f"""## Datagrams
 
 TCP delivers everything in order, so one lost packet delays all that follow by its retransmission: on a network that loses

@@ -36,8 +36,8 @@ def header() -> str:
     layout = vars(memory)
     lines = [BANNER]
     outcomes = ("TIMEOUT", "ENDED", "SOCKET_ERROR", "CALL_LAW", "LAW_FAILED")
-    lines += _enum("what a turn returns instead of a size", _named(native, "LAW"))
-    lines += _enum("what a run returns", _named(native, *outcomes))
+    lines += _enum("what a turn returns instead of a size", _constants(native, "LAW"))
+    lines += _enum("what a run returns", _constants(native, *outcomes))
     for doc, kind, prefix in (
         ("how a call of a compiled law ended", native.LawStatus, "LAW_"),
         ("states of a session", messages.SessionState, ""),
@@ -60,27 +60,27 @@ def header() -> str:
     }
     lines += _enum("a safety state, a control mode, a redundancy strategy, no value", alone)
     flags = ("ANSWERED", "FILLED", "LIMITED", "BRAKING", "ESTIMATED")
-    lines += _enum("flags of a turn", _named(memory, *flags))
-    words = """STATES COMMANDS PARAMS EVENTS STOP BEAT MEMORY MEMORY_SET OVERRUNS COUNTS LIMITED_COUNTS LIMITED_WORST
+    lines += _enum("flags of a turn", _constants(memory, *flags))
+    words = """STATES COMMANDS PARAMS EVENTS STOP BEAT RELEASE MEMORY MEMORY_SET OVERRUNS COUNTS LIMITED_COUNTS LIMITED_WORST
         LIMITED_ALLOWED EPOCH STALE LATENCY JITTER POSE_COUNTS POSE_WORST POSE_ALLOWED COLLIDED COLLISION_TORQUE
         COLLISION_ALLOWED"""
     lines += _enum("words of the shared header", {f"H_{name}": layout[name] for name in words.split()})
     counts = {f"COUNT_{name.upper()}": i for i, name in enumerate(statistics.COUNTERS)}
     lines += _enum("counters from H_COUNTS on", counts)
     arrays = {f"S_{name.upper()}": place.start for name, place in memory.ARRAYS.items()}
-    lines += _enum("words of a state", _prefixed(layout, "S_") | arrays | _named(memory, "STATE_WORDS"))
+    lines += _enum("words of a state", _prefixed(layout, "S_") | arrays | _constants(memory, "STATE_WORDS"))
     places = (f'{{{tag}, S_{name.upper()}, "{text}"}}' for name, (tag, text) in messages.MONITORED.items())
     lines += ["/* joint arrays of a message: number of the field, place in a state, what it is */"]
     lines += [f"#define MONITORED {{{', '.join(places)}}}", ""]
-    command = _prefixed(layout, "C_") | _named(memory, "COMMAND_WORDS", "COMMAND_SLOTS")
+    command = _prefixed(layout, "C_") | _constants(memory, "COMMAND_WORDS", "COMMAND_SLOTS")
     lines += _enum("words of a command", command)
     lines += _enum("parts that a command has", _prefixed(layout, "GIVEN_"))
-    sizes = {"AXES": joint_guard.AXES} | _named(messages, "MAX_NAME", "MAX_IO", "MAX_TRANSFORMATIONS")
-    sizes |= _named(
+    sizes = {"AXES": joint_guard.AXES} | _constants(messages, "MAX_NAME", "MAX_IO", "MAX_TRANSFORMATIONS")
+    sizes |= _constants(
         memory, "PARAM_SLOTS", "MEMORY_SLOTS", "EVENT_WORDS", "EVENT_SLOTS", "EVENT_TEXT", "NOTE_WORDS"
     )
-    sizes |= _named(memory, "NAME_BYTES", "NAME_WORDS")
-    lines += _enum("sizes", sizes | _named(version, "MAX_DATAGRAM") | _named(statistics, "BINS"))
+    sizes |= _constants(memory, "NAME_BYTES", "NAME_WORDS")
+    lines += _enum("sizes", sizes | _constants(version, "MAX_DATAGRAM") | _constants(statistics, "BINS"))
     for module, names in (
         (version, ("MONITORING_ID", "COMMAND_ID")),
         (joint_guard, ("PLANNED", "ON_TRACK")),
@@ -235,7 +235,7 @@ def _structure(name: str, members: Iterable[tuple[str, tuple[int, ...], str, str
     return "\n".join([f"struct {name} {{", *lines, "};"])
 
 
-def _named(module: object, *names: str) -> dict[str, int]:
+def _constants(module: object, *names: str) -> dict[str, int]:
     return {name: getattr(module, name) for name in names}
 
 

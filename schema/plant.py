@@ -49,7 +49,7 @@ class Section:
 
     @property
     def size(self) -> int:
-        return sum(_words(one) for one in self.fields)
+        return sum(_words(field) for field in self.fields)
 
     @property
     def end(self) -> int:
@@ -59,9 +59,9 @@ class Section:
     def offsets(self) -> list[tuple[Field, int]]:
         """Each field and where it starts."""
         found, at = [], 0
-        for one in self.fields:
-            found.append((one, at))
-            at += _words(one)
+        for field in self.fields:
+            found.append((field, at))
+            at += _words(field)
         return found
 
 
@@ -88,7 +88,7 @@ def load(folder: Path = HERE) -> Seam:
     kinds, constants = kinds_of(raw), raw["constants"]
 
     def fields(entries: list[dict[str, Any]]) -> list[Field]:
-        return [parse_field({**one, "type": sized(one["type"])}, kinds) for one in entries]
+        return [parse_field({**entry, "type": sized(entry["type"])}, kinds) for entry in entries]
 
     def sized(text: str) -> str:
         return re.sub(r"\[([A-Z]\w*)\]", lambda found: f"[{constants[found[1]]['value']}]", text)
@@ -184,7 +184,9 @@ def _python_struct(seam: Seam, struct: Struct) -> list[str]:
     ]
     lines += ["", "    @classmethod", f"    def _read(cls, data: bytes, pos: int) -> tuple[{name}, int]:"]
     lines += [f"        {line}" for line in body.read]
-    lines += [f"        return cls({', '.join(f'{one.name}={one.name}' for one in struct.fields)}), pos"]
+    lines += [
+        f"        return cls({', '.join(f'{field.name}={field.name}' for field in struct.fields)}), pos"
+    ]
     if name in seam.roots:
         lines += python.encoding(name)
     return lines + python.setters(name, own)
@@ -304,7 +306,7 @@ public abstract class {union.name} {{
 
 def _java_struct(seam: Seam, struct: Struct, parent: tuple[str, int] | None) -> str:
     name, spec, root = struct.name, seam.spec, seam.roots.get(struct.name)
-    writer, renamed = java.Writer(spec), [replace(one, name=_camel(one.name)) for one in struct.fields]
+    writer, renamed = java.Writer(spec), [replace(field, name=_camel(field.name)) for field in struct.fields]
     uses = ["Decoder", "WireException"] if root == "java" else ["Encoder"]
     lines = [JAVA_BANNER, *(f"import heptarm.wire.{one};" for one in uses), "", f"/** {struct.doc} */"]
     lines += [f"public final class {name}{f' extends {parent[0]}' if parent else ''} {{"]

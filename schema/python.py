@@ -70,16 +70,16 @@ class Body:
         self.check: list[str] = []
         self._numbers = count()
         run: list[Field] = []
-        for one in fields:
-            if one.type.kind in ("prim", "array", "enum", "flags"):
-                run.append(one)
+        for field in fields:
+            if field.type.kind in ("prim", "array", "enum", "flags"):
+                run.append(field)
                 continue
             self._flush(run)
             run = []
-            self._single(one)
+            self._single(field)
         self._flush(run)
-        for one in fields:
-            self._validate(one)
+        for field in fields:
+            self._validate(field)
 
     @property
     def is_run(self) -> bool:
@@ -263,7 +263,7 @@ def _methods(name: str, body: Body, fields: list[Field]) -> list[str]:
     lines += [f"        {line}" for line in body.write] or ["        pass"]
     lines += ["", "    @classmethod", f"    def _read(cls, data: bytes, pos: int) -> tuple[{name}, int]:"]
     lines += [f"        {line}" for line in body.read]
-    lines += [f"        return cls({', '.join(f'{one.name}={one.name}' for one in fields)}), pos"]
+    lines += [f"        return cls({', '.join(f'{field.name}={field.name}' for field in fields)}), pos"]
     return lines + _check(body)
 
 
@@ -282,7 +282,7 @@ def _run_methods(name: str, body: Body, fields: list[Field]) -> list[str]:
         f'            codec.refuse_size(_{name}_0, data, "{name}")',
         f"        v = _{name}_0.unpack(data)",
         *(f"        {line}" for line in body.read[2:]),
-        f"        return cls({', '.join(f'{one.name}={one.name}' for one in fields)})",
+        f"        return cls({', '.join(f'{field.name}={field.name}' for field in fields)})",
         *_check(body),
     ]
 

@@ -78,7 +78,7 @@ class Maker:
         return struct.pack(">" + PRIMITIVES[name], value)
 
     def fields(self, fields: list[Field]) -> bytes:
-        return b"".join(self.value(one.type, one) for one in fields)
+        return b"".join(self.value(field.type, field) for field in fields)
 
 
 def body(spec: Spec, name: str, seed: str, size: int = 3) -> bytes:

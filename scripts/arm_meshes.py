@@ -24,7 +24,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "src")]
 
-from heptarm.values.arrays import Array  # noqa: E402
+from heptarm.values.checks import Array  # noqa: E402
 from heptarm.values.robot import robot  # noqa: E402
 
 SIMULATOR = "src/heptarm/sim/models/meshes"

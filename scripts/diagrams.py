@@ -45,7 +45,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
         ("Your program", "Cabinet application (Java 6)", "Doubles (Java 17)", "Simulator (Python)"),
         (
             Step(0, "Arm.move, Arm.start", f"{PY}/arm/verbs.py", "ProgramTerms"),
-            Step(0, "check and time-limit the program", f"{PY}/arm/motion/program.py", "values"),
+            Step(0, "check and time-limit the program", f"{PY}/arm/motion/program_request.py", "values"),
             Step(0, "values to messages", f"{PY}/arm/translate/motions.py", "wire.Run"),
             Step(0, "frame, send, await the answer", f"{PY}/arm/link/link.py", "TCP"),
             Step(1, "read a frame", f"{CORE}/session/ClientConnection.java", "Run"),
@@ -56,7 +56,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
             Step(3, "Java to Python", f"{PY}/sim/runtime/java_plant.py", "MotionCommand"),
             Step(3, "plan behind the motion before", f"{PY}/planning/planner.py", "Plan"),
             Step(3, "set-point each millisecond", f"{PY}/sim/controller/interpolator.py", "set-points"),
-            Step(3, "torque", f"{PY}/sim/control/controller.py", "torque"),
+            Step(3, "torque", f"{PY}/sim/control_laws/active_law.py", "torque"),
             Step(3, "one step of MuJoCo", f"{PY}/sim/plant/plant.py"),
         ),
     ),
@@ -95,7 +95,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
     "fri": (
         ("Your program", "FRI loop (own process)", "Simulator, or KUKA's controller"),
         (
-            Step(2, "tick, compose a message", f"{PY}/sim/fri/controller.py", "monitoring message"),
+            Step(2, "tick, compose a message", f"{PY}/sim/fri/controller_side.py", "monitoring message"),
             Step(2, "send and receive", f"{PY}/sim/fri/server.py", "UDP"),
             Step(1, "receive a datagram", f"{PY}/fri/loop/process.py", "bytes"),
             Step(1, "decode, session state", f"{PY}/fri/session/session.py", "Sample"),
@@ -103,7 +103,7 @@ DIAGRAMS: dict[str, tuple[tuple[str, ...], tuple[Step, ...]]] = {
             Step(0, "Client.command", f"{PY}/fri/loop/client.py", "shared memory"),
             Step(1, "clamp to the limits", f"{PY}/fri/guard/joint_guard.py", "Setpoint"),
             Step(1, "encode the answer", f"{PY}/fri/session/answers.py", "UDP"),
-            Step(2, "check the command", f"{PY}/sim/fri/controller.py", "Superposition"),
+            Step(2, "check the command", f"{PY}/sim/fri/controller_side.py", "Superposition"),
             Step(2, "overlay on the motion", f"{PY}/sim/fri/sessions.py"),
         ),
     ),

@@ -31,7 +31,7 @@ from heptarm.sim.plant.scene import Scene  # noqa: E402
 from heptarm.sim.plant.shared_state import PositionsFile  # noqa: E402
 from heptarm.sim.plant.world import compiled  # noqa: E402
 from heptarm.skills import insert  # noqa: E402
-from heptarm.values.arrays import Array  # noqa: E402
+from heptarm.values.checks import Array  # noqa: E402
 
 FILM = ROOT / "docs" / "_static" / "film.webp"
 SCENE = "peg-in-hole"

@@ -174,7 +174,7 @@ def main() -> int:
         "--pythons", nargs="*", default=list(VERSIONS), help="versions of Python for the wheel"
     )
     arguments = parser.parse_args()
-    chosen = {one for one in arguments.only.split(",") if one}
+    chosen = {part for part in arguments.only.split(",") if part}
     results: list[Timed] = []
     with tempfile.TemporaryDirectory(prefix="heptarm-first-hour-") as folder:
         for step in Newcomer(Path(folder), tuple(arguments.pythons)).steps():
@@ -186,7 +186,7 @@ def main() -> int:
             if last.failed:
                 print(last.outcome, file=sys.stderr)
                 return 1
-    print(f"{sum(one.seconds for one in results):7.1f} s  in all")
+    print(f"{sum(result.seconds for result in results):7.1f} s  in all")
     return 0
 
 

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "src")]
 
 import heptarm as ha  # noqa: E402
-from heptarm.values.arrays import Array  # noqa: E402
+from heptarm.values.checks import Array  # noqa: E402
 from heptarm.values.motion.motion import Motion  # noqa: E402
 
 FOLDER = ROOT / "docs" / "_static" / "motions"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import FLANGE_RADIUS, FLANGES, ROBOTS, RobotModel
 
 ROOT = Path(__file__).parents[1]

@@ -57,7 +57,7 @@ _MATCHING = "build_type_description_tuples"
 def _described(definitions: Sequence[str], descriptions: Sequence[str]) -> list[str]:
     """Match definitions "folder:msg/Name.idl" with descriptions of the same kind and name."""
     found = {(path.parent.name, path.stem): path for path in map(Path, descriptions)}
-    relative = [Path(one.rpartition(":")[2]) for one in definitions]
+    relative = [Path(definition.rpartition(":")[2]) for definition in definitions]
     return [f"{path}:{found[path.parent.name, path.stem]}" for path in relative]
 
 

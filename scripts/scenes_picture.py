@@ -21,7 +21,7 @@ from heptarm.sim.plant.appearance import ArmMeshes  # noqa: E402
 from heptarm.sim.plant.plant import Plant  # noqa: E402
 from heptarm.sim.plant.scene import Scene  # noqa: E402
 from heptarm.sim.plant.world import compiled  # noqa: E402
-from heptarm.values.arrays import Array  # noqa: E402
+from heptarm.values.checks import Array  # noqa: E402
 from heptarm.values.pose import deg  # noqa: E402
 
 PICTURE = ROOT / "docs" / "_static" / "scenes.png"

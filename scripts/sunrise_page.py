@@ -19,7 +19,7 @@ HEAD = """# Sunrise in the virtual cabinet
 
 <!-- made by scripts/sunrise_page.py from tests/doubles/surface.toml; change that list -->
 
-`heptarm sim --app` offers these classes of Sunrise.OS 1.11 to 1.17: {classes} classes with {members} members. They
+`heptarm sim app` offers these classes of Sunrise.OS 1.11 to 1.17: {classes} classes with {members} members. They
 are doubles, written for the simulation after the calls in public applications; they contain no code of KUKA's. Names
 and signatures are those that applications use; guesses are marked. The doubles act on the virtual arm, in simulated
 time.

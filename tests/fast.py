@@ -33,9 +33,9 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
     if event == "subprocess.Popen":
         command = arguments[1]
         words = command if isinstance(command, str) else " ".join(map(str, command))
-        for one in PROGRAMS:
-            if one in words:
-                pytest.skip(f"starts {one}", allow_module_level=True)
+        for program in PROGRAMS:
+            if program in words:
+                pytest.skip(f"starts {program}", allow_module_level=True)
 
 
 def pytest_configure(config: pytest.Config) -> None:

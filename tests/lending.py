@@ -48,7 +48,7 @@ def borrow(address: str) -> None:
                 return lent
         return start(target, key=key, timeout=timeout)
 
-    PrivateCabinet.start = take  # type: ignore[method-assign,assignment]
+    PrivateCabinet.start = take  # type: ignore[method-assign]
 
 
 class Borrowed(PrivateCabinet):

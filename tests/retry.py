@@ -75,13 +75,19 @@ def answers_late(outcome: object) -> str:
     hint = str(getattr(outcome, "hint", ""))  # of an error of heptarm
     failed = not isinstance(outcome, subprocess.CompletedProcess) or outcome.returncode != 0
     words = f"{type(outcome).__name__} {said} {hint}"
-    return "FRI answers came late" if failed and any(one in words for one in _LATE_ANSWERS) else ""
+    return (
+        "FRI answers came late"
+        if failed and any(late_answer in words for late_answer in _LATE_ANSWERS)
+        else ""
+    )
 
 
 def starved(outcome: object) -> str:
     """The cause, if servo targets of a program or a call were too late."""
     if isinstance(outcome, subprocess.CompletedProcess):
-        failed = outcome.returncode != 0 and any(one in outcome.stderr for one in _LATE_TARGETS)
+        failed = outcome.returncode != 0 and any(
+            late_target in outcome.stderr for late_target in _LATE_TARGETS
+        )
         return "servo targets came late" if failed else ""
     return "servo targets came late" if type(outcome).__name__ == "Starved" else ""
 

@@ -18,4 +18,4 @@ assert _spec is not None and _spec.loader is not None
 _module = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(_module)
 sys.modules["heptarm._native"] = _module
-heptarm._native = _module  # type: ignore[attr-defined]
+heptarm._native = _module

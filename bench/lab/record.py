@@ -39,7 +39,7 @@ class RecordedBlocks:
 
     def __init__(self, arm: ha.Arm, folder: Path, seconds: float) -> None:
         self._arm, self._folder = arm, folder
-        self._block_states = States(arm, seconds)
+        self._block_states = States(seconds)
         self.files: list[Path] = []
         self.lost = 0
         self.processor = {"with": 0.0, "without": 0.0}
@@ -53,7 +53,7 @@ class RecordedBlocks:
     def whole(self, seconds: float) -> list[float]:
         """Ages of the states of a longer recording, which counts among the files but not as a block [s]."""
         with self._recording():
-            return States(self._arm, seconds).block()
+            return States(seconds).block(self._arm)
 
     def bare(self) -> list[float]:
         """Ages of the states of a block that is not [s]."""
@@ -68,7 +68,7 @@ class RecordedBlocks:
 
     def _block(self, kind: str) -> list[float]:
         began, used = time.monotonic(), time.process_time()
-        ages = self._block_states.block()
+        ages = self._block_states.block(self._arm)
         self.time[kind] += time.monotonic() - began
         self.processor[kind] += time.process_time() - used
         return ages

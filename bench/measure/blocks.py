@@ -110,8 +110,8 @@ class Comparison:
             scale: from the samples' unit to the figure's.
             detail: further facts.
         """
-        values = np.array([np.percentile(one, percentile) for one in self.values]) * scale
-        floors = np.array([np.percentile(one, percentile) for one in self.floors]) * scale
+        values = np.array([np.percentile(value, percentile) for value in self.values]) * scale
+        floors = np.array([np.percentile(floor, percentile) for floor in self.floors]) * scale
         high = (floors > HIGH_FLOOR * np.median(floors)) | (floors >= self.cap * scale)
         facts = {
             "samples": [sum(map(len, self.values)), sum(map(len, self.floors))],

@@ -204,7 +204,7 @@ class BadNetwork:
     ) -> None:
         os.write(self._ends[1], b".")
         self._thread.join(10.0)
-        for one in self._sides.values():
-            one.close()
+        for side in self._sides.values():
+            side.close()
         for end in self._ends:
             os.close(end)

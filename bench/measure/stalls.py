@@ -59,8 +59,8 @@ class Stalls:
         )
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "ready\n"
-        self.starts = np.zeros(0, dtype=np.int64)
-        self.lengths = np.zeros(0)
+        self.starts: npt.NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.lengths: npt.NDArray[np.float64] = np.zeros(0)
 
     def during(
         self, times: npt.NDArray[np.int64], *, before: float, after: float, longer: float
@@ -88,4 +88,4 @@ class Stalls:
         output, _ = self._process.communicate()
         numbers = np.array([line.split() for line in output.splitlines()], dtype=np.int64).reshape(-1, 2)
         numbers = numbers[np.argsort(numbers[:, 0])]
-        self.starts, self.lengths = numbers[:, 0], numbers[:, 1] * 1e-9
+        self.starts, self.lengths = numbers[:, 0], numbers[:, 1].astype(np.float64) * 1e-9

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
-from heptarm.planning.seam import Batch, Spl, Spline
+from heptarm.planning.seam import Batch, PlantMotion, Spl, Spline
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose
@@ -34,7 +34,7 @@ def _orders(start: Pose) -> dict[str, MotionCommand]:
     """One order of every kind of path."""
     knots = ((0.05, 0.05, 0.0), (0.0, 0.12, 0.03), (0.06, 0.2, 0.0), (0.0, 0.25, -0.03))
     joints = ((0.4, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2), (0.8, 0.5, 0.0, -1.2, 0.2, 0.9, 0.4), READY)
-    made = {
+    made: dict[str, PlantMotion] = {
         "ptp": motions.ptp(joints[0]),
         "lin": motions.lin(_at(start, 0.05, 0.25, 0.05), velocity=SPEED),
         "circ": motions.circ(_at(start, 0.06, 0.06, 0), _at(start, 0, 0.12, 0), velocity=SPEED),

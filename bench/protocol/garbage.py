@@ -29,7 +29,7 @@ def _seeds() -> list[tuple[int, bytes]]:
         messages.Item(motion=messages.Lin(target=pose, redundancy=free)),
         messages.Item(motion=messages.LinRel(offset=pose)),
     ]
-    legal = [
+    legal: list[messages.Message] = [
         messages.Run(items=tuple(items)),
         messages.Subscribe(groups=messages.Groups.JOINTS, rate=100.0),
         messages.TakeControl(),

@@ -9,7 +9,7 @@ import numpy as np
 
 from heptarm.model.batch import jacobian_batch
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 _STARTS, _ROUNDS, _STEP, _DAMPED = 120, 120, 0.6, 1e-3
 _AIM = 0.8  # of the radius: an oracle that aims at the boundary itself would narrowly miss it

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from math import inf
 from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from heptarm.rl.sim.batch import BatchReach
 from heptarm.rl.sim.randomisation import Randomisation
 from heptarm.rl.task import ReachTask
 
+if TYPE_CHECKING:
+    from heptarm.rl.train.recipe import Recipe
+
 #: Number of trained seeds; fewer, such as BENCH_SEEDS=1, for a quick check.
 SEEDS = range(int(os.environ.get("BENCH_SEEDS", "5")))
 TARGETS = 1000
@@ -24,7 +28,7 @@ HARD = Randomisation(latency=(2, 2), stiffness=(300.0, 300.0))
 ON_PLANT = 20
 
 
-def _train(name: str, recipes: list, limit: float) -> Iterator[Figure]:
+def _train(name: str, recipes: list[Recipe], limit: float) -> Iterator[Figure]:
     """Figures of one kind of training over all seeds: the worst counts."""
     from heptarm.rl.sim.plant_engine import PlantEngine
     from heptarm.rl.train.train import train

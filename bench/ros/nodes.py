@@ -116,21 +116,22 @@ def _states(ros: str) -> Iterator[Figure]:
         for block in measured["blocks"]:
             noise = Noise(others=block["others"], stolen=block["stolen"])
             comparisons[block["placement"]].add(block["values"], block["floors"], noise)
-        noisy = any(noise.is_noisy for one in comparisons.values() for noise in one.noise)
+        noisy = any(noise.is_noisy for comparison in comparisons.values() for noise in comparison.noise)
         yield Figure(f"{name}_late", measured["late"] * 100, "%", limit=LATE, disturbed=noisy)
         yield Figure(f"{name}_rate", measured["rate"], "Hz")
-        for one in comparisons.values():
-            yield one.figure(name, 50, "ms", scale=1e3)
-            yield one.figure(f"{name}_p99", 99, "ms", scale=1e3)
+        for comparison in comparisons.values():
+            yield comparison.figure(name, 50, "ms", scale=1e3)
+            yield comparison.figure(f"{name}_p99", 99, "ms", scale=1e3)
             beyond = [
-                float(np.median(v) - np.median(f)) * 1e3 for v, f in zip(one.values, one.floors, strict=True)
+                float(np.median(v) - np.median(f)) * 1e3
+                for v, f in zip(comparison.values, comparison.floors, strict=True)
             ]
             yield Figure(
-                f"{name}_beyond_{one.placement.name}",
+                f"{name}_beyond_{comparison.placement.name}",
                 median(beyond),
                 "ms",
                 limit=BEYOND,
-                disturbed=2 * sum(noise.is_noisy for noise in one.noise) > len(one.noise),
+                disturbed=2 * sum(noise.is_noisy for noise in comparison.noise) > len(comparison.noise),
                 detail={"blocks": [round(each, 3) for each in beyond]},
             )
 

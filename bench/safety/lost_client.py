@@ -54,7 +54,8 @@ def lost_client() -> Iterator[Figure]:
             os.kill(client.pid, signal.SIGKILL)
             client.wait()
             observer.wait_until(
-                lambda s: not s.motion.active and float(np.abs(s.dq).max()) < 5e-3, timeout=10
+                lambda s: s.motion is not None and not s.motion.active and float(np.abs(s.dq).max()) < 5e-3,
+                timeout=10,
             )
             times.append(time.monotonic() - killed)
             with ha.connect(cabinet.target) as arm:

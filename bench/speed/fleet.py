@@ -44,24 +44,24 @@ def _together(count: int, rate: int) -> tuple[list[dict[str, Any]], float, bool]
         clients = [
             stack.enter_context(
                 subprocess.Popen(
-                    [sys.executable, "-m", "bench.speed.fleet_peer", one.target, str(rate), str(SECONDS)],
+                    [sys.executable, "-m", "bench.speed.fleet_peer", cabinet.target, str(rate), str(SECONDS)],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     text=True,
                 )
             )
-            for one in cabinets
+            for cabinet in cabinets
         ]
         for client in clients:
             assert client.stdout is not None
             if client.stdout.readline() != "ready\n":
                 raise RuntimeError("bench.speed.fleet_peer has ended; its error is above")
-        before = sum(processor_time(one.process.pid) for one in cabinets)
+        before = sum(processor_time(cabinet.process.pid) for cabinet in cabinets)
         with Noise() as noise:
             for client in clients:
                 assert client.stdin is not None
                 client.stdin.write("go\n")
                 client.stdin.flush()
             found = [json.loads(client.stdout.readline()) for client in clients if client.stdout is not None]
-        usage = (sum(processor_time(one.process.pid) for one in cabinets) - before) / SECONDS
+        usage = (sum(processor_time(cabinet.process.pid) for cabinet in cabinets) - before) / SECONDS
     return found, usage, noise.is_noisy

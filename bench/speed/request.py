@@ -36,7 +36,7 @@ def _watched(arm: ha.Arm, count: int) -> np.ndarray:
     """Duration of the parts of requests, shape (count, 3) [us]: Python before the call of C, the call, Python after."""
     link, clock = arm.connection.link, time.perf_counter_ns
     exchange, began, ended = link._exchange, 0, 0
-    assert exchange is not None, "this table needs the compiled part: install a C compiler"
+    assert exchange is not None, "this table needs a connection over TCP"
 
     def timed(*request: Any) -> Any:
         nonlocal began, ended

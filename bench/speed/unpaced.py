@@ -31,7 +31,7 @@ STACK_LIMIT, PLANT_LIMIT = 30.0, 60.0
 @benchmark("unpaced")
 def unpaced() -> Iterator[Figure]:
     """Simulated time per time during motions, without pacing: through client, cabinet and plant; the plant alone."""
-    plant = Plant("iiwa14", q=HERE)
+    plant = Plant("iiwa14", q=tuple(HERE.tolist()))
     with Noise() as alone_noise, _without_collections():
         alone = [_plant(plant) for _ in range(BLOCKS + 1)][1:]
     with Cabinet("--speed", "0") as cabinet, ha.connect(cabinet.target, watchdog=10.0, state_rate=10) as arm:
@@ -68,8 +68,9 @@ def _whole(arm: ha.Arm) -> float:
 def _plant(plant: Plant) -> float:
     """Simulated time per time of the plant's ticks, so many at once as in a cabinet."""
     ticks, begin = 0, time.perf_counter()
+    here, there = HERE.tolist(), THERE.tolist()
     for number in range(ALONE):
-        plant.submit(MotionCommand(number + 1, motions.ptp(HERE if number % 2 else THERE)))
+        plant.submit(MotionCommand(number + 1, motions.ptp(here if number % 2 else there)))
         while not plant.idle:
             ticks += plant.tick(AT_ONCE)
     return ticks * TICK / (time.perf_counter() - begin)

@@ -45,38 +45,17 @@ class States:
     """Records blocks of states and checks every state.
 
     Args:
-        target: of the cabinet.
         seconds: of a block.
     """
 
-    def __init__(self, target: str, seconds: float) -> None:
-        self._target, self._seconds = target, seconds
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
         self._robot = ROBOTS["iiwa14"]
         self.count = self.distinct = self.expected = self.disordered = self.dropped = 0
         self.checked = self.torn = 0
 
-    def block(self) -> list[float]:
-        """Ages of the states of one block [s]."""
-        with self.moving(SETTLING + self._seconds) as arm:
-            return self._record(arm)
-
-    @contextlib.contextmanager
-    def moving(self, seconds: float) -> Iterator[ha.Arm]:
-        """An arm that moves for a time [s] and longer; its first second has passed."""
-        with ha.connect(self._target, state_rate=1000) as arm:
-            arm.speed = 0.3
-            there, back = (
-                ha.ptp(ha.deg(30, 40, 10, -70, 20, 60, 30)),
-                ha.ptp(ha.deg(-30, 20, -10, -100, -20, 50, -30)),
-            )
-            arm.start([there, back] * int(2 * seconds + 10))  # closing stops it
-            gc.collect()  # what other connections have left: in the midst of a block that would take 50 ms
-            for _ in arm.states(duration=SETTLING):
-                pass
-            yield arm
-        time.sleep(RESTING)
-
-    def _record(self, arm: ha.Arm) -> list[float]:
+    def block(self, arm: ha.Arm) -> list[float]:
+        """Ages of the states of one block of an arm that moves [s]."""
         stamps: list[int] = []
         ages: list[float] = []
         kept: list[tuple[np.ndarray, Pose]] = []
@@ -99,23 +78,44 @@ class States:
         return ages
 
 
+@contextlib.contextmanager
+def moving(target: str, seconds: float) -> Iterator[ha.Arm]:
+    """An arm that moves for a time [s] and longer; its first second has passed."""
+    with ha.connect(target, state_rate=1000) as arm:
+        arm.speed = 0.3
+        there, back = (
+            ha.ptp(ha.deg(30, 40, 10, -70, 20, 60, 30)),
+            ha.ptp(ha.deg(-30, 20, -10, -100, -20, 50, -30)),
+        )
+        arm.start([there, back] * int(2 * seconds + 10))  # closing stops it
+        gc.collect()  # what other connections have left: in the midst of a block that would take 50 ms
+        for _ in arm.states(duration=SETTLING):
+            pass
+        yield arm
+    time.sleep(RESTING)
+
+
 @benchmark("state_push")
 def state_push() -> Iterator[Figure]:
     """States at 1 kHz while the arm moves: delivery, order, consistency, and their age beside the bare path's."""
     seconds = SECONDS / MANY
     with tempfile.TemporaryDirectory() as folder, Cabinet() as cabinet:
         program = compiled(Path(__file__).with_name("path.c"), Path(folder))
-        states, current = States(cabinet.target, seconds), [frozenset({0})]
+        states, current = States(seconds), [frozenset({0})]
+
+        def block() -> list[float]:
+            with moving(cabinet.target, SETTLING + seconds) as arm:
+                return states.block(arm)
 
         def place(placement: Placement) -> None:
             pin(cabinet.process.pid, placement.far)
             current[0] = placement.far
 
-        with states.moving(WARM_UP) as arm:
+        with moving(cabinet.target, WARM_UP) as arm:
             for _ in arm.states(duration=WARM_UP):
                 pass
         found = by_turns(
-            states.block,
+            block,
             lambda: bare(program, round(seconds * 1000), current[0]),
             place,
             blocks=MANY,

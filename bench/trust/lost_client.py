@@ -196,7 +196,7 @@ def _until_it_moves(
     assert client.stdout is not None
     client.stdout.readline()  # empty if it has ended: then nothing moves
     if loss.guided:
-        observer.wait_until(lambda state: state.motion.active, timeout=30.0)
+        observer.wait_until(lambda state: state.motion is not None and state.motion.active, timeout=30.0)
         cabinet.operate("guide")
         cabinet.operate("push 0 15 15 60")
     observer.wait_until(lambda state: float(np.abs(state.dq).max()) > 0.05, timeout=60.0)
@@ -211,7 +211,7 @@ def _time_to_rest(observer: ha.Arm) -> tuple[float, float]:
         speed = float(np.abs(state.dq).max())
         if speed > _REST:
             last, fastest = after, max(fastest, speed)
-        elif after > last + 0.2 and not state.motion.active:
+        elif after > last + 0.2 and state.motion is not None and not state.motion.active:
             return max(last, 0.0), fastest / ACCELERATION + ACCELERATION / JERK
     return _NEVER, 0.0
 

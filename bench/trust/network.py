@@ -154,7 +154,7 @@ def bad_network() -> Iterator[Figure]:
             kind: [stream(network, cabinet.port, kind, SECONDS) for _ in range(STREAMS)]
             for kind in ("udp", "tcp")
         }
-        detail = {
+        detail: dict[str, object] = {
             "seconds": SECONDS,
             "passed": network.passed,
             "lost": network.lost,

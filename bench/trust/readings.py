@@ -23,6 +23,7 @@ from heptarm.planning.seam import TICK_NS, SafetyFlags, StateWords
 from heptarm.sim.plant.shared_state import Trace
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS
+from heptarm.values.state import Joints
 
 #: States of the whole benchmark, and of one cabinet: its record has half a kilobyte for each tick.
 STATES = int(os.environ.get("BENCH_STATES", "1000000" if os.environ.get("LONG") else "100000"))
@@ -91,9 +92,10 @@ class Comparison:
         first = int(times[0])
         assert (np.diff(times) == TICK_NS).all(), "the record has gaps"
         speeds = record[:, StateWords.DQ]
-        before = None
+        before: Joints | None = None
         for state in states:
             groups = state.groups
+            assert groups.motion is not None
             for name in ("joints", "torques", "pose", "wrench", "motion", "safety"):
                 group = getattr(groups, name)
                 row, odd = divmod(group.stamp - first, TICK_NS)
@@ -104,6 +106,7 @@ class Comparison:
                     self.contradictions[what] += 1
                 self.oldest = max(self.oldest, 1e-6 * (groups.motion.stamp - group.stamp))
             joints = groups.joints
+            assert joints is not None
             if before is not None:
                 self.gaps += joints.stamp - before.stamp > 5 * TICK_NS
                 self.contradictions["dq"] += not self._is_velocity(before, joints, speeds, first)
@@ -111,7 +114,7 @@ class Comparison:
         self.states += len(states)
         self.contradictions += Counter()  # without zeros
 
-    def _is_velocity(self, before, now, speeds: np.ndarray, origin: int) -> bool:  # type: ignore[no-untyped-def]
+    def _is_velocity(self, before: Joints, now: Joints, speeds: np.ndarray, origin: int) -> bool:
         """One tick after another state it follows from the filter; otherwise it is between speeds that there were."""
         row, ticks = (now.stamp - origin) // TICK_NS, (now.stamp - before.stamp) // TICK_NS
         if ticks == 1:

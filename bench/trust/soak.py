@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -230,16 +230,18 @@ class Soak:
 
     def servo(self, arm: ha.Arm) -> None:
         """A stream of joint positions."""
-        engine = self._random.choice(("smart", "direct"))
-        with arm.servo("joint", rate=100, engine=engine, watchdog=2.0) as stream:  # type: ignore[arg-type]
+        engines: tuple[Literal["smart", "direct"], ...] = ("smart", "direct")
+        engine = self._random.choice(engines)
+        with arm.servo("joint", rate=100, engine=engine, watchdog=2.0) as stream:
             while stream.tick() and stream.t < 1.5:
                 stream.set(stream.start.q + 0.1 * np.sin(2 * np.pi * stream.t / 1.5) * np.eye(7)[6])
                 self._look(arm)
 
     def straight_servo(self, arm: ha.Arm) -> None:
         """Streams of poses, by the joints and on straight lines."""
-        for kind in ("pose", "lin"):
-            with arm.servo(kind, rate=100, watchdog=2.0) as stream:  # type: ignore[call-overload]
+        kinds: tuple[Literal["pose", "lin"], ...] = ("pose", "lin")
+        for kind in kinds:
+            with arm.servo(kind, rate=100, watchdog=2.0) as stream:
                 start = stream.start.pose
                 while stream.tick() and stream.t < 1.0:
                     z = 0.01 * np.sin(np.pi * stream.t)
@@ -257,7 +259,7 @@ class Soak:
             "position", period_ms=10, law=laws.sine, params={"amplitude": 0.02, "frequency": 0.5}
         ) as s:
             if not s.wait(1.0):
-                raise RuntimeError(f"FRI ended early: {s.report()}")
+                raise RuntimeError(f"FRI ended early: {s.report}")
         with arm.fri("monitor", period_ms=10) as s:
             s.wait(0.5)
 

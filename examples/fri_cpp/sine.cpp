@@ -1,7 +1,7 @@
 // A client of FRI in plain C++17, without any SDK: overlays a slow sine on whatever the controller lets it command.
 //
 //     g++ -std=c++17 -O2 -o sine sine.cpp
-//     ./sine 30200 1.15                       # and, elsewhere: heptarm sim --fri 1.15
+//     ./sine 30200 1.15                       # and, elsewhere: heptarm sim fri 1.15
 //
 // It has the habits of the clients that labs write: it sets itself up when MONITORING_READY begins, computes the step of
 // its sine from the period that it reads there, sends the measured position in COMMANDING_WAIT, and prints each change of

@@ -2,6 +2,7 @@
 """Send joint and pose commands by topics, and wait for the states that show their ends."""
 
 import math
+from collections.abc import Callable
 
 import rospy
 from geometry_msgs.msg import PoseStamped
@@ -27,7 +28,7 @@ class Arm:
     def on_pose(self, message: PoseStamped) -> None:
         self.pose = message
 
-    def until(self, condition) -> None:
+    def until(self, condition: Callable[[], object]) -> None:
         while not condition():
             if rospy.is_shutdown():
                 raise SystemExit("ROS ends")
@@ -39,7 +40,7 @@ class Arm:
         self.until(lambda: all(abs(self.position(name) - value) < 2e-3 for name, value in target.items()))
 
     def position(self, name: str) -> float:
-        return self.joints.position[self.joints.name.index(name)]
+        return float(self.joints.position[self.joints.name.index(name)])
 
     def move_straight(self, dx: float = 0.0, dy: float = 0.0, dz: float = 0.0) -> None:
         """Move the flange on a straight line [m]."""

@@ -2,6 +2,7 @@
 """Measure the height of a table: move down until contact, retract, move down again slowly, and up."""
 
 import math
+from typing import Any
 
 import actionlib
 import rospy
@@ -12,7 +13,7 @@ HOME = [math.radians(angle) for angle in (0, 30, 0, -90, 0, 60, 0)]
 rospy.init_node("touch")
 
 
-def do(kind, name: str, goal):
+def do(kind: type, name: str, goal: Any) -> Any:
     """Return the result of a goal."""
     client = actionlib.SimpleActionClient(name, kind)
     client.wait_for_server()

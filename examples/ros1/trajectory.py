@@ -5,7 +5,11 @@ import math
 
 import actionlib
 import rospy
-from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+)
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
@@ -31,7 +35,7 @@ for number in range(1, 21):
 worst = [0.0]
 
 
-def on_feedback(feedback) -> None:
+def on_feedback(feedback: FollowJointTrajectoryFeedback) -> None:
     worst[0] = max(worst[0], *(abs(error) for error in feedback.error.positions))
 
 

@@ -2,6 +2,7 @@
 """Measure the height of a table: move down until contact, retract, move down again slowly, and up."""
 
 import math
+from typing import Any
 
 import rclpy
 from heptarm_msgs.action import MoveJoints, Touch
@@ -23,7 +24,7 @@ def discover(name: str) -> None:
         rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0)
 
 
-def do(kind, name: str, **goal):
+def do(kind: Any, name: str, **goal: Any) -> Any:
     """Return the result of a goal."""
     client = ActionClient(node, kind, name)
     client.wait_for_server()

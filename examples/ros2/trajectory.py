@@ -7,6 +7,7 @@ import rclpy
 from control_msgs.action import FollowJointTrajectory
 from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
 from rclpy.duration import Duration
 from rclpy.task import Future
 from rclpy.wait_for_message import wait_for_message
@@ -45,11 +46,11 @@ for number in range(1, 21):
 worst = [0.0]
 
 
-def on_feedback(message) -> None:
+def on_feedback(message: FollowJointTrajectory.Impl.FeedbackMessage) -> None:
     worst[0] = max(worst[0], *(abs(error) for error in message.feedback.error.positions))
 
 
-def send(wanted):
+def send(wanted: FollowJointTrajectory.Goal) -> ClientGoalHandle:
     """The handle of a goal that is accepted or rejected."""
     future = client.send_goal_async(wanted, feedback_callback=on_feedback)
     rclpy.spin_until_future_complete(node, future)

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import os
 
 from heptarm.errors import HeptarmError
-
-#: Environment variable; any value switches the compiled part off.
-SWITCH = "HEPTARM_PURE_PYTHON"
 
 
 class Unavailable(HeptarmError):
     """The compiled part is not available; the text gives the reason."""
 
 
-def extension_file(*, has_twin: bool = True) -> str:
+def extension_file() -> str:
     """Path of the extension.
 
-    Args:
-        has_twin: see `library`.
-
     Raises:
-        Unavailable: it was not built, or is switched off.
+        Unavailable: it was not built.
     """
-    if has_twin and os.environ.get(SWITCH):
-        raise Unavailable(f"switched off by {SWITCH}")
     try:
         from heptarm import _native
     except ImportError as error:
@@ -38,17 +29,16 @@ def extension_file(*, has_twin: bool = True) -> str:
     return _native.__file__
 
 
-def library(*, holds_gil: bool = False, has_twin: bool = True) -> ctypes.CDLL:
+def library(*, holds_gil: bool = False) -> ctypes.CDLL:
     """The functions of the extension.
 
     Args:
         holds_gil: for short functions: they run without releasing Python's lock.
-        has_twin: another implementation in Python takes over where the extension is switched off.
 
     Raises:
         Unavailable: see `extension_file`.
     """
-    return _load(extension_file(has_twin=has_twin), holds_gil)
+    return _load(extension_file(), holds_gil)
 
 
 @functools.cache

@@ -81,7 +81,7 @@ class Peer:
     def finished(
         self, number: int, cause: wire.Cause = wire.Cause.FINISHED, **more: Any
     ) -> wire.MotionFinished:
-        fields = {
+        fields: dict[str, Any] = {
             "item": 0,
             "fired": -1,
             "residual": 1e-5,

@@ -10,10 +10,11 @@ import pytest
 
 import heptarm
 from heptarm import Arm
-from heptarm.arm.connect import PrivateCabinet, tcp
 from heptarm.arm.devices.operator import Operator
+from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.fri import Client
 from heptarm.fri.loop import client as fri_client
+from heptarm.io import tcp
 from heptarm.wire import messages as wire
 from tests.bad_values import Call, call_of, methods_of, wrong
 from tests.conftest import RunningCabinet
@@ -49,7 +50,7 @@ def silence(arm: Arm) -> Iterator[None]:
     def refuse_target(*_: Any, **__: Any) -> NoReturn:
         raise AssertionError("sends a target")
 
-    link._send, link.send_target = refuse, refuse_target  # type: ignore[method-assign]
+    link._send, link.send_target = refuse, refuse_target  # type: ignore[method-assign, assignment]
     try:
         yield
     finally:

@@ -22,6 +22,7 @@ from heptarm.errors import (
     require_extra,
     without_java,
 )
+from heptarm.fri import Client
 from heptarm.values.robot import robot
 from heptarm.wire.codes import MEANINGS, Code
 
@@ -130,7 +131,7 @@ def test_windows_gets_one_sentence_for_what_does_not_work_there(monkeypatch: pyt
     ):
         ha.connect("sim://iiwa14")
     with pytest.raises(CommandRejected, match="FRI runs on Linux"):
-        ha.fri.Client(0)
+        Client(0)
 
 
 def test_a_private_simulator_without_its_packages(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ def touch() -> Iterator[str]:
 
 
 def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
-    return [one.getMessage() for one in caplog.records if one.levelno >= logging.WARNING]
+    return [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
 
 
 def test_the_flange_of_a_robot_is_stated_at_connect(touch: str, caplog: pytest.LogCaptureFixture) -> None:

@@ -21,6 +21,7 @@ import pytest
 import heptarm as ha
 from heptarm import laws
 from heptarm.arm.fri.settings import request as request_of
+from heptarm.fri import Output, State
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.loop import shared_memory as at
@@ -60,19 +61,19 @@ def patient(test: Callable[..., None]) -> Callable[..., None]:
     return tried
 
 
-def swing(s, out, p):
+def swing(s: State, out: Output, p: Any) -> None:
     out.q[6] += p.amplitude * (1.0 - math.cos(2.0 * s.t)) / 2.0
 
 
-def push(s, out, p):
+def push(s: State, out: Output, p: Any) -> None:
     out.tau[6] = p.torque * min(s.t, 1.0)
 
 
-def press(s, out, p):
+def press(s: State, out: Output, p: Any) -> None:
     out.wrench[:3] = p.force * min(s.t, 1.0)
 
 
-def fail(s, out, p):
+def fail(s: State, out: Output, p: Any) -> None:
     out.q[6] += 0.05 * (1.0 - math.cos(2.0 * s.t))
     if s.t > 0.3:
         raise ZeroDivisionError("nothing to divide by")
@@ -183,7 +184,7 @@ def test_what_does_not_go_together_is_refused_here_as_it_is_there(
     arm: ha.Arm, kind: str, mode: object, code: Code
 ) -> None:
     with pytest.raises(ha.CommandRejected) as here:
-        arm.fri(kind, mode=mode)  # type: ignore[arg-type, call-arg]
+        arm.fri(kind, mode=mode)  # type: ignore[arg-type]
     from heptarm.arm.translate.modes import mode_message
 
     message = wire.FriOpen(
@@ -215,7 +216,9 @@ def test_what_does_not_go_together_is_refused_here_as_it_is_there(
         ({"mode": "soft"}, "mode"),
     ],
 )
-def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings: dict, word: str) -> None:
+def test_bad_settings_are_refused_before_anything_is_sent(
+    arm: ha.Arm, settings: dict[str, Any], word: str
+) -> None:
     with pytest.raises(ha.CommandRejected, match=word):
         arm.fri(**settings)
 

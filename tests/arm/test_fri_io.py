@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import heptarm as ha
+from heptarm.fri import Output, State
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.test_fri import LONG, patient
@@ -32,11 +33,11 @@ def until(condition: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-def follow(s, out, p):
+def follow(s: State, out: Output, p: Any) -> None:
     out.io["led_blue"] = s.io["user_button"]
 
 
-def meddle(s, out, p):
+def meddle(s: State, out: Output, p: Any) -> None:
     if s.t > 0.1:
         out.io["user_button"] = True
 

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 import heptarm as ha
 
 IS_OPEN, IS_CLOSED, HOLDS = "InputX3Pin3", "InputX3Pin4", "InputX3Pin10"
-WIRED = {"open": "OutputX3Pin1", "close": "OutputX3Pin2", "is_open": IS_OPEN, "is_closed": IS_CLOSED}
+WIRED: dict[str, Any] = {
+    "open": "OutputX3Pin1",
+    "close": "OutputX3Pin2",
+    "is_open": IS_OPEN,
+    "is_closed": IS_CLOSED,
+}
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from heptarm.arm.link.link import InterruptShield
+from heptarm.arm.link.pending import InterruptShield
 from tests.interrupts import ctrl_c_interrupts
 
 

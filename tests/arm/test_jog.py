@@ -199,7 +199,7 @@ def test_the_elbow_follows_a_posture_while_the_tool_stays(arm: ha.Arm, sent: lis
         ("twist", {"posture": [0, 30, 0, -90, 0, 60, 0]}, "A2 must be in"),
     ],
 )
-def test_what_no_elbow_can_do_is_refused(arm: ha.Arm, kind: Any, settings: dict, word: str) -> None:
+def test_what_no_elbow_can_do_is_refused(arm: ha.Arm, kind: Any, settings: dict[str, Any], word: str) -> None:
     with pytest.raises(ha.CommandRejected, match=word):
         arm.servo(kind, **settings)
 
@@ -338,7 +338,9 @@ def test_a_stop_ends_the_stream(arm: ha.Arm) -> None:
         ("pose", {"frame": "tool"}, "frame applies"),
     ],
 )
-def test_settings_that_do_not_fit_are_refused(arm: ha.Arm, kind: Any, settings: dict, word: str) -> None:
+def test_settings_that_do_not_fit_are_refused(
+    arm: ha.Arm, kind: Any, settings: dict[str, Any], word: str
+) -> None:
     with pytest.raises(ha.CommandRejected, match=word):
         arm.servo(kind, **settings)
 
@@ -439,7 +441,7 @@ def test_targets_of_servo_motions_are_clamped(arm: ha.Arm) -> None:
         assert sv.stats.clamped == 2
         sv.set(HOME)
     for kind in ("pose", "lin"):
-        with arm.servo(kind, watchdog=2.0) as poses:  # type: ignore[call-overload]
+        with arm.servo(kind, watchdog=2.0) as poses:
             start = poses.start.pose
             went = poses.set(start.shifted(x=0.5, y=0.02))
             np.testing.assert_allclose(went.xyz, [0.62, start.y + 0.02, start.z], atol=1e-9)
@@ -496,7 +498,7 @@ def test_motions_that_leave_it_are_refused_before_anything_is_sent(
     arm: ha.Arm, motion: Any, word: str
 ) -> None:
     for mode in ("clamp", "refuse"):
-        arm.workspace = ha.Workspace(BOX, mode=mode)  # type: ignore[arg-type]
+        arm.workspace = ha.Workspace(BOX, mode=mode)
         before = arm.state.q
         with pytest.raises(ha.OutsideWorkspace, match=word):
             arm.move(motion)

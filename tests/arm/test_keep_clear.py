@@ -129,7 +129,7 @@ def test_joint_targets_stop_at_the_last_good_one_and_the_stream_goes_on(arm: ha.
         assert np.abs(arm.state.q - last).max() < 2e-3 and last[6] < wall - Wall.margin
         sv.set(last - 0.1 * A7)
         arm.wait_until(lambda state: state.q[6] < last[6] - 0.09, timeout=PATIENCE)
-        assert not sv.stats.slowdown.reason and [one.reason for one in sv.stats.slowdowns] == [
+        assert not sv.stats.slowdown.reason and [slowdown.reason for slowdown in sv.stats.slowdowns] == [
             "tool near wall"
         ]
     stats = sv.stats
@@ -154,7 +154,7 @@ def test_poses_stop_above_a_box(arm: ha.Arm, box: ha.CollisionModel, kind: Any) 
             with pytest.raises(ha.CollisionForeseen):
                 sv.set(ha.Pose.of(start.xyz - [0, 0, depth + 0.2], start.quat))
         assert arm.state.pose.distance_to(last) < 2e-3
-        gap = min(one.distance for one in box.carrying(pen).clearances(arm.state.q))
+        gap = min(clearance.distance for clearance in box.carrying(pen).clearances(arm.state.q))
         sv.set(start)  # it may leave
     assert sv.stats.slowdowns[0].reason.startswith("pen near box") and sv.stats.refused == 0
     assert 0.017 < gap < 0.033

@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 import heptarm as ha
-from heptarm.arm.link.link import Heartbeat
+from heptarm.arm.link.heartbeat import Heartbeat
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from heptarm.wire.session import Session
@@ -99,10 +99,10 @@ def test_silence_is_noticed() -> None:
 def test_heartbeats_go_both_directions() -> None:
     peer = Peer(heartbeat=0.2)
     with peer.arm(rate=0.0) as arm:
-        count = arm.connection.link.offset.count  # type: ignore[union-attr]
+        count = arm.connection.link.offset.count
         peer.tell(wire.Ping(sent=77))
         deadline = time.monotonic() + 20.0
-        while arm.connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
+        while arm.connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:
             assert time.monotonic() < deadline
             time.sleep(0.01)
         with pytest.raises(ha.StaleState):
@@ -144,13 +144,13 @@ def test_control_that_is_lost_is_noticed(peer: Peer) -> None:
 def test_a_loop_over_fast_states_reads_the_link_itself_until_it_ends(peer: Peer) -> None:
     with peer.arm(rate=400.0) as arm:
         link, here = arm.connection.link, threading.get_ident()
-        take, readers = link._on_state, []
+        take, readers = link._arrivals.on_state, []
 
         def taken(body: bytes, now: int) -> None:
             readers.append(threading.get_ident())
             take(body, now)
 
-        link._on_state = taken
+        link._arrivals.on_state = taken
         states, deadline = arm.states(), time.monotonic() + 20.0
         stamps = []
         while readers.count(here) < 50:
@@ -191,10 +191,10 @@ def test_a_loop_that_was_held_up_keeps_its_connection(peer: Peer) -> None:
     with peer.arm(rate=200.0) as arm:
         link = arm.connection.link
         assert link is not None
-        read, held_up = link._read, []
+        read, held_up = link._read, list[None]()
 
         def late(*, wait: bool) -> None:
-            if link._loop_reads and len(held_up) < 5:
+            if threading.current_thread() is threading.main_thread() and len(held_up) < 5:
                 time.sleep(0.1)  # until bytes wait
                 link._heartbeat.received -= 10_000_000_000
                 held_up.append(time.sleep(0.02))
@@ -288,7 +288,9 @@ def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:
 
 
 def test_an_interrupted_request_leaves_a_sound_link(peer: Peer) -> None:
-    timer = threading.Timer(0.1, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT))
+    timer = threading.Timer(
+        0.1, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    )
     # the first stop is never answered, so the caller waits in receive_into
     peer.expect(wire.Stop, lambda *_: timer.start())
     with peer.arm() as arm:

@@ -6,6 +6,7 @@ import asyncio
 import re
 import signal
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from tests.interrupts import ctrl_c_interrupts
 HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 
 
-def later(seconds: float, *messages: wire.Message):
+def later(seconds: float, *messages: wire.Message) -> Callable[[Served, int], None]:
     """Replies that arrive later."""
 
     def reply(client: Served, _: int) -> None:
@@ -118,7 +119,7 @@ def test_the_ceiling_only_slows_down(peer: Peer) -> None:
         for wrong in (0.0, 1.5, float("nan")):
             with pytest.raises(ha.LimitError):
                 arm.speed = wrong
-    assert [run.items[0].motion.dynamics.velocity[0] for run in sent] == [0.5, 0.5, 0.1]  # type: ignore[union-attr]
+    assert [run.items[0].motion.dynamics.velocity[0] for run in sent] == [0.5, 0.5, 0.1]  # type: ignore[index]
 
 
 def test_a_target_outside_the_robot_is_refused_before_it_is_sent(peer: Peer) -> None:
@@ -290,7 +291,9 @@ def test_a_callback_may_talk_to_the_cabinet(peer: Peer) -> None:
 
 
 def test_ctrl_c_stops_the_arm_and_goes_on(peer: Peer) -> None:
-    timer = threading.Timer(0.05, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT))
+    timer = threading.Timer(
+        0.05, lambda: signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    )
     peer.runs(1, wire.MotionStarted(id=1, item=0), lambda *_: timer.start())
     peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))
     with peer.arm() as arm:
@@ -309,7 +312,8 @@ def test_a_handle_that_failed_reports_why_and_its_callback_receives_it(peer: Pee
     done = threading.Event()
     with peer.arm() as arm:
         handle = arm.start(HOME)
-        handle.add_done_callback(lambda one: (seen.append(one.error), done.set()))
+        handle.add_done_callback(lambda one: seen.append(one.error))
+        handle.add_done_callback(lambda _: done.set())
         with pytest.raises(ha.MotionAborted) as raised:
             handle.wait(timeout=20.0)
         assert done.wait(20.0)
@@ -328,8 +332,8 @@ def test_a_wrong_timeout_is_refused_before_anything_is_sent(peer: Peer, wrong: o
             lambda: arm.move(HOME, timeout=wrong),  # type: ignore[arg-type]
             lambda: arm.wait_until(lambda _: True, timeout=wrong),  # type: ignore[arg-type]
             lambda: arm.wait_for_rest(timeout=wrong),  # type: ignore[arg-type]
-            lambda: arm.servo(goal_timeout=wrong),  # type: ignore[arg-type]
-            lambda: arm.servo(speed_timeout=wrong),  # type: ignore[arg-type]
+            lambda: arm.servo(goal_timeout=wrong),  # type: ignore[call-overload]
+            lambda: arm.servo(speed_timeout=wrong),  # type: ignore[call-overload]
         )
         for call in calls:
             with pytest.raises(ha.CommandRejected, match="timeout must be"):

@@ -10,7 +10,7 @@ import pytest
 import heptarm as ha
 from heptarm import Arm
 from heptarm.arm.link.state_stream import States
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from tests.simulators import FASTER
 

@@ -12,7 +12,7 @@ import pytest
 import heptarm as ha
 from heptarm import do, model, modes
 from heptarm.io.plan_box import PlanBox
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
@@ -114,7 +114,7 @@ def test_nothing_moves_and_nothing_is_sent(arm: ha.Arm) -> None:
     before = arm.wait_for_rest()
     queue = arm.connection.journal.open()
     preview = arm.plan([ha.lin_rel(z=0.05), ha.lin_rel(z=-0.05)])
-    assert not [entry for entry in queue if entry.kind == "request"]
+    assert not [entry for entry in queue if entry[1] == "request"]
     arm.connection.journal.close(queue)
     assert arm.state.q == pytest.approx(before.q, abs=1e-6)
     assert [one.name for one in preview.motions] == ["LinRel", "LinRel"]

@@ -199,7 +199,7 @@ async def by_another_task(handle: ha.MotionHandle) -> None:
             group.create_task(_await(handle))
             group.create_task(fails())
     except Exception as failure:
-        assert [type(one) for one in failure.exceptions] == [TimeoutError]  # type: ignore[attr-defined]
+        assert [type(exception) for exception in failure.exceptions] == [TimeoutError]  # type: ignore[attr-defined]
         assert handle.done  # the group has ended: nothing of it goes on
         raise asyncio.TimeoutError from failure
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import heptarm as ha
-from heptarm.arm.motion.program import ProgramTerms, is_endless, listed, longest
+from heptarm.arm.motion.program_request import ProgramTerms, is_endless, listed, longest
 from heptarm.arm.translate.motions import item as item_of
 from heptarm.errors import inside
 from heptarm.model.inverse_kinematics import redundancy

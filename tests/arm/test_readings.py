@@ -10,7 +10,7 @@ import pytest
 from heptarm import Arm, State, connect
 from heptarm.model.inverse_kinematics import redundancy
 from heptarm.model.kinematics import jacobian
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg

@@ -1,9 +1,10 @@
-"""Requests over TCP, in one call of C and without it: several threads, states between them, Ctrl-C at any moment."""
+"""Requests over TCP, in one call of C and as without the GIL: threads, states in between, Ctrl-C at any moment."""
 
 from __future__ import annotations
 
 import random
 import signal
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -11,7 +12,6 @@ from collections.abc import Iterator
 import pytest
 
 import heptarm as ha
-from heptarm._library import SWITCH
 from heptarm.io.tcp import connect, listening
 from heptarm.io.transport import Transport
 from heptarm.wire import messages as wire
@@ -29,10 +29,10 @@ class TcpPeer(Peer):
         return ours
 
 
-@pytest.fixture(params=["C", "Python"])
+@pytest.fixture(params=["C", "no lock"])
 def peer(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Peer]:
-    if request.param == "Python":
-        monkeypatch.setenv(SWITCH, "1")
+    if request.param == "no lock":
+        monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)
     made = TcpPeer()
     yield made
     made.close()
@@ -89,7 +89,7 @@ def test_requests_of_several_threads_beside_states(peer: Peer) -> None:
             thread.join()
         assert not problems and stamps == sorted(set(stamps))
         assert sum(isinstance(message, wire.Stop) for message in peer.seen) == 450
-        assert not arm.connection.link._pending and not arm.connection.link._session.waiting
+        assert not arm.connection.link._requests.by_id and not arm.connection.link._session.waiting
 
 
 class CtrlC:
@@ -133,7 +133,7 @@ def test_ctrl_c_at_any_moment_leaves_a_sound_link(peer: Peer) -> None:
             arm.stop()
             assert arm.connected and min(asked, interrupted) >= 500, (asked, interrupted)
             link = arm.connection.link
-            assert not link._reading.locked() and not link._sending.locked()
+            assert not link._turns.lock.locked() and not link._sending.locked()
     finally:
         over.set()
         signal.signal(signal.SIGINT, before)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,7 +191,7 @@ def test_a_servo_motion_ends_with_a_stop(safe: Arm) -> None:
 
 @pytest.mark.parametrize("motion", [FAR, lin_rel(z=-0.25, frame="base", speed_mps=0.1), hold(20.0)])
 @pytest.mark.parametrize("kind", ["path", "fast"])
-def test_stop_from_another_thread_while_a_move_blocks(safe: Arm, motion: object, kind: str) -> None:
+def test_stop_from_another_thread_while_a_move_blocks(safe: Arm, motion: object, kind: Any) -> None:
     def stop() -> None:
         safe.wait_until(lambda s: s.motion is not None and s.motion.active, timeout=20.0)
         for _ in range(3):

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -32,9 +33,11 @@ def follow(sv: ha.JointServo, seconds: float, *, turn: float = 0.2) -> np.ndarra
 
 
 @pytest.mark.parametrize("engine", ["smart", "direct"])
-def test_the_arm_follows_a_stream_and_rests_at_its_end(arm: ha.Arm, engine: str) -> None:
-    seen = []
-    with arm.servo("joint", rate=100, engine=engine, speed=0.5, acceleration=1.0, watchdog=2.0) as sv:  # type: ignore[arg-type]
+def test_the_arm_follows_a_stream_and_rests_at_its_end(
+    arm: ha.Arm, engine: Literal["smart", "direct"]
+) -> None:
+    seen: list[float] = []
+    with arm.servo("joint", rate=100, engine=engine, speed=0.5, acceleration=1.0, watchdog=2.0) as sv:
         start = sv.start.q
         while sv.tick() and sv.t < 20.0 and (sv.t < 1.0 or max(seen) <= 0.15):
             sv.set(start + 0.2 * np.sin(np.pi * sv.t) * A7)
@@ -130,7 +133,9 @@ def test_bad_targets_are_refused_here(arm: ha.Arm, bad: object) -> None:
         ({"mode": "soft"}, "mode"),
     ],
 )
-def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings: dict, word: str) -> None:
+def test_bad_settings_are_refused_before_anything_is_sent(
+    arm: ha.Arm, settings: dict[str, Any], word: str
+) -> None:
     with pytest.raises(ha.CommandRejected, match=word):
         arm.servo("joint", **settings)
     with pytest.raises(ha.ShapeError, match="kind"):

@@ -51,7 +51,7 @@ def test_they_begin_together_and_are_released_at_once(arms: ha.Arms) -> None:
         ha.lin_rel(y=0.02 * (-1) ** k, frame="base", blend_m=0.005) for k in range(12)
     ]  # takes long to plan
 
-    skews = []
+    skews: list[float] = []
     while not skews or (min(skews) > 0.02 and len(skews) < 5):  # a busy machine may be late with one of them
         both = ha.start_together({left: long, right: ha.lin_rel(y=0.05, frame="base", speed_mps=0.1)})
         results = both.wait()

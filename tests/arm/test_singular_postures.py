@@ -29,7 +29,7 @@ def sensors(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def allowed(sensors: str) -> float:
-    return STAYS if sensors == "ideal" else STAYS_WITH_NOISE
+    return float(STAYS if sensors == "ideal" else STAYS_WITH_NOISE)
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,7 @@ def test_a_full_queue_drops_the_oldest() -> None:
     for number in range(10):
         queue.put(StateSample(number, b"", 0))
     assert queue.lost == 7
-    assert [queue.get(0).number for _ in range(3)] == [7, 8, 9]  # type: ignore[union-attr]
+    assert [queue.get(0).number for _ in range(3)] == [7, 8, 9]
     assert queue.get(0) is None
     queue.put(StateSample(11, b"", 0))
     assert queue.get(0) is not None and queue.get(0) is None

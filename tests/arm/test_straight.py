@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,7 +93,7 @@ def test_a_straight_servo_is_compliant_and_renewed_after_its_time_out(arm: ha.Ar
     ],
 )
 def test_limits_that_a_kind_does_not_obey_are_refused(
-    arm: ha.Arm, kind: str, settings: dict, word: str
+    arm: ha.Arm, kind: str, settings: dict[str, Any], word: str
 ) -> None:
     with pytest.raises(ha.CommandRejected, match=word):
         arm.servo(kind, **settings)  # type: ignore[call-overload]

@@ -15,6 +15,7 @@ from heptarm.io.clock import RealClock
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
+from tests.conftest import RunningCabinet
 
 EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31mroot\r\nfake: line\u202egnp.exe\u2028\x00"
 
@@ -41,7 +42,9 @@ def test_a_message_may_have_lines() -> None:
     assert printable("one\ntwo\x1b[1m", lines=True) == "one\ntwo[1m"
 
 
-def test_the_cabinet_strips_the_names_of_its_clients(cabinet, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_cabinet_strips_the_names_of_its_clients(
+    cabinet: RunningCabinet, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # what this side removes when it receives a text must not hide what the cabinet lets through
     monkeypatch.setattr("heptarm.arm.link.link.printable_message", lambda message: message)
     options = Options(name=EVIL, timeout=30.0, watchdog=5.0)

@@ -83,7 +83,7 @@ def test_other_clients_know_the_shapes_as_soon_as_they_are_there(arm: ha.Arm) ->
             assert other.shapes == arm.shapes == tuple((one, one.pose) for one in PEN.shapes)
             arm.attach_workpiece(CUBE)
             other.wait_until(lambda _: len(other.shapes) > 1)
-            assert other.shapes == arm.shapes and other.shapes[1][1] == TIP @ CUBE.shapes[0].pose
+            assert other.shapes == arm.shapes and other.shapes[1][1] == TIP @ CUBE.shapes[0].pose  # type: ignore[misc]
         other.wait_until(lambda _: not other.shapes)
 
 

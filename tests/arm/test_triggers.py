@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -117,7 +117,7 @@ def test_events_come_by_callbacks_too_under_override_and_pause(arm: ha.Arm) -> N
     assert handle.wait_started(20.0) and not handle.done
     arm.resume()
     arm.set_override(0.9)
-    handle.add_event_callback(lambda event: 1 / 0)  # its errors are not heptarm's
+    handle.add_event_callback(lambda event: 1 / 0)  # type: ignore[arg-type]  # not our error
     assert handle.wait().arrived
     arm.set_override(1.0)
     late: list[ha.MotionEvent] = []
@@ -176,6 +176,7 @@ def test_what_makes_no_sense_is_refused_before_anything_moves(
 
 
 def test_negative_distances_do_not_come_into_being() -> None:
+    wrong: Callable[[], object]
     for wrong in (lambda: path.after(-0.1), lambda: path.before_end(-0.1), lambda: path.after(float("nan"))):
         with pytest.raises(ha.LimitError) as error:
             wrong()

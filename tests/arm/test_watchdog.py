@@ -23,7 +23,8 @@ def test_the_range_is_that_of_the_messages() -> None:
     for message in (wire.ServoJoints, wire.ServoJointsVelocity, wire.ServoPose, wire.ServoOpen):
         assert message.RANGES["watchdog"] == (TARGETS.low, TARGETS.high), message
     assert (
-        next(one.default for one in fields(wire.TakeControl) if one.name == "watchdog") == CONNECTION.default
+        next(field.default for field in fields(wire.TakeControl) if field.name == "watchdog")
+        == CONNECTION.default
     )
 
 

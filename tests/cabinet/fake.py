@@ -17,7 +17,7 @@ _OUT = ROOT / "build" / "cabinet" / "fake"
 sys.path.insert(0, str(ROOT / "cabinet"))
 
 import build  # noqa: E402
-import toolchain  # noqa: E402
+import toolchain as toolchain  # noqa: E402
 
 
 def classes(folder: str = "java") -> str:

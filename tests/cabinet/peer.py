@@ -26,6 +26,11 @@ class Busy(Exception):
     """The cabinet has waited too long for the handshake."""
 
 
+def is_of(number: int) -> Callable[[Any], bool]:
+    """Whether a message is about this motion."""
+    return lambda message: number == (message.servo if isinstance(message, wire.ServoStatus) else message.id)
+
+
 class Peer:
     """One connection. `seen` keeps every message with its frame."""
 
@@ -123,7 +128,9 @@ class Peer:
     def signals(self) -> dict[str, float]:
         """The signals by name, all of them read after the last frame that was received; they are subscribed."""
         now = self.seen[-1][0].time
-        state = self.wait(lambda _, one: isinstance(one, wire.State) and one.io and one.io.stamp > now)
+        state = self.wait(
+            lambda _, one: isinstance(one, wire.State) and one.io is not None and one.io.stamp > now
+        )
         return {self.welcome.signals[one.index].name: one.value for one in state.io.values}
 
     def all(self, kind: type[M]) -> list[M]:

@@ -14,7 +14,7 @@ import pytest
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.cabinet.fake import ROOT, FakeCabinet
-from tests.cabinet.peer import Peer, ptp, run
+from tests.cabinet.peer import Peer, is_of, ptp, run
 
 Connect = Callable[..., Peer]
 
@@ -88,7 +88,7 @@ def test_release_stops_what_runs_and_what_waits(connect: Connect) -> None:
     peer.wait_for(wire.MotionStarted)
     peer.ask(wire.ReleaseControl())
     for number in ids:
-        assert peer.wait_for(wire.MotionFinished, lambda e, n=number: e.id == n).cause == wire.Cause.STOPPED
+        assert peer.wait_for(wire.MotionFinished, is_of(number)).cause == wire.Cause.STOPPED
 
 
 @pytest.mark.parametrize("rate", [1.0, 10.0])
@@ -190,6 +190,6 @@ def test_control_changes_hands_a_hundred_times(connect: Connect) -> None:
                 time.sleep(0.001)
             number = peer.ask(run(ptp(0.001 * (turn % 2)))).id
             if turn % 3:
-                finished = peer.wait_for(wire.MotionFinished, lambda e, n=number: e.id == n)
+                finished = peer.wait_for(wire.MotionFinished, is_of(number))
                 assert finished.cause == wire.Cause.FINISHED
     observer.wait_for(wire.ControlChanged, lambda e: e.text.startswith("turn 99 was lost"))

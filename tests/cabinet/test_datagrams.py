@@ -204,7 +204,7 @@ def test_pings_are_answered_and_states_come_by_datagram_once_the_client_answers_
     with Line(*keyed) as line:
         line.peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=50.0))
         line.peer.wait_for(wire.State)  # over TCP: nothing shows that datagrams reach this client
-        kinds = set()
+        kinds: set[type] = set()
         deadline = time.monotonic() + PATIENCE
         line.send(wire.Ping(sent=5))
         while not {wire.Ping, wire.Pong, wire.State} <= kinds and time.monotonic() < deadline:
@@ -289,7 +289,7 @@ class Held:
         self._free = threading.Event()
         self._free.set()
         for direction in ("up", "down"):
-            relay.attack(direction, self._pass)  # type: ignore[arg-type]
+            relay.attack(direction, self._pass)
 
     def _pass(self, frames: list[bytes]) -> bytes:
         frame = frames[-1]
@@ -325,7 +325,7 @@ def arm(keyed: tuple[FakeCabinet, str]) -> Iterator[tuple[ha.Arm, Relay, Datagra
             address, key=key, datagrams=True, timeout=PATIENCE, watchdog=1.0, groups=("joints", "motion")
         )
         try:
-            until(lambda: arm.connection.datagrams.gets_through, "datagrams get through")  # type: ignore[union-attr]
+            until(lambda: arm.connection.datagrams.gets_through, "datagrams get through")
             yield arm, relay, datagrams, peer
         finally:
             arm.close()
@@ -343,7 +343,7 @@ def test_tcp_that_is_held_up_for_longer_than_every_watchdog_ends_nothing(arm: Pa
             assert moving(servo, 2.5)
             assert one.state.age < 1.0  # states come by datagram
         assert moving(servo, 0.3)
-    assert one.in_control and one.connection.datagrams.states > 100  # type: ignore[union-attr]
+    assert one.in_control and one.connection.datagrams.states > 100
     assert not [event for event in watcher.all(wire.ControlChanged) if "lost" in event.text]
 
 
@@ -352,7 +352,7 @@ def test_udp_that_is_cut_is_replaced_by_tcp_at_once_and_used_again_later(arm: Pa
     with one.servo(rate=100, watchdog=1.0) as servo:
         assert moving(servo, 0.3)
         for direction in ("up", "down"):
-            datagrams.attack(direction, lambda _: [])  # type: ignore[arg-type]
+            datagrams.attack(direction, lambda _: [])
         assert moving(servo, 2.5)
         assert one.state.age < 1.0
         report = one.connection.datagrams
@@ -360,7 +360,7 @@ def test_udp_that_is_cut_is_replaced_by_tcp_at_once_and_used_again_later(arm: Pa
         assert report.targets_over_tcp > 0.5 * report.targets  # a busy machine sends fewer of them
         for direction in ("up", "down"):
             datagrams.attack(direction, None)  # type: ignore[arg-type]
-        until(lambda: moving(servo, 0.05) and one.connection.datagrams.gets_through, "datagrams again")  # type: ignore[union-attr]
+        until(lambda: moving(servo, 0.05) and one.connection.datagrams.gets_through, "datagrams again")
 
 
 def test_when_nothing_gets_through_the_arm_stops(arm: Parts) -> None:
@@ -370,7 +370,7 @@ def test_when_nothing_gets_through_the_arm_stops(arm: Parts) -> None:
         assert moving(servo, 0.3)
         number = servo._number
         for direction in ("up", "down"):
-            datagrams.attack(direction, lambda _: [])  # type: ignore[arg-type]
+            datagrams.attack(direction, lambda _: [])
         with held:
             ended = watcher.wait_for(wire.MotionFinished, lambda event: event.id == number)
             assert ended.cause in (wire.Cause.STARVED, wire.Cause.LOST)
@@ -414,7 +414,7 @@ def test_loss_reordering_and_repetition_end_nothing(arm: Parts) -> None:
         return [[last], [last], [last], [], [last, before, last]][int(random.integers(5))]
 
     for direction in ("up", "down"):
-        datagrams.attack(direction, spoil)  # type: ignore[arg-type]
+        datagrams.attack(direction, spoil)
     with one.servo(rate=200, watchdog=1.0) as servo:
         for _ in range(4):
             assert moving(servo, 0.3)
@@ -422,15 +422,15 @@ def test_loss_reordering_and_repetition_end_nothing(arm: Parts) -> None:
                 assert moving(servo, 0.7)
     counts = one.connection.link.datagram_counts(timeout=PATIENCE)
     assert counts.old > 0 and counts.forged == counts.damaged == 0
-    assert one.connection.datagrams.ignored > 0  # type: ignore[union-attr]
+    assert one.connection.datagrams.ignored > 0
 
 
 def test_datagrams_that_are_changed_in_transit_change_nothing(arm: Parts) -> None:
     one, _, datagrams, _ = arm
     with one.servo(rate=100, watchdog=1.0) as servo:
         for direction in ("up", "down"):
-            datagrams.attack(direction, lambda seen: [seen[-1][:-30] + os.urandom(30)])  # type: ignore[arg-type]
+            datagrams.attack(direction, lambda seen: [seen[-1][:-30] + os.urandom(30)])
         assert moving(servo, 1.5)  # over TCP
     counts = one.connection.link.datagram_counts(timeout=PATIENCE)
     assert counts.forged > 20
-    assert one.connection.datagrams.ignored > 0  # type: ignore[union-attr]
+    assert one.connection.datagrams.ignored > 0

@@ -43,7 +43,7 @@ ENDLESS: dict[str, tuple[dict[str, Any], str]] = {
     "ramps longer than the whole": ({"rise_time": 0.6, "fall_time": 0.5, "total_time": 1.0}, "total_time"),
     "waits for no end": ({"stay_active": True}, "stay_active"),
 }
-BAD = {
+BAD: dict[str, tuple[Any, str]] = {
     **{name: (replace(SPRING, **fields), field) for name, (fields, field) in CONTRADICTIONS.items()},
     **{
         f"base {name}": (replace(WAVE, base=replace(SPRING, **fields)), f"base.{field}")

@@ -306,7 +306,7 @@ def test_home_is_a_motion_of_the_robot(peer: Peer) -> None:
 @pytest.mark.parametrize("name", NO_CIRCLES)
 def test_the_cabinet_refuses_the_arcs_that_the_client_refuses(peer: Peer, name: str) -> None:
     *points, parameter, words = NO_CIRCLES[name]
-    start, via, end = (wire.Pose(xyz=xyz, quat=(0.0, 0.0, 0.0, 1.0)) for xyz in points)  # type: ignore[arg-type]
+    start, via, end = (wire.Pose(xyz=xyz, quat=(0.0, 0.0, 0.0, 1.0)) for xyz in points)
     line, arc = wire.Item(motion=wire.Lin(target=start)), wire.Item(motion=wire.Circ(via=via, end=end))
     spline = wire.Spline(segments=(wire.SplSegment(target=start), wire.CircSegment(via=via, end=end)))
     hold = wire.Item(motion=wire.Hold(duration=0.1))

@@ -80,7 +80,9 @@ def test_a_slow_cabinet_reads_them_a_few_at_a_time(make: Maker) -> None:
 
 
 def next_signals(peer: Peer) -> wire.IoState:
-    return peer.wait(lambda _, one: isinstance(one, wire.State) and one.io, since=len(peer.seen)).io
+    state = peer.wait(lambda _, one: isinstance(one, wire.State) and one.io is not None, since=len(peer.seen))
+    assert isinstance(state, wire.State) and state.io is not None
+    return state.io
 
 
 def test_the_stamp_of_signals_is_that_of_the_oldest(make: Maker) -> None:
@@ -105,7 +107,7 @@ def test_a_new_subscriber_sees_no_value_from_before(make: Maker) -> None:
             assert next_signals(peer).stamp > written
             for _ in range(count):
                 next_signals(peer)
-            peer.ask(wire.Subscribe(groups=0, rate=0.0))
+            peer.ask(wire.Subscribe(groups=wire.Groups(0), rate=0.0))
             peer.read_for(0.5)
 
 

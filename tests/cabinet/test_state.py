@@ -69,9 +69,8 @@ def test_only_the_groups_that_were_asked_for(connect: Connect) -> None:
     for chosen in (G.JOINTS, G.POSE | G.SAFETY, G.TORQUES | G.WRENCH | G.MOTION):
         peer.ask(wire.Subscribe(groups=chosen, rate=200.0))
         # some older ones may still arrive; after the first new one no old ones do
-        peer.wait(
-            lambda _, m, g=chosen: isinstance(m, wire.State) and carried(m) == set(g), since=len(peer.seen)
-        )
+        groups = set(chosen)
+        peer.wait(lambda _, m: isinstance(m, wire.State) and carried(m) == groups, since=len(peer.seen))  # noqa: B023
         later = peer.wait(lambda _, m: isinstance(m, wire.State), since=len(peer.seen))
         assert carried(later) == set(chosen)
     peer.ask(wire.Subscribe(groups=G.JOINTS, rate=0.0))

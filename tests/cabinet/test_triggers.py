@@ -94,13 +94,13 @@ def test_an_output_is_set_on_the_way_and_an_event_reported(cabinet: FakeCabinet,
     )
     assert finish(peer, number).cause is wire.Cause.FINISHED
     events = fired(peer, number)
-    assert [(one.trigger, one.label, one.code) for one in events] == [
+    assert [(event.trigger, event.label, event.code) for event in events] == [
         (0, "half way", 0),
         (1, "", 0),
         (2, "", 0),
     ]
-    assert all(one.item == 0 for one in events)
-    assert [one.time for one in events] == sorted(one.time for one in events)
+    assert all(event.item == 0 for event in events)
+    assert [event.time for event in events] == sorted(event.time for event in events)
     half = events[0].joints
     assert half is not None and 0.2 <= half.q[6] <= 0.4
     assert lamp(cabinet.port) == (1.0, 2.5)

@@ -1,4 +1,4 @@
-"""`heptarm sim --app`: applications of other people."""
+"""`heptarm sim app`: applications of other people."""
 
 from __future__ import annotations
 
@@ -368,11 +368,7 @@ def test_a_typed_line_answers_a_dialog_that_reports_what_to_type(asking: Path) -
     "options",
     [
         ("--panel",),
-        ("--view-port", "8081"),
-        ("--meshes", "."),
         ("--count", "2"),
-        ("--host", "0.0.0.0"),
-        ("--key-file", "cell.key"),
         ("--fri", "1.15"),
         ("--fri-io", "G.S<bool"),
     ],
@@ -382,15 +378,32 @@ def test_an_option_that_means_nothing_to_an_application_is_refused(
 ) -> None:
     done = sim(lab, *options)
     assert done.returncode != 0
-    assert f"{options[0]} cannot be used with --app" in done.stderr
+    assert f"{options[0]} cannot be used with heptarm sim app" in done.stderr
 
 
-@pytest.mark.parametrize("options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0")])
+@pytest.mark.parametrize(
+    ("options", "needed"),
+    [
+        (("--view-port", "8081"), "--view"),
+        (("--meshes", "."), "--view"),
+        (("--host", "0.0.0.0"), "--port or --view"),
+        (("--key-file", "cell.key"), "--port or --view"),
+    ],
+)
+def test_an_option_of_those_who_look_on_needs_them(lab: Path, options: tuple[str, ...], needed: str) -> None:
+    done = sim(lab, *options)
+    assert done.returncode != 0
+    assert f"{options[0]} needs {needed}" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0"), ("--map", "a=b")]
+)
 def test_an_option_of_an_application_needs_one(options: tuple[str, ...]) -> None:
     command = [sys.executable, "-m", "heptarm.cli.main", "sim", *options]
     done = subprocess.run(command, input="", capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode != 0
-    assert f"{options[0]} needs --app" in done.stderr
+    assert f"{options[0]} needs heptarm sim app FOLDER" in done.stderr
 
 
 @needs_javac

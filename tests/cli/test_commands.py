@@ -19,11 +19,12 @@ import pytest
 from heptarm.io.plan_box import PlanBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import HEPTARM, objects, run, sim
+from tests.conftest import RunningCabinet
 from tests.retry import retry, starved
 
 
 @pytest.fixture
-def target(cabinet) -> str:
+def target(cabinet: RunningCabinet) -> str:
     return cabinet.target
 
 

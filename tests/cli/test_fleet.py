@@ -96,7 +96,7 @@ def test_ports_follow_each_other_and_a_port_in_use_ends_both() -> None:
         (("--speed", "-1"), "--speed must be 0 or in [0.01, 1000], got -1"),
         (("extra",), "unexpected: extra (heptarm sim --help)"),
         (("--count", "2", "--view"), "--view cannot be used with --count"),
-        (("--count", "2", "--fri", "1.15"), "--count cannot be used with --fri"),
+        (("--count", "2", "--fri", "1.15"), "--count cannot be used with heptarm sim fri"),
     ],
 )
 def test_refuses(words: tuple[str, ...], text: str) -> None:

@@ -44,7 +44,7 @@ class Reported(list[Any]):
 def controller(
     port: int, *arguments: str, version: str = "1.15", typed: bool = False
 ) -> Iterator[tuple[Any, Reported]]:
-    """`heptarm sim --fri`: its output, including its end."""
+    """`heptarm sim fri`: its output, including its end."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
     with ctrl_c_interrupts():
         started = subprocess.Popen(
@@ -178,7 +178,7 @@ def test_the_network_of_a_bare_controller_has_faults() -> None:
         (("--fri", "1.15", "--fri-network", "luck=1"), "one of loss, duplicate"),
         (("--fri", "1.15", "--fri-network", "loss=2"), "loss must be in [0, 1]"),
         (("--fri", "1.15", "--fault", "explode@1"), "not understood"),
-        (("--fri", "1.15", "--key-file", "x"), "--key-file cannot be used with --fri"),
+        (("--fri", "1.15", "--key-file", "x"), "--key-file cannot be used with heptarm sim fri"),
     ],
 )
 def test_what_no_cabinet_would_do_is_refused_in_words(arguments: tuple[str, ...], why: str) -> None:

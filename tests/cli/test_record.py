@@ -46,10 +46,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory, cabinet: RunningCabinet) 
 
 def test_an_observer_records_the_motions_of_another_client(recorded: Path) -> None:
     run = ha.load(recorded)
-    assert run.complete and len(run) > 50 and [one.text for one in run.notes] == ["third try"]
+    assert run.complete and len(run) > 50 and [note.text for note in run.notes] == ["third try"]
     assert run.motions and run.motions[0].id in set(run["motion"].tolist())
     assert any(
-        one.kind == "signals" and "control mode" in one.text for one in run.events
+        event.kind == "signals" and "control mode" in event.text for event in run.events
     )  # all groups are recorded
 
 
@@ -92,5 +92,5 @@ def test_for_some_seconds_with_pictures(cabinet: RunningCabinet, tmp_path: Path)
 def test_a_mistake_is_one_sentence(
     recorded: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
-    done = run(*(one.format(recorded=recorded, folder=tmp_path) for one in arguments))
+    done = run(*(argument.format(recorded=recorded, folder=tmp_path) for argument in arguments))
     assert done.returncode == 1 and words in done.stderr and "Traceback" not in done.stderr

@@ -1,4 +1,4 @@
-"""`heptarm sim --app` with the samples on heptarm's core, which stream targets: they need a machine that has time."""
+"""`heptarm sim app` with the samples on heptarm's core, which stream targets: they need a machine that has time."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +21,8 @@ pytest.importorskip("viser")
     [
         (("--meshes", "."), "--meshes needs --view or --panel"),
         (("--view", "--meshes", "/nowhere"), "meshes must be a folder with link_0.stl to link_7.stl"),
-        (("--fri", "2.5", "--meshes", "."), "--meshes cannot be used with --fri"),
-        (("--app", ".", "--meshes", "."), "--meshes cannot be used with --app"),
+        (("--fri", "2.5", "--meshes", "."), "--meshes cannot be used with heptarm sim fri"),
+        (("--app", ".", "--meshes", "."), "--meshes needs --view"),
     ],
 )
 def test_meshes_that_nobody_could_see_are_refused(words: tuple[str, ...], text: str) -> None:
@@ -29,7 +30,7 @@ def test_meshes_that_nobody_could_see_are_refused(words: tuple[str, ...], text: 
     assert done.returncode != 0 and text in done.stderr
 
 
-def _picture(browser: object) -> np.ndarray:
+def _picture(browser: Any) -> np.ndarray:
     """The middle of the page, where the arm is: without the readouts and the browser's notes."""
     from matplotlib.image import imread
 
@@ -59,7 +60,7 @@ def _settled(browser: object, patience: float = 60.0) -> np.ndarray:
 
 
 @pytest.mark.browser
-def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) -> None:
+def test_the_view_shows_the_arm_and_follows_it(browser: Any, tmp_path: Path) -> None:
     own = Path(ha.__file__).parent / "sim" / "models" / "meshes"
     for part in [*(own / "lbr").iterdir(), *(own / "iiwa14").iterdir()]:
         (tmp_path / part.name).write_bytes(part.read_bytes())

@@ -13,7 +13,7 @@ import numpy as np
 
 import heptarm as ha
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal, TrajectoryPoint
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.conformance.client import Client, ReceivedFeedback, ReceivedResult, SentGoal
 
 Case = Callable[[Client], None]

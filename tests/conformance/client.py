@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal
 from heptarm.ros.trajectory.trajectory import KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class SentGoal:
 
     accepted: bool
     code: ErrorCode | None = None
-    handle: object = None
+    handle: Any = None
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from heptarm._library import SWITCH
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState
 from heptarm.sim.runtime import cabinet as virtual
 
 #: Delay of an arm that lags, in ticks.
@@ -88,14 +87,14 @@ def _listen() -> None:
 
 
 if __name__ == "__main__":
-    os.environ[SWITCH] = "1"  # the laws are Python functions, which may be replaced
+    ActiveLaw.is_plain = property(lambda control: False)  # type: ignore[assignment]  # every tick asks for its torque
     unruly = _Unruly(ActiveLaw.torque)
 
     def torque(control: ActiveLaw, sensed: MeasuredState) -> Any:
         """Torque of the law for the modified set-points."""
         return unruly.torque(control, sensed)
 
-    ActiveLaw.torque = torque  # type: ignore[method-assign]
-    virtual.VirtualCabinet = _Cabinet  # type: ignore[misc]
+    ActiveLaw.torque = torque  # type: ignore[method-assign, assignment]
+    virtual.VirtualCabinet = _Cabinet  # type: ignore[misc, assignment]
     threading.Thread(target=_listen, daemon=True).start()
     sys.exit(virtual.main())

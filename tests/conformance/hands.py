@@ -130,7 +130,7 @@ def case_triggers_write_outputs_and_notify(probe: Probe, stage: Stage) -> None:
     until(
         lambda: {feedback.item for feedback in list(sent.reported)} == {0, 1, 2}, "not every item is reported"
     )
-    fed = [one for feedback in sent.reported for one in feedback.events]
+    fed = [event for feedback in sent.reported for event in feedback.events]
     assert fed[0].kind == "begun" and any(feedback.remaining > 0.0 for feedback in sent.reported)
     number = fed[0].motion
     last = ("ended", 2)
@@ -176,7 +176,9 @@ def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage
         return len(states) > count + 50
 
     until(received, "no states")
-    assert not any(one.motion for one in states[count:]), "a servo topic is not followed after a collision"
+    assert not any(state.motion for state in states[count:]), (
+        "a servo topic is not followed after a collision"
+    )
     done(probe.call("collision_guard", "SetCollisionGuard", disable=True))
     home(probe)
     answer = done(
@@ -189,7 +191,7 @@ def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage
     count, first = len(seen), len(states)
     assert not act(probe, "move_pose", "MovePose", **down).success
     until(lambda: len(seen) > count, "no collision is reported")
-    until(lambda: len({one.motion for one in states[first:]} - {0}) == 2, "the arm is not compliant")
+    until(lambda: len({state.motion for state in states[first:]} - {0}) == 2, "the arm is not compliant")
     home(probe)  # the guard is disabled, and a command replaces the compliant hold
     refused(probe.call("collision_guard", "SetCollisionGuard", threshold=[-1.0]), "threshold")
     refused(probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "soft")

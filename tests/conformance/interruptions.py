@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.conformance.case import (
     REST,
     TOUCH,

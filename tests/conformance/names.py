@@ -154,7 +154,7 @@ def a_program_for_lbr_stack(probe: NamesProbe) -> None:
         begin = here[6]
         there = begin + (1.0 if to > begin else -1.0) * min(0.004 * pushed, abs(to - begin))
         probe.tell(topic, kind, **{field: [*here[:6], there]})()
-        return abs(states[-1].position[6] - to) < 5e-3
+        return bool(abs(states[-1].position[6] - to) < 5e-3)
 
     goal = here[6] + 0.2
     until(

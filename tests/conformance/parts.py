@@ -24,7 +24,8 @@ def select(config: pytest.Config, items: list[pytest.Item]) -> None:
     if part is None:
         return
     assert part in PARTS, part
-    kept, left = [], []
+    kept: list[pytest.Item] = []
+    left: list[pytest.Item] = []
     for item in items:
         (kept if _part(item) == part else left).append(item)
     items[:] = kept

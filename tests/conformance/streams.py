@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.conformance.case import (
     REST,
     STALL,

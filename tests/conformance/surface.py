@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,7 +27,7 @@ PROJECT = f"""<persistence><processDataContainer>
 <processData dataType="java.lang.Integer" id="cell.count" value="3"/>
 </processDataContainer></persistence>"""
 #: Parameters of the node.
-PARAMETERS: dict[str, object] = {
+PARAMETERS: dict[str, Any] = {
     "publish_signals": True,
     "publish_tf": True,
     "speed": 0.6,
@@ -211,7 +212,7 @@ def case_a_guard_ends_commands_and_servo_topics(probe: Probe, stage: Stage) -> N
 
     def turned() -> bool:
         turn()
-        return states[-1].position[6] > 0.1
+        return bool(states[-1].position[6] > 0.1)
 
     until(turned, "the arm does not follow")
     stage.do("set UserButton true")
@@ -243,7 +244,7 @@ def case_a_servo_topic_follows_lines(probe: Probe, stage: Stage) -> None:
 
     def arrived() -> bool:
         follow()
-        return abs(seen[-1].pose.position.y - target.position.y) < 2e-3
+        return bool(abs(seen[-1].pose.position.y - target.position.y) < 2e-3)
 
     until(arrived, "the flange does not follow")
     states = probe.listen("state", "heptarm_msgs/RobotState")
@@ -388,9 +389,9 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
         return stands("monitor", io=["LEDRed"]) and status[-1].received > 10
 
     until(watched, "nothing is received")
-    again = lambda: probe.call("fri/open", "OpenFri", kind="monitor", period_ms=10, io=["LEDRed"])  # noqa: E731
+    again = partial(probe.call, "fri/open", "OpenFri", kind="monitor", period_ms=10, io=["LEDRed"])
     until(lambda: "close it first" in again().message, "a second session is not refused")
-    lit = lambda: probe.call("fri/set_outputs", "SetSignals", names=["LEDRed"], values=[1.0])  # noqa: E731
+    lit = partial(probe.call, "fri/set_outputs", "SetSignals", names=["LEDRed"], values=[1.0])
     until(lambda: stands("monitor", io=["LEDRed"]) and lit().success, "the output is not set")
     done(probe.call("fri/close", "std_srvs/Trigger"))
     until(lambda: not status[-1].kind, "the status does not tell of the end")
@@ -401,7 +402,7 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
         if not stands("position"):
             return False
         turn()
-        return abs(states[-1].position[6] - target_a7) < 2e-3
+        return bool(abs(states[-1].position[6] - target_a7) < 2e-3)
 
     until(arrived, "the arm does not follow FRI")
     done(probe.call("fri/close", "std_srvs/Trigger"))
@@ -440,7 +441,7 @@ def case_forward_controllers_are_followed(probe: Probe, stage: Stage) -> None:
         pushed = min(pushed + 1, 60)
         data = [*HOME[:6], start + 0.004 * pushed]
         probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=data)()
-        return abs(states[-1].position[6] - start - 0.24) < 5e-3
+        return bool(abs(states[-1].position[6] - start - 0.24) < 5e-3)
 
     until(push, "the positions are not followed")
     until(

@@ -77,8 +77,7 @@ def _scaled(client: Client, factor: float) -> None:
         ended = client.result(sent)
         assert ended.outcome is GoalOutcome.SUCCEEDED, ended
         reported = client.feedback(sent)
-        late = [one for one in reported if one.elapsed > 0.3]
-        for one in late:
+        for one in [one for one in reported if one.elapsed > 0.3]:
             late = one.time - factor * one.elapsed
             # a spline of the cabinet takes less time than a trajectory that is slower than it need be
             assert abs(late) < (0.02 if client.timely else 0.4), (one.time, one.elapsed)

@@ -150,11 +150,11 @@ def test_a_virtual_pad_of_the_kernel_is_found_and_read() -> None:
     import evdev
 
     axes = [(code, evdev.AbsInfo(0, low, high, 0, 0, 0)) for code, (low, high) in RANGES.items()]
-    with evdev.UInput({KEY: [A, B, LB, START], ABSOLUTE: axes}, name="heptarm test pad") as virtual:
+    with evdev.UInput({KEY: [A, B, LB, START], ABSOLUTE: axes}, name="heptarm test pad") as virtual:  # type: ignore[dict-item]
         deadline = time.monotonic() + 20.0
-        while not Path(virtual.device.path).exists() and time.monotonic() < deadline:
+        while not Path(str(virtual.device.path)).exists() and time.monotonic() < deadline:
             time.sleep(0.01)
-        with devices.gamepad(virtual.device.path) as pad:
+        with devices.gamepad(str(virtual.device.path)) as pad:
             assert pad.name == "heptarm test pad"
             virtual.write(KEY, LB, 1)
             virtual.write(ABSOLUTE, LY, -32768)

@@ -10,7 +10,7 @@ import pytest
 
 from heptarm import devices
 from heptarm.devices.device import without_dead_zone
-from heptarm.devices.stream import RecordedDevice, RecordingDevice, SyntheticDevice
+from heptarm.devices.virtual import RecordedDevice, RecordingDevice, SyntheticDevice
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.io.clock import StepClock
 
@@ -74,7 +74,7 @@ def test_a_recording_replays_with_its_times_buttons_and_roles(tmp_path: Path) ->
     for _ in range(25):
         states.append(again.read())
         clock.step(0.1)
-    forward = [one.twist[0] for one in states]
+    forward = [state.twist[0] for state in states]
     np.testing.assert_allclose(forward, [0.0] * 10 + [1.0] * 10 + [0.0] * 5, atol=1e-9)
     assert states[7].buttons == {"LB"} and not states[2].buttons and not states[-1].buttons
 

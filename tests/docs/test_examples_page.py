@@ -33,6 +33,6 @@ def test_the_page_is_up_to_date(pictures: ModuleType) -> None:
 
 
 def test_each_number_is_that_of_one_example(pictures: ModuleType) -> None:
-    numbers = Counter(one.number for one in pictures.examples())
+    numbers = Counter(example.number for example in pictures.examples())
     assert len(numbers) > 15 and max(numbers.values()) == 1, numbers
     assert not set(pictures.PLOTS) - set(numbers), "plots of examples that there are not"

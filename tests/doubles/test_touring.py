@@ -149,5 +149,5 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
 
 def test_a_project_file_reports_classes_of_tools_and_arms_of_frames(project: Path) -> None:
     found = templates.read_project(project)
-    assert [one.type for one in found.templates] == ["sample.Pen"]
+    assert [template.type for template in found.templates] == ["sample.Pen"]
     assert found.redundancies == (("Table/Corner", (0.25, 2, 28)),)

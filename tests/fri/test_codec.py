@@ -6,7 +6,7 @@ import zlib
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from heptarm.fri.protocol import messages as m
@@ -54,7 +54,6 @@ def test_command_round_trip(wire: Version, data: st.DataObject) -> None:
 
 
 @every_version
-@settings(max_examples=80)
 @given(data=st.data(), raw=st.binary(max_size=200))
 def test_any_bytes_only_raise_malformed(wire: Version, data: st.DataObject, raw: bytes) -> None:
     good = bytearray(codec.encode_monitoring(data.draw(some.monitorings(wire)), wire))

@@ -11,8 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard.joint_guard import Limited, Limits
+from heptarm.fri.guard.joint_guard import JointReport, Limited, Limits
 from heptarm.values.robot import robot
+from tests.long import longer
 from tests.oracles.fri.joint_guard import JointGuard, brake, overrun
 
 LIMITS = Limits.of(robot("iiwa14"))
@@ -75,7 +76,7 @@ def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
     return targets
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=longer(15, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(targets=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
 def test_whatever_is_asked_the_limits_hold(
     targets: list[tuple[float, ...] | None], period: float, data: st.DataObject
@@ -90,7 +91,7 @@ def test_whatever_is_asked_the_limits_hold(
     assert np.abs(guard.v).max() < 1e-12, "and it can always be brought to a stop"
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=longer(50, 150), deadline=None)
 @given(
     v=st.floats(-1, 1),
     a=st.floats(-1, 1),
@@ -215,3 +216,31 @@ def test_limits_without_room_are_refused() -> None:
         Limits.of(robot("iiwa7"), margin=4.0)
     with pytest.raises(LimitError, match=r"fraction must be in \(0, 1\], got 0"):
         Limits.of(robot("iiwa7"), fraction=0.0)
+
+
+def test_limits_of_a_robot_lie_slightly_inside_its_own() -> None:
+    arm, limits = robot("iiwa14"), Limits.of(robot("iiwa14"))
+    for name in ("dq_max", "ddq_max", "dddq_max", "tau_max"):
+        assert getattr(limits, name) == pytest.approx(0.95 * getattr(arm, name)), name
+        assert getattr(Limits.of(arm, fraction=0.5), name) == pytest.approx(0.5 * getattr(arm, name)), name
+    assert limits.q_min == pytest.approx(arm.q_min + math.radians(1.0))
+    assert limits.q_max == pytest.approx(arm.q_max - math.radians(1.0))
+    assert limits.dtau_max == pytest.approx(20.0 * 0.95 * arm.tau_max)
+    assert limits.wrench_max == (150.0,) * 3 + (50.0,) * 3
+    assert limits.dwrench_max == (3000.0,) * 3 + (1000.0,) * 3
+    assert limits.reach == math.inf and Limits.of(arm, fraction=1.0).tau_max == tuple(arm.tau_max)
+
+
+def test_a_report_counts_each_quantity_and_keeps_the_worst_with_what_was_allowed_then() -> None:
+    assert [(one.name, one.value) for one in Limited] == [
+        *(("NOT_FINITE", 0), ("POSITION", 1), ("VELOCITY", 2), ("ACCELERATION", 3)),
+        *(("JERK", 4), ("TORQUE", 5), ("WRENCH", 6)),
+    ], "as in C"
+    report = JointReport()
+    for asked, allowed in ((3.0, 1.0), (-4.0, -1.5), (4.0, 1.25), (2.0, 1.0)):
+        report.add(Limited.VELOCITY, 3, asked, allowed)
+    report.add(Limited.WRENCH, 2, 200.0, 150.0)
+    assert report.lines == [
+        "A4: velocity limited in 4 cycles: 4 rad/s requested, 1.25 allowed",
+        "wrench[2]: wrench limited in 1 cycle: 200 N or Nm requested, 150 allowed",
+    ]

@@ -216,8 +216,8 @@ def oracle_of_command(value: m.Command, classes: dict[str, Any]) -> Any:
     )
     for field in ("q", "wrench", "tau"):
         _joints(made.data, field, getattr(value, field))
-    for one in value.transformations:
-        _frame(made.data.frames.add(), one)
+    for transformation in value.transformations:
+        _frame(made.data.frames.add(), transformation)
     _ios(made.data.io, value.io)
     if value.pose is not None:
         _frame(made.data.pose, value.pose)

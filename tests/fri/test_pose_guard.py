@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.fri.guard.pose_guard import PoseLimited, PoseLimits, PoseReport
+from tests.long import longer
 from tests.oracles.fri.pose_guard import PoseGuard, between, moved
 
 LIMITS = PoseLimits()
@@ -130,7 +131,7 @@ targets = st.lists(
 
 
 @given(targets, st.sampled_from([1e-3, 5e-3]))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=longer(15, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_whatever_is_asked_the_limits_are_kept(asked: list[tuple[object, int]], period: float) -> None:
     guard = begun(period=period)
     sent = run(guard, [wanted for wanted, count in asked for _ in range(count)])
@@ -150,7 +151,7 @@ def test_a_limit_that_is_none() -> None:
     targets=st.lists(st.floats(-3.0, 3.0) | st.just(NAN) | st.none(), min_size=1, max_size=20),
     speed=st.floats(-0.9, 0.9),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=longer(20, 60), deadline=None)
 def test_the_elbow_keeps_its_limits_too(targets: list[float | None], speed: float) -> None:
     guard, begin = PoseGuard(LIMITS), 0.3
     guard.start(START, period=1e-3, e1=begin, e1_speed=speed * LIMITS.elbow_velocity)
@@ -175,3 +176,14 @@ def test_an_elbow_reaches_its_target_and_the_report_names_it() -> None:
     assert guard.e1 == 0.8
     assert any("elbow: velocity limited" in line for line in guard.report.lines)
     assert any("elbow: target not finite" in line for line in guard.report.lines)
+
+
+def test_a_report_keeps_the_worst_and_what_was_allowed_then() -> None:
+    report = PoseReport()
+    for asked, allowed in ((3.0, 1.0), (4.0, 1.5), (4.0, 1.25), (2.0, 1.0)):
+        report.add(PoseLimited.VELOCITY, 0, asked, allowed)
+    report.add(PoseLimited.NOT_FINITE, 1, 0.0, 0.0)
+    assert report.lines == [
+        "rotation: target not finite in 1 cycle; the last one was kept",
+        "flange: velocity limited in 4 cycles: 4 m/s requested, 1.25 allowed",
+    ]

@@ -96,7 +96,7 @@ def test_a_session_from_idle_to_commanding_and_back(wire: Version) -> None:
         assert one is not None and one.q == echo and one.tau is None
     assert mirror is not None and mirror.q == IPO, "COMMANDING_WAIT mirrors, whatever is wanted"
     assert active is not None and active.q == target
-    assert [one.header for one in answers if one] == [m.Header(i, i + 1) for i in range(5)]
+    assert [answer.header for answer in answers if answer] == [m.Header(i, i + 1) for i in range(5)]
     assert kinds(session).count(Kind.STATE) == 6
     assert session.counters.answered == 5 and session.counters.commanded == 1 and session.counters.lost == 0
 
@@ -373,7 +373,7 @@ class Exchange(RuleBasedStateMachine):
 
     @invariant()
     def counters_grow_by_one(self) -> None:
-        assert [one.header.sequence for one in self.answers] == list(range(len(self.answers)))
+        assert [answer.header.sequence for answer in self.answers] == list(range(len(self.answers)))
         if self.sent:
             assert self.session.state is self.state
 

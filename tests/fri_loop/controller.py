@@ -94,10 +94,10 @@ class Controller:
                 raw = self._sock.recv(2048)
                 self.answers.append(codec.decode_command(raw, self.wire))
                 self._reflected = self.answers[-1].header.sequence
-        raw = self.mangle(self.datagram())
-        if raw is not None:
+        sent = self.mangle(self.datagram())
+        if sent is not None:
             with contextlib.suppress(ConnectionRefusedError):
-                self._sock.sendto(raw, ("127.0.0.1", self.port))
+                self._sock.sendto(sent, ("127.0.0.1", self.port))
         self.sequence += 1
 
     def _run(self) -> None:

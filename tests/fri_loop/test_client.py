@@ -19,11 +19,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from heptarm._library import SWITCH, Unavailable
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, NotReady, ShapeError, Timeout
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop.client import Client
-from heptarm.fri.loop.native import library
 from heptarm.fri.loop.process import importable
 from heptarm.fri.loop.settings import ClientKeywords, LoopSettings
 from heptarm.fri.loop.shared_memory import PID
@@ -438,14 +436,6 @@ def test_what_the_system_refuses_is_said_plainly() -> None:
             assert "limits.conf" in line
         policy = os.sched_getscheduler(int(client._header[PID]))
         assert policy == os.SCHED_FIFO or "no real-time priority" in client.refused[0]
-
-
-def test_without_the_extension_it_reports_so_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(SWITCH, "1")
-    library.cache_clear()
-    with pytest.raises(Unavailable, match=SWITCH):
-        Client(0, realtime=False)
-    library.cache_clear()
 
 
 def test_a_new_setting_is_written_once() -> None:

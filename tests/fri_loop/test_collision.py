@@ -144,7 +144,7 @@ def test_a_client_reports_the_collision() -> None:
             for _ in client:
                 if client.collision is not None:
                     break
-            assert client.collision.joint == 6 and client.collision.torque == pytest.approx(11.0)
+            assert (client.collision.joint, client.collision.torque) == (6, pytest.approx(11.0))  # type: ignore[attr-defined]
             assert any(COLLIDED in one.text for one in client.events())
     with pytest.raises(ShapeError, match="collision"):
         Client(0, collision=10.0)  # type: ignore[arg-type]

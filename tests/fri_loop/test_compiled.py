@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import threading
 import time
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import heptarm as ha
@@ -28,7 +30,7 @@ from .test_cycle import Bench
 
 SOURCE = Path(__file__).with_name("compiled_laws.c")
 OFFSET = {"offset": [0.02] * 7}
-FILTER = {"x": [0.0] * 7, "calls": 0.0}
+FILTER: dict[str, npt.ArrayLike] = {"x": [0.0] * 7, "calls": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +88,7 @@ def test_parameters_and_memory_are_live_and_the_law_keeps_what_it_knows(kind: st
 def test_the_three_forms_agree(laws: Path) -> None:
     """The same messages: Python, Numba and C answer the same, and see the same velocities and times."""
     sent, seen = [], []
-    for law in (looking.__wrapped__, looking, ha.law_from(laws, "looking", memory=looking.memory)):
+    for law in (inspect.unwrap(looking), looking, ha.law_from(laws, "looking", memory=looking.memory)):
         settings = LoopSettings(law=law, memory=looking.memory, history=256)
         bench = Bench(settings=settings)
         bench.activate()
@@ -136,7 +138,9 @@ def test_a_law_that_fails_brakes_the_arm_and_is_named(what: int, words: str, law
             assert any("the law failed, the arm brakes: " in one and words in one for one in events)
             controller.settle()
             last = [one.q for one in controller.answers[-2:]]
-            assert last[0] == last[1] and np.isfinite(last[0]).all(), "the loop answers on, at rest"
+            assert last[0] == last[1] is not None and np.isfinite(last[1]).all(), (
+                "the loop answers on, at rest"
+            )
             assert client.is_running and client.state.q_sent == pytest.approx(last[0])
             assert what != 5 or client.stats.overruns >= 10
 

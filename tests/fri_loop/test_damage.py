@@ -9,6 +9,7 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,7 +87,7 @@ class Hostile:
         message = codec.decode_monitoring(controller.datagram(), self.wire)
         monitor, ipo = message.monitor, message.ipo
         assert monitor is not None
-        lacking: dict[str, object] = [
+        variants: list[dict[str, Any]] = [
             {},
             {},
             {},
@@ -94,7 +95,8 @@ class Hostile:
             {"q_cmd": None},
             {"tau_ext": None},
             {"pose": None},
-        ][variant % 7]  # type: ignore[assignment]
+        ]
+        lacking = variants[variant % 7]
         if variant == 7:
             monitor = replace(monitor, stamp=m.TimeStamp(2**32 - 1, 2**32 - 1))
         if variant == 8:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -76,7 +77,7 @@ class Twins:
         controller._reflected = max(0, self.pure.cycle.session.sent - 1)
         self.message(datagram)
 
-    def command(self, **numbers: object) -> None:
+    def command(self, **numbers: Sequence[float]) -> None:
         """A command for both."""
         words = np.zeros(at.COMMAND_WORDS)
         given = 0
@@ -87,7 +88,7 @@ class Twins:
         }
         for name, values in numbers.items():
             bit, start = places[name]
-            words[start : start + len(values)] = values  # type: ignore[arg-type]
+            words[start : start + len(values)] = values
             given |= bit
         for bench in (self.pure, self.other):
             bench.give(words.copy(), given)

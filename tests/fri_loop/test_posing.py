@@ -73,7 +73,7 @@ def test_a_commanded_pose_is_reached_without_a_jump_and_reported_in_metres() -> 
     assert np.linalg.norm(speeds[:, :3], axis=1).max() <= 0.2500001
     assert np.abs(np.diff(speeds[:, :3], axis=0)).max() * 1e3 <= 1.000001
     assert bench.states[-1].pose_sent.array.tolist() == pytest.approx(goal.array.tolist())
-    name, values = bench.sent[-1].pose.name, bench.sent[-1].pose.values  # type: ignore[union-attr]
+    name, values = bench.sent[-1].pose.name, bench.sent[-1].pose.values
     assert name == "ipo" and values == pytest.approx(
         (150.0, 200.0, 300.0, math.cos(0.1), 0.0, 0.0, math.sin(0.1))
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from functools import partial
 
 import numpy as np
 import pytest
@@ -103,7 +104,8 @@ def test_redundancy_strategy_and_receive_multiplier_are_read() -> None:
     plain = twins.pure.controller.datagram
     for strategy in (m.RedundancyStrategy.E1, m.RedundancyStrategy.NONE):
         redundancy = m.Redundancy(strategy, 0.3)
-        twins.pure.controller.datagram = lambda one=redundancy: _with(plain(), Version.V2_5, redundancy=one)  # type: ignore[method-assign]
+        replies = partial(lambda one: _with(plain(), Version.V2_5, redundancy=one), redundancy)
+        twins.pure.controller.datagram = replies  # type: ignore[method-assign]
         twins.step()
         twins.step()
         state = twins.pure.states[-1]

@@ -8,6 +8,7 @@ of KUKA's classes in the doubles are not ours.
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -71,6 +72,7 @@ def _java() -> dict[str, set[str]]:
     return places
 
 
+@functools.cache
 def duplicates() -> dict[str, list[str]]:
     """Names with more than one place."""
     places = _python()

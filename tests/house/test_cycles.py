@@ -7,6 +7,7 @@ package's own `__init__` counts where somebody imports a name from it, not where
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,6 +47,7 @@ def _targets(node: ast.Import | ast.ImportFrom, package: str, known: dict[str, P
             yield base
 
 
+@functools.cache
 def imports() -> dict[str, set[str]]:
     """For each module those that it imports anywhere in it."""
     known = _modules()

@@ -138,8 +138,8 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="a shell script")
 def test_locked_files_are_installed_with_their_checksums(tmp_path: Path) -> None:
     code, _, calls = set_up(tmp_path)
     assert code == 0
-    assert all("--require-hashes --no-deps" in one for one in calls if ".txt" in one)
-    assert any("dev.txt" in one for one in calls)
+    assert all("--require-hashes --no-deps" in call for call in calls if ".txt" in call)
+    assert any("dev.txt" in call for call in calls)
     assert "-m pip install -q --no-deps --no-build-isolation -e ." in calls
     assert "-m pip install -q -e .[dev]" not in calls
 
@@ -149,7 +149,7 @@ def test_locked_files_are_installed_with_their_checksums(tmp_path: Path) -> None
 def test_a_file_with_another_content_ends_the_set_up(tmp_path: Path, which: str) -> None:
     code, said, calls = set_up(tmp_path, **{which: WRONG})
     assert code != 0 and "not the one that scripts/lock" in said
-    assert not any(" -e " in one for one in calls), "it goes on without checksums"
+    assert not any(" -e " in call for call in calls), "it goes on without checksums"
 
 
 @posix
@@ -164,11 +164,11 @@ def test_another_build_of_torch_is_taken_and_all_the_rest_is_checked(tmp_path: P
     code, said, calls = set_up(tmp_path, torch=MISSING)
     assert code == 0 and "another build is installed, without a checksum" in said
     assert "-m pip install -q torch==2.13.0" in calls
-    assert any("--require-hashes" in one and "dev.txt" in one for one in calls)
+    assert any("--require-hashes" in call and "dev.txt" in call for call in calls)
     assert "-m pip install -q -e .[dev]" not in calls
 
 
 @posix
 def test_a_smaller_set_up_is_not_locked(tmp_path: Path) -> None:
     code, said, calls = set_up(tmp_path, extras="sim,viz")
-    assert code == 0 and not said and not any("lock" in one for one in calls)
+    assert code == 0 and not said and not any("lock" in call for call in calls)

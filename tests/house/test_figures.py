@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import json
+import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
@@ -114,14 +116,14 @@ def test_a_benchmark_that_fails_keeps_what_it_measured(
 
 
 def test_value_and_floor_take_turns_in_blocks_and_processors_come_back() -> None:
-    before, order = blocks.os.sched_getaffinity(0), []
+    before, order = os.sched_getaffinity(0), []
     places: list[str] = []
     found = blocks.by_turns(
-        lambda: order.append("value") or [2.0, 4.0, 6.0],  # type: ignore[func-returns-value]
-        lambda: order.append("floor") or [1.0, 2.0, 3.0],  # type: ignore[func-returns-value]
+        lambda: order.append("value") or [2.0, 4.0, 6.0],
+        lambda: order.append("floor") or [1.0, 2.0, 3.0],
         lambda placement: places.append(placement.name),
     )
-    assert blocks.os.sched_getaffinity(0) == before
+    assert os.sched_getaffinity(0) == before
     assert places[: len(found)] == [one.placement.name for one in found]
     assert order[: 2 * len(found)] == ["value", "floor"] * len(found)
     assert order[2 * len(found) : 4 * len(found)] == ["floor", "value"] * len(found)
@@ -148,7 +150,7 @@ def test_a_stored_benchmark_replaces_its_figures_and_leaves_the_others(
 def test_unknown_names_are_refused(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(command.sys, "argv", ["bench", "--group", "frei"])
+    monkeypatch.setattr(sys, "argv", ["bench", "--group", "frei"])
     assert command.main() == 2
     assert "no group 'frei'; there are contact, fri, lab, motion" in capsys.readouterr().err
 

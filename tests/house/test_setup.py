@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -10,8 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "cabinet"), str(ROOT / "scripts")]
 
-import setup_jdk  # noqa: E402
 import toolchain  # noqa: E402
+from scripts import setup_jdk  # noqa: E402
 
 
 @pytest.fixture
@@ -23,7 +25,7 @@ def no_jdk(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_root_it_stops_with_the_command_to_type(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(setup_jdk.os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert setup_jdk.main() == 1
     said = capsys.readouterr().err
     assert "apt-get install -y --no-install-recommends openjdk-17-jdk-headless ecj" in said
@@ -32,8 +34,8 @@ def test_without_root_it_stops_with_the_command_to_type(
 @pytest.mark.usefixtures("no_jdk")
 def test_as_root_on_debian_it_installs_once(monkeypatch: pytest.MonkeyPatch) -> None:
     installed: list[bool] = []
-    monkeypatch.setattr(setup_jdk.os, "geteuid", lambda: 0)
-    monkeypatch.setattr(setup_jdk.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(shutil, "which", lambda name: f"/usr/bin/{name}")
     monkeypatch.setattr(setup_jdk, "_install", lambda: installed.append(True))
     assert setup_jdk.main() == 1
     assert installed == [True]
@@ -42,6 +44,6 @@ def test_as_root_on_debian_it_installs_once(monkeypatch: pytest.MonkeyPatch) -> 
 def test_missing_eclipse_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(toolchain, "_ECJ_JARS", ())
     monkeypatch.delenv("ECJ_JAR", raising=False)
-    monkeypatch.setattr(toolchain.shutil, "which", lambda name: None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(toolchain.ToolMissing, match="ecj"):
         toolchain.find_ecj(toolchain.Jdk(ROOT))

@@ -48,7 +48,13 @@ KINDS = {
 }
 KINDS |= {".sh", ".launch", ".cfg", ".json", ".txt", ".rst"}
 #: Not in our words: KUKA's names in the doubles, upstream's interfaces, builds, and the list of the words itself.
-FOREIGN = ("cabinet/doubles/src/com/", "cabinet/doubles/src/javax/", "/interfaces/", "docs/_build/", "/jars/")
+FOREIGN: tuple[str, ...] = (
+    "cabinet/doubles/src/com/",
+    "cabinet/doubles/src/javax/",
+    "/interfaces/",
+    "docs/_build/",
+    "/jars/",
+)
 FOREIGN += ("tests/house/test_words.py",)
 SHOWN = 60
 
@@ -118,8 +124,8 @@ RULES = (
     Rule(r"\b(?:class|interface|enum|record) Desk\b", "ApplicationServices", exact=True),
     Rule(r"\b(?:class|interface|enum|record) \w*Insight\b", "SimulatorProbe", exact=True),
 )
-#: Any of the words, in words and in a text as it stands: a quick check, since most lines have none.
-_ANY = re.compile(rf"(?<!\w)(?:{'|'.join(rule.word for rule in RULES if not rule.exact)})(?!\w)", re.I)
+#: Any of the words, in lower case and in a text as it stands: a quick check, since most texts and lines have none.
+_ANY = re.compile(rf"\b(?:{'|'.join(rule.word for rule in RULES if not rule.exact)})\b")
 _ANY_EXACT = re.compile("|".join(rule.word for rule in RULES if rule.exact))
 _INSIDE = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_")
 
@@ -134,11 +140,16 @@ def files() -> Iterator[Path]:
                 yield path
 
 
+def has_any(text: str) -> bool:
+    """Whether a text has a word that may be one of those that are not used."""
+    return bool(_ANY.search(_INSIDE.sub(" ", text).lower()) or _ANY_EXACT.search(text))
+
+
 def found_in(line: str) -> Iterator[tuple[str, Rule]]:
     """The words of a line that are not used."""
-    words = _INSIDE.sub(" ", line)
-    if not _ANY.search(words) and not _ANY_EXACT.search(line):
+    if not has_any(line):
         return
+    words = _INSIDE.sub(" ", line)
     for rule in RULES:
         text = line if rule.exact else words
         pattern = rule.word if rule.exact else rf"(?i:(?<!\w)(?:{rule.word})(?!\w))"
@@ -152,7 +163,8 @@ def test_the_words_are_the_fields() -> None:
     lines: list[str] = []
     count: Counter[str] = Counter()
     for path in files():
-        for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        text = path.read_text(encoding="utf-8", errors="replace")
+        for number, line in enumerate(text.splitlines() if has_any(text) else (), 1):
             for word, rule in found_in(line):
                 count[f"{word.lower()} -> {rule.instead}"] += 1
                 lines.append(f"{path.relative_to(ROOT)}:{number}: {word!r}; use: {rule.instead}")

@@ -14,12 +14,12 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.torque_guard import TorqueGuard
 from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.planning.seam import Hold
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors
-from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.robot import Body, robot
 from tests.oracles.fri.joint_guard import JointGuard
 
@@ -62,20 +62,23 @@ def adversary(rng: np.random.Generator) -> tuple[str, Adversary]:
 
 @dataclass
 class Trial:
-    """A torque session of a law; what the plant saw.
+    """A session of a law that commands torques, or a wrench; what the plant saw.
 
     Attributes:
         seed: of the law, the posture, the stiffness, the period and the load.
-        is_guarded: whether the guard of torques is in force.
+        is_guarded: whether the guard of the motion is in force.
+        by_wrench: the law commands a wrench, and the arm is compliant about its flange.
         is_ending: whether the session lets the arm brake in the second half.
     """
 
     seed: int
     is_guarded: bool = True
     is_ending: bool = False
+    by_wrench: bool = False
     speed: Floats = field(default_factory=lambda: np.zeros(7))  # largest fractions of the robot's speeds
     nearest: float = np.inf  # to a position limit [rad]
     final_speed: Floats = field(default_factory=lambda: np.zeros(7))
+    final_effort: Floats = field(default_factory=lambda: np.zeros(7))  # that the law has sent last [Nm, N]
     error: str = ""
     name: str = ""
 
@@ -88,7 +91,7 @@ class Trial:
         start = rng.uniform(0.9 * arm.q_min, 0.9 * arm.q_max)
         plant = Plant(model, q=tuple(start.tolist()), errors=errors)
         plant.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # a clash turns an axis by itself
-        load = Body(float(rng.uniform(0.0, 0.3 * float(rng.choice((1.0, 30.0))))), (0.0, 0.0, 0.08))
+        load = Body(float(rng.uniform(0.0, 0.3 * float(rng.choice((1.0, 30.0))))), np.array((0.0, 0.0, 0.08)))
         plant.set_load_data(load)
         known = load if load.mass > 0.3 else None  # a light one that nobody declared
         self.name = (
@@ -100,23 +103,29 @@ class Trial:
         dt = period * 1e-3
         joints.start(start.tolist(), [0.0] * 7, period=dt)
         guard.start()
-        plant.submit(MotionCommand(1, Hold(duration=nan), mode=JointImpedance(stiffness)))
+        mode = CartesianImpedance(stiffness=(stiffness,) * 6) if self.by_wrench else JointImpedance(stiffness)
+        plant.submit(MotionCommand(1, Hold(duration=nan), mode=mode))
         plant.step(50)
-        set_point, tau, waiting = plant.snapshot.q_cmd, np.zeros(7), np.zeros(7)
+        size = 6 if self.by_wrench else 7
+        limited, guarded = (
+            (joints.force, guard.limit_wrench) if self.by_wrench else (joints.torque, guard.limit)
+        )
+        set_point, effort, waiting = plant.snapshot.q_cmd, np.zeros(size), np.zeros(size)
         before = plant.snapshot.q
         low, high = arm.q_min, arm.q_max
         for k in range(round(seconds * 1e3)):
             if k % period == 0:  # the answer acts one period after its message
-                tau = waiting
+                effort = waiting
                 q = plant.snapshot.q
                 dq, before = (q - before) / dt, q
                 with np.errstate(all="ignore"):
-                    target = joints.torque(law(q, dq, k * 1e-3).tolist())
+                    target = limited(law(q, dq, k * 1e-3)[:size].tolist())
                 braking = self.is_ending and k > 500 * seconds
                 if self.is_guarded:
-                    target = guard.limit(target, q=q, dq=dq, period=dt, is_braking=braking)
+                    target = guarded(target, q=q, dq=dq, period=dt, is_braking=braking)
                 waiting = np.array(target)
-            plant.overlay(Superposition(set_point, tau=tau))
+            by = {"wrench" if self.by_wrench else "tau": effort}
+            plant.overlay(Superposition(set_point, **by))
             plant.tick()
             self.speed = np.maximum(self.speed, np.abs(plant.data.qvel[:7]) / arm.dq_max)
             here = plant.data.qpos[:7]
@@ -124,5 +133,5 @@ class Trial:
             if StopRequest.DRIVE_ERROR in plant.safety.stop_requests:
                 self.error = "drive error"
                 break
-        self.final_speed = plant.data.qvel[:7].copy()
+        self.final_speed, self.final_effort = plant.data.qvel[:7].copy(), effort
         return self

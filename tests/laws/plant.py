@@ -68,7 +68,7 @@ class Plant:
             self.jacobian,
             self._pose,
         )
-        self._library.heptarm_model(*(ctypes.c_void_p(one.ctypes.data) for one in arrays))
+        self._library.heptarm_model(*(ctypes.c_void_p(array.ctypes.data) for array in arrays))
 
     @property
     def place(self) -> Floats:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from heptarm.values.robot import ROBOTS, robot
 
 from .plant import ARM, DT, HOME
 
-READY = {
+READY: dict[str, Callable[[], Any]] = {
     "cartesian_impedance": laws.cartesian_impedance,
     "joint_impedance": laws.joint_impedance,
     "free_guiding": laws.free_guiding,
@@ -76,19 +78,19 @@ SIX, SEVEN = np.ones(6), np.ones(7)
         ("search", "amplitude", -1.0),
     ],
 )
-def test_what_making_a_law_refuses_is_refused_on_the_way(law: str, name: str, value: object) -> None:
+def test_what_making_a_law_refuses_is_refused_on_the_way(law: str, name: str, value: Any) -> None:
     params, sent = live(READY[law]())
     before = np.array(params.words)
     with pytest.raises(CommandRejected) as one:
         setattr(params, name, value)
     with pytest.raises(CommandRejected):
-        params.set(**{name: value})  # type: ignore[arg-type]
+        params.set(**{name: value})
     assert one.value.parameter.startswith(name)
     assert not sent and np.array_equal(params.words, before, equal_nan=True), "nothing is half applied"
     with pytest.raises(CommandRejected):  # by params= of the session, too
         merged(READY[law]().parameters(ARM), {name: value}) if name != "gravity" else params.set(
             gravity=value
-        )  # type: ignore[arg-type]
+        )
 
 
 @pytest.mark.parametrize("name", READY)
@@ -148,7 +150,7 @@ def test_a_program_declares_its_own_parameters() -> None:
         lambda: ha.param(math.nan),
         lambda: ha.param([1.0, 2.0], low=[0.0, 0.0, 0.0]),
         lambda: ha.param("3"),
-        lambda: ha.param(3.0, check="no"),
+        lambda: ha.param(3.0, check="no"),  # type: ignore[arg-type]
         lambda: ha.param(3.0, check=lambda value: "not today"),
     ],
 )

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from heptarm import laws, model
-from heptarm._library import Unavailable
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri import LawTrial
-from heptarm.fri.loop.native import library
 from heptarm.laws.ready import across, shared_library
 from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.pose import Pose
@@ -20,17 +18,15 @@ from heptarm.values.robot import ROBOTS, Body, robot
 
 from .plant import ARM, DT, HOME, Floats, Plant
 
-try:
-    library()
-except Unavailable as reason:
-    pytest.skip(f"no native part: {reason}", allow_module_level=True)
-
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_model_in_c_is_that_of_python(name: str) -> None:
     compiled, arm = ctypes.CDLL(str(shared_library())), robot(name)
     rng = np.random.default_rng(3)
-    for load in (None, Body(2.0, (0.01, 0.02, 0.1), (0.01, 0.02, 0.015, 0.001, 0.0, 0.002))):
+    for load in (
+        None,
+        Body(2.0, np.array((0.01, 0.02, 0.1)), np.array((0.01, 0.02, 0.015, 0.001, 0.0, 0.002))),
+    ):
         for _ in range(5):
             q, dq = rng.uniform(arm.q_min, arm.q_max), rng.uniform(-2.0, 2.0, 7)
             found = [np.zeros(shape) for shape in ((7, 7), 7, 7, (6, 7), 7)]
@@ -167,8 +163,8 @@ def test_free_guiding_is_light_inside_and_a_wall_outside() -> None:
 
 
 def test_free_guiding_holds_joints_inside_their_limits_and_carries_extra_load() -> None:
-    trial = LawTrial(laws.free_guiding(extra=Body(1.5, (0.0, 0.0, 0.1))))
-    weight = model.gravity(ARM, HOME, load=Body(1.5, (0.0, 0.0, 0.1))) - model.gravity(ARM, HOME)
+    trial = LawTrial(laws.free_guiding(extra=Body(1.5, np.array((0.0, 0.0, 0.1)))))
+    weight = model.gravity(ARM, HOME, load=Body(1.5, np.array((0.0, 0.0, 0.1)))) - model.gravity(ARM, HOME)
     assert trial(HOME).tau == pytest.approx(weight, abs=1e-9)
     near = HOME.copy()
     near[5] = ARM.q_max[5] - 0.05

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,29 @@ def test_no_law_brings_an_axis_beyond_its_speed_or_to_a_limit(block: int) -> Non
         assert trial.nearest >= np.radians(1.0), f"{trial.name}: {np.degrees(trial.nearest):.2f} deg"
 
 
+def test_hardly_any_law_of_a_wrench_does_either() -> None:
+    """A wrench has one direction less than the arm, so it cannot brake every axis in every posture."""
+    count = longer(24, 400)
+    found = [Trial(seed, by_wrench=True).run(0.8) for seed in range(count)]
+    errors = [one.name for one in found if one.error]
+    assert len(errors) <= 0.02 * count, errors
+    fast = [one.name for one in found if one.speed.max() > 0.95 or one.nearest < np.radians(-0.5)]
+    assert len(fast) <= 0.1 * count, fast
+
+
+def test_without_the_guard_laws_of_a_wrench_do_break_the_arm() -> None:
+    found = [Trial(seed, is_guarded=False, by_wrench=True).run(0.8) for seed in range(4)]
+    assert sum(bool(one.error) for one in found) >= 3
+
+
+@pytest.mark.parametrize("seed", [9, 12, 15, 21])
+def test_at_the_end_the_torques_unwind_the_spring(seed: int) -> None:
+    """It threw the arm back at 1.4 times an axis' speed when a session ended with a wound spring."""
+    trial = Trial(seed, is_ending=True).run(6.0)
+    assert not trial.error
+    assert np.abs(trial.final_effort).max() < 5.0
+
+
 def test_without_the_guard_such_laws_do_break_the_arm() -> None:
     found = [Trial(seed, is_guarded=False).run(0.8) for seed in (0, 1, 2, 3, 4, 5)]
     assert sum(one.speed.max() > 0.95 or bool(one.error) for one in found) >= 3
@@ -44,10 +69,19 @@ def test_without_the_guard_such_laws_do_break_the_arm() -> None:
 def test_torques_of_a_calm_law_pass_unchanged() -> None:
     tau = [20.0, -30.0, 10.0, 15.0, -5.0, 4.0, -2.0]
     made = guard()
+    assert not made.was_limited
     for _ in range(20):
         assert made.limit(tau, q=HOME, dq=STILL, period=PERIOD) == tau
         assert not made.was_limited
     assert made.report.lines == []
+
+
+def test_a_torque_beyond_its_limit_is_cut_and_reported_by_axis() -> None:
+    made = TorqueGuard(replace(Limits.of(ARM), tau_max=(5.0,) * 7), rigid_bodies(ARM, rotor=ROTOR))
+    made.start()
+    sent = made.limit([8.0, *[0.0] * 6], q=HOME, dq=STILL, period=PERIOD)
+    assert made.was_limited and sent[0] == pytest.approx(5.0)
+    assert made.report.lines == ["A1: torque limited in 1 cycle: 8 Nm requested, 5 allowed"]
 
 
 def test_an_axis_near_its_limit_brakes_and_the_others_keep_their_accelerations() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -21,14 +23,14 @@ from tests.model.arms import random_q
 from tests.oracles import dynamics as oracle
 
 ALL = list(ROBOTS.values())
-LOAD = Body(3.0, (0.02, -0.01, 0.08), (0.02, 0.03, 0.025, 0.001, -0.002, 0.003))
+LOAD = Body(3.0, np.array((0.02, -0.01, 0.08)), np.array((0.02, 0.03, 0.025, 0.001, -0.002, 0.003)))
 
 
 def by_name(robot: RobotModel) -> str:
     return robot.name
 
 
-def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[object, object]:
+def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[Any, Any]:
     """The plant's model reduced to rigid-body dynamics, optionally with a load."""
     mujoco = pytest.importorskip("mujoco")
     from heptarm.sim.plant.world import specification
@@ -73,7 +75,7 @@ def test_links_are_those_of_the_plant(robot: RobotModel) -> None:
     model, _ = mujoco_model(robot)
     links = robot.links
     for index in range(7):
-        body = model.body(f"link_{index + 1}")  # type: ignore[attr-defined]
+        body = model.body(f"link_{index + 1}")
         assert body.mass[0] == links.mass[index]
         assert np.array_equal(body.pos, links.origin[index])
         assert np.abs(body.ipos - links.com[index]).max() < 1e-15
@@ -158,11 +160,11 @@ def test_refuses() -> None:
     with pytest.raises(LimitError, match=r"transition must be in \(0, 10\] rad/s"):
         Friction(1.0, transition=0.0)
     with pytest.raises(LimitError, match=r"mass must be in \[0, 50\] kg, got -1 kg"):
-        Body(-1.0, (0, 0, 0))
+        Body(-1.0, np.zeros(3))
     with pytest.raises(LimitError, match="principal moments 0, 0, 1"):
-        Body(1.0, (0, 0, 0), (0, 0, 1, 0, 0, 0))
+        Body(1.0, np.zeros(3), np.eye(6)[2])
     with pytest.raises(ShapeError, match="com must have shape"):
-        Body(1.0, (0, 0))
+        Body(1.0, (0, 0))  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match="dq must have shape"):
         coriolis(ROBOTS["iiwa7"], np.zeros(7), np.zeros(6))
 

@@ -9,7 +9,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model, planning, shapes
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
 

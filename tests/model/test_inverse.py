@@ -113,7 +113,7 @@ def test_a_path_through_the_wrist_singularity_is_continuous(robot: RobotModel) -
     for k in range(1, 401):
         # turning about the flange's y axis takes A6 from 20 to -20 deg
         pose = first @ Pose.xyz_abc(0, 0, 0, 0, -np.radians(40) * k / 400, 0)
-        following = path.joints(pose.xyz, pose.quat, q)
+        following = path.joints(pose.xyz.tolist(), pose.quat.tolist(), q)
         assert np.abs(following - q).max() < 0.01
         assert np.abs(model.solve(robot, pose, near=q) - q).max() < 0.01
         q = following
@@ -261,7 +261,7 @@ def test_kukas_sample_moves_in_the_null_space(robot: RobotModel) -> None:
     start = deg(0, 20, 0, -110, 0, -40, 90)
     pose, q, path = Pose.from_matrix(model.forward(robot, start)), start, PathInverse(robot, HERE)
     for degrees in (*range(0, -81, -1), *range(-80, 1)):
-        q = path.joints(pose.xyz, pose.quat, q, a3=float(np.radians(degrees)))
+        q = path.joints(pose.xyz.tolist(), pose.quat.tolist(), q, a3=float(np.radians(degrees)))
         robot.check(q)
         assert q[2] == pytest.approx(np.radians(degrees), abs=1e-12)
     assert np.abs(q - start).max() < 1e-6

@@ -11,7 +11,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model, shapes
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
 

@@ -103,9 +103,9 @@ def mutants(source: bytes, *, file: str = "", seed: int = 0) -> list[Mutant]:
 def drawn(root: Path, files: list[Path], *, count: int, seed: int) -> list[Mutant]:
     """So many changes of these files, drawn by their rank, in the order of files and lines."""
     every = [
-        one
+        mutant
         for file in files
-        for one in mutants(file.read_bytes(), file=str(file.relative_to(root)), seed=seed)
+        for mutant in mutants(file.read_bytes(), file=str(file.relative_to(root)), seed=seed)
     ]
     return sorted(sorted(every, key=lambda one: one.rank)[:count], key=lambda one: (one.file, one.begin))
 

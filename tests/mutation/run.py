@@ -53,10 +53,20 @@ PACKAGES = (
         (
             *("tests/sim/test_table.py", "tests/sim/test_spline.py", "tests/sim/test_circ.py"),
             *("tests/sim/test_lookahead.py", "tests/sim/test_straight.py", "tests/sim/test_motions.py"),
+            "tests/sim/test_geometry.py",
         ),
     ),
-    Package("guard", ("src/heptarm/fri/guard",), ("tests/fri",)),
-    Package("session", ("src/heptarm/fri/session",), ("tests/fri",)),
+    Package(
+        "guard",
+        ("src/heptarm/fri/guard",),
+        (
+            *("tests/fri/test_guard.py", "tests/fri/test_pose_guard.py", "tests/fri/test_policy.py"),
+            "tests/laws/test_torque_guard.py",
+        ),
+    ),
+    Package(
+        "session", ("src/heptarm/fri/session",), ("tests/fri/test_statistics.py", "tests/fri/test_session.py")
+    ),
     Package("model", ("src/heptarm/model",), ("tests/model",)),
     Package(
         "motion",

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def changes(text: str) -> list[tuple[str, str]]:
-    return [(one.before, one.after) for one in mutants(text.encode())]
+    return [(mutant.before, mutant.after) for mutant in mutants(text.encode())]
 
 
 @pytest.mark.parametrize(
@@ -47,8 +47,8 @@ def test_what_is_changed(text: str, found: list[tuple[str, str]]) -> None:
 
 def test_a_change_is_one_of_the_text_and_still_a_program() -> None:
     source = "é = 1\ndef f(a, b):\n    return (a + b) * 2  # ä\n".encode()
-    for one in mutants(source):
-        changed = one.apply(source)
+    for mutant in mutants(source):
+        changed = mutant.apply(source)
         assert changed != source and ast.dump(ast.parse(changed)) != ast.dump(ast.parse(source))
         assert len(changed.splitlines()) == len(source.splitlines())
 

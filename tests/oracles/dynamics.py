@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array, array, instance
+from heptarm.values.checks import Array, array, instance
 from heptarm.values.robot import Body, RobotModel, symmetric
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].

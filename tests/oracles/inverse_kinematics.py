@@ -16,7 +16,7 @@ from typing import TypeAlias
 import numpy as np
 
 from heptarm.errors import ShapeError, Unreachable
-from heptarm.values.arrays import Array, finite_entries, instance, integer, numbers
+from heptarm.values.checks import Array, finite_entries, instance, integer, numbers
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from tests.oracles.kinematics import Columns, Vec, flange

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, array, instance, integer
+from heptarm.values.checks import Array, array, instance, integer
 from heptarm.values.robot import RobotModel
 
 Vec: TypeAlias = tuple[float, float, float]

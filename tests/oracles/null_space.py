@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Coefficients of sin(psi), cos(psi) and 1.

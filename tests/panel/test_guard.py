@@ -6,6 +6,7 @@ import http.client
 import socket
 import urllib.parse
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -48,7 +49,7 @@ def cookie_of(view: urllib.parse.SplitResult) -> str:
     return headers["Set-Cookie"].partition(";")[0]
 
 
-def test_the_url_opens_the_view_and_its_cookie_the_rest(view) -> None:
+def test_the_url_opens_the_view_and_its_cookie_the_rest(view: urllib.parse.SplitResult) -> None:
     cookie = cookie_of(view)
     assert get(view, "/", Cookie=cookie)[0] == 200
     assert get(view, "/", Cookie=cookie, Origin=f"http://{view.netloc}")[0] == 200
@@ -58,7 +59,7 @@ def test_the_url_opens_the_view_and_its_cookie_the_rest(view) -> None:
 @pytest.mark.parametrize(
     "path", ["/", "/index.html", "/?token=", "/?token=wrong", "/?Token={token}", "/%2e%2e/"]
 )
-def test_without_the_token_nothing_is_shown(view, path: str) -> None:
+def test_without_the_token_nothing_is_shown(view: urllib.parse.SplitResult, path: str) -> None:
     status, headers, body = get(view, path.format(token=view.query.partition("=")[2]))
     assert status == 403 and b"token" in body and "Set-Cookie" not in headers
 
@@ -67,7 +68,7 @@ def test_without_the_token_nothing_is_shown(view, path: str) -> None:
     "name",
     ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", "127.0.0.1.evil.example:{port}"],
 )
-def test_another_host_is_refused_even_with_the_token(view, name: str) -> None:
+def test_another_host_is_refused_even_with_the_token(view: urllib.parse.SplitResult, name: str) -> None:
     status, _, body = get(view, f"/?{view.query}", host=name.format(port=view.port))
     assert status == 403 and b"Host" in body
 
@@ -75,16 +76,16 @@ def test_another_host_is_refused_even_with_the_token(view, name: str) -> None:
 @pytest.mark.parametrize(
     "origin", ["http://evil.example", "null", "https://127.0.0.1:{port}", "http://127.0.0.1:1"]
 )
-def test_another_origin_is_refused_even_with_the_token(view, origin: str) -> None:
+def test_another_origin_is_refused_even_with_the_token(view: urllib.parse.SplitResult, origin: str) -> None:
     status, _, body = get(view, f"/?{view.query}", Origin=origin.format(port=view.port))
     assert status == 403 and b"origin" in body
 
 
-def test_the_websocket_needs_the_token_and_the_origin_as_well(view) -> None:
+def test_the_websocket_needs_the_token_and_the_origin_as_well(view: urllib.parse.SplitResult) -> None:
     url = f"ws://{view.netloc}/"
     cookie = cookie_of(view)
 
-    def connect(**headers: str):
+    def connect(**headers: str) -> Any:
         return client.connect(
             url,
             additional_headers={name: value for name, value in headers.items() if name != "Origin"},

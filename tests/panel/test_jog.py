@@ -14,7 +14,7 @@ PERIOD = 0.02
 
 @pytest.mark.parametrize("age", [0.0, 0.1, 0.3, 0.9])
 def test_an_arm_whose_states_are_late_does_not_go_beyond_the_pose(age: float) -> None:
-    goal, pose = Pose([0.5, 0.0, 0.4], [0, 0, 0, 1]), Pose([0.4, 0.0, 0.4], [0, 0, 0, 1])
+    goal, pose = Pose.at(0.5, 0.0, 0.4), Pose.at(0.4, 0.0, 0.4)
     known = deque([pose] * (round(age / PERIOD) + 1))
     farthest = 0.0
     for _ in range(round(30.0 / PERIOD)):

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -517,7 +518,7 @@ def test_a_panel_that_only_shows_refuses_all_but_stop(model: PanelArm) -> None:
         ("0.0.0.0", {"allow_control": True}, True),
     ],
 )
-def test_who_may_control(host: str, words: dict[str, bool], may: bool) -> None:
+def test_who_may_control(host: str, words: dict[str, Any], may: bool) -> None:
     assert PanelOptions(host=host, **words).may_control is may
 
 

@@ -9,11 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from heptarm.planning.seam import TICK_NS, SafetyFlags, StateWords
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
+#: Times and flags of ticks.
+Ticks = npt.NDArray[np.int64]
 #: Rounding of a difference of two set-points, relative to the limit.
 ROUNDING = 1e-6
 #: A stop has brought the arm to rest after so long [s]; behind closed brakes it gives so much when pushed [rad].
@@ -94,7 +97,8 @@ def judged(robot: RobotModel, rows: Array, *, compliant: bool) -> list[Violation
     times = rows[:, StateWords.TIME].copy().view(np.int64)
     flags = rows[:, StateWords.FLAGS].copy().view(np.int64)
     assert (np.diff(times) == TICK_NS).all(), "the record has gaps"
-    seconds, points = times * 1e-9, rows[:, StateWords.Q_CMD]
+    seconds: Array = times.astype(np.float64) * 1e-9
+    points = rows[:, StateWords.Q_CMD]
     open_brakes = (flags & SafetyFlags.BRAKES_OPEN) != 0
     # where brakes have held the arm, the set-point begins again at the measured position
     driven = open_brakes[:-3] & open_brakes[1:-2] & open_brakes[2:-1] & open_brakes[3:]
@@ -120,7 +124,7 @@ def judged(robot: RobotModel, rows: Array, *, compliant: bool) -> list[Violation
     return found + _stopped(flags, rows[:, StateWords.Q], seconds)
 
 
-def _stopped(flags: Array, positions: Array, seconds: Array) -> list[Violation]:
+def _stopped(flags: Ticks, positions: Array, seconds: Array) -> list[Violation]:
     return [one for bit in SafetyFlags(_STOPS) for one in _after_stop(bit, flags, positions, seconds)]
 
 
@@ -147,7 +151,7 @@ def _first(rule: str, values: Array, allowed: float, seconds: Array) -> list[Vio
     )
 
 
-def _after_stop(bit: SafetyFlags, flags: Array, positions: Array, seconds: Array) -> list[Violation]:
+def _after_stop(bit: SafetyFlags, flags: Ticks, positions: Array, seconds: Array) -> list[Violation]:
     """Where the arm goes while a stop has been in force for longer than it needs to come to rest."""
     on = ((flags & bit) != 0).astype(np.int8)
     found: list[Violation] = []

@@ -39,6 +39,11 @@ _LIMIT = np.deg2rad([170, 120, 170, 120, 170, 120, 175])
 class Step(Protocol):
     """Something that a client does."""
 
+    @property
+    def is_compliant(self) -> bool:
+        """Whether the arm does not follow its set-points closely, so that they are judged by less."""
+        ...
+
     def run(self, arm: ha.Arm) -> None:
         """Do it."""
         ...
@@ -67,6 +72,11 @@ class Move:
     mode: str
     interrupted: str
     after: float
+
+    @property
+    def is_compliant(self) -> bool:
+        """Whether the arm gives way."""
+        return self.mode != "position"
 
     def motion(self, arm: ha.Arm) -> Any:
         q = self.goal.q
@@ -137,6 +147,7 @@ class Stream:
     count: int
     ending: str
     engine: str
+    is_compliant = False
 
     def run(self, arm: ha.Arm) -> None:
         """Send the targets."""
@@ -176,6 +187,55 @@ class Stream:
                 return ha.Pose.from_matrix(forward(arm.robot, q))
 
 
+@dataclass(frozen=True)
+class Fri:
+    """An FRI session: positions towards a posture, torques or a wrench, ended in one of several manners."""
+
+    kind: str
+    goal: Posture
+    period: int
+    shape: str
+    seconds: float
+    ending: str
+
+    @property
+    def is_compliant(self) -> bool:
+        """Whether the arm gives way, or its set-points are the client's, which the judge of motions does not know."""
+        return True
+
+    def run(self, arm: ha.Arm) -> None:
+        """Answer the messages."""
+        mode = {
+            "position": None,
+            "torque": JointImpedance(stiffness=100.0),
+            "wrench": CartesianImpedance(stiffness=(500.0, 500.0, 500.0, 50.0, 50.0, 50.0)),
+        }[self.kind]
+        with arm.fri(self.kind, period_ms=self.period, mode=mode) as rt:  # type: ignore[call-overload]
+            for s in rt:
+                rt.command(**self.command(rt.start.q_ipo, s.t))
+                if s.t > self.seconds:
+                    break
+            match self.ending:
+                case "error":
+                    raise Interrupted
+                case "lost":
+                    cut(arm)
+                case "stop":
+                    arm.stop("fast")
+                case "fault":
+                    arm.operator.fault("emergency_stop")
+
+    def command(self, q0: np.ndarray, t: float) -> dict[str, Any]:
+        part = 1.0 if self.shape == "step" else math.sin(2.0 * t)
+        match self.kind:
+            case "position":
+                return {"q": q0 + part * (self.goal.q - q0)}
+            case "torque":
+                return {"tau": 100.0 * part * np.sin(self.goal.q)}
+            case _:
+                return {"wrench": part * np.concatenate([100.0 * np.sin(self.goal.q[:3]), np.zeros(3)])}
+
+
 class Interrupted(Exception):
     """A program's own error in a stream."""
 
@@ -185,6 +245,7 @@ class Outside:
     """What others do meanwhile: a person beside the robot, a stranger on the network."""
 
     what: str
+    is_compliant = False
 
     def run(self, arm: ha.Arm) -> None:
         """Do it."""
@@ -254,11 +315,22 @@ streams = st.builds(
     st.sampled_from(("leave", "leave", "error", "lost", "stop", "fault")),
     st.sampled_from(("smart", "direct")),
 )
+fri = st.builds(
+    Fri,
+    st.sampled_from(("position", "position", "torque", "wrench")),
+    postures,
+    st.sampled_from((5, 10)),
+    st.sampled_from(("step", "smooth")),
+    st.sampled_from((0.3, 1.5)),
+    st.sampled_from(("leave", "leave", "error", "lost", "stop", "fault")),
+)
 outside = st.builds(
     Outside,
     st.sampled_from(("recover", "recover", "garbage", "push", "t1", "aut", "tool", "no tool", *FAULTS)),
 )
-programs = st.lists(st.one_of(moves, streams, moves, streams, outside), min_size=1, max_size=5)
+programs = st.lists(
+    st.one_of(moves, streams, moves, streams, moves, streams, fri, outside), min_size=1, max_size=5
+)
 
 
 @contextlib.contextmanager

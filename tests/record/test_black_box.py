@@ -35,7 +35,9 @@ def test_an_aborted_motion_has_its_black_box(peer: Peer, folder: Path) -> None:
         assert path is not None and path.parent == folder and "motion-5-stopped" in path.name
     run = ha.load(path)
     assert run.complete and len(run) >= 40 and run.facts["black_box"] == "motion 5 stopped"
-    assert [(one.id, one.cause, one.detail) for one in run.motions] == [(5, "stopped", "somebody")]
+    assert [(motion.id, motion.cause, motion.detail) for motion in run.motions] == [
+        (5, "stopped", "somebody")
+    ]
     assert path.stat().st_mode & 0o077 == 0
     assert pickle.loads(pickle.dumps(raised.value.black_box)) == path
 
@@ -54,7 +56,7 @@ def test_a_lost_connection_has_its_black_box(peer: Peer, folder: Path) -> None:
         arm.move(ha.ptp(HOME))
     assert again.value.black_box == path
     arm.close()
-    assert any("connection lost" in one.text for one in ha.load(path).events)
+    assert any("connection lost" in event.text for event in ha.load(path).events)
     assert len(list(folder.iterdir())) == 1
 
 
@@ -73,7 +75,7 @@ def test_a_safety_stop_has_its_black_box(peer: Peer) -> None:
             arm.move(ha.ptp(HOME))
     path = raised.value.black_box
     assert path is not None and "safety-stop" in path.name
-    texts = [one.text for one in ha.load(path).events]
+    texts = [event.text for event in ha.load(path).events]
     assert any("emergency stop pressed" in text for text in texts)
 
 
@@ -87,7 +89,7 @@ def test_no_more_than_twenty_files_are_kept(
         newest = arm.connection.capture("by hand")
         assert newest is not None and arm.connection.capture("the same second") is newest
         assert newest() is not None
-    names = sorted(one.name for one in folder.iterdir())
+    names = sorted(path.name for path in folder.iterdir())
     assert len(names) == black_box.MOST_FILES and names[0].startswith("20200101-000011")
 
 
@@ -97,7 +99,9 @@ def test_two_connections_that_see_the_same_stop_have_files_of_their_own(peer: Pe
         boxes = [arm.connection.capture("stop") for arm in (left, right)]
         assert None not in [box and box() for box in boxes]
     other.close()
-    numbers = {one.name.split("-")[4] for one in folder.iterdir()}  # date, time, millisecond, process, number
+    numbers = {
+        path.name.split("-")[4] for path in folder.iterdir()
+    }  # date, time, millisecond, process, number
     assert len(numbers) == 2
 
 

@@ -83,7 +83,7 @@ def test_a_recording_has_pictures_of_the_arm_that_moves(peer: Peer, tmp_path: Pa
     run = ha.load(path)
     pictures = run.pictures
     assert run.complete and len(pictures) == rec.pictures and pictures.dropped == rec.pictures_dropped
-    assert all(one.shape == (120, 160, 3) and one.dtype == np.uint8 for one in pictures)
+    assert all(picture.shape == (120, 160, 3) and picture.dtype == np.uint8 for picture in pictures)
     assert changed(pictures[0], pictures[-1]) > 300 and changed(pictures[-2], pictures[-1]) == 0
     assert (np.diff(pictures.t) > 0).all()
     distance = np.abs(pictures.t[:, None] - run.t[None, :]).min(axis=1)
@@ -239,7 +239,7 @@ def test_a_killed_process_leaves_pictures_that_can_be_read_and_no_process(
     until(lambda: not any(is_camera(one.pid) for one in running()))
     run = ha.load(path)
     assert not run.complete and len(run) >= 200
-    assert len(run.pictures) >= 5 and all(one.shape == (120, 160, 3) for one in run.pictures)
+    assert len(run.pictures) >= 5 and all(picture.shape == (120, 160, 3) for picture in run.pictures)
 
 
 @pytest.mark.slow

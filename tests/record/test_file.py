@@ -77,8 +77,8 @@ def test_motions_events_and_notes_are_on_the_time_line(tmp_path: Path) -> None:
     (motion,) = run.motions
     assert (motion.id, motion.cause, motion.detail) == (5, "stopped", "why")
     assert motion.begin == 0.0 and motion.end == pytest.approx(0.9002, abs=1e-6)
-    assert [one.t for one in run.events] == sorted(one.t for one in run.events)
-    assert [one.text for one in run.notes] == ["half"] and "motion 5" in str(motion)
+    assert [event.t for event in run.events] == sorted(event.t for event in run.events)
+    assert [note.text for note in run.notes] == ["half"] and "motion 5" in str(motion)
     part = run.between("half", "end")
     assert part.t[0] == pytest.approx(0.501) and len(part) == 1499 and len(part["q"]) == 1499
     assert len(run.between(0.1, 0.2)) == pytest.approx(100, abs=1)
@@ -96,7 +96,7 @@ def test_signals_are_noted_when_they_change(tmp_path: Path) -> None:
         every[index] = every[index]._replace(body=body(index, button=button))
     file.states(every, to_ours=to_ours, signals=("A.One", "A.Two"))
     file.finish({})
-    texts = [(round(one.t * 1e3), one.text) for one in load(tmp_path / "io.mcap").events]
+    texts = [(round(event.t * 1e3), event.text) for event in load(tmp_path / "io.mcap").events]
     assert texts == [(0, "A.Two = 0"), (2, "A.Two = 1"), (5, "A.Two = 0")]
 
 
@@ -177,7 +177,7 @@ def _parsed(name: str, descriptors: bytes, data: bytes) -> Any:
 
 def test_a_row_has_the_size_of_its_layout() -> None:
     message = _parsed(STATE.full_name, STATE.descriptor, STATE.rows(1).tobytes())
-    assert len(message.ListFields()) >= sum(one.size > 1 for one in STATE.fields)
+    assert len(message.ListFields()) >= sum(field.size > 1 for field in STATE.fields)
 
 
 @pytest.mark.parametrize("fraction", [0.02, 0.3, 0.5, 0.77, 0.999])

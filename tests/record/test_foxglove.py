@@ -68,7 +68,7 @@ def shape(message: Any) -> dict[str, Any]:
         if field.message_type is not None:
             inner = field.message_type.full_name, shape(field.message_type)
         elif field.enum_type is not None:
-            inner = field.enum_type.full_name, {one.name: one.number for one in field.enum_type.values}
+            inner = field.enum_type.full_name, {value.name: value.number for value in field.enum_type.values}
         found[field.name] = (field.number, field.type, field.is_repeated, inner)
     return found
 
@@ -137,12 +137,12 @@ def test_the_frames_are_a_chain_from_the_base_to_the_flange(tmp_path: Path) -> N
     transforms = published("foxglove.FrameTransforms").FromString(found["/left/tf"]).transforms
     assert published("foxglove.PoseInFrame").FromString(found["/left/tcp"]).frame_id == "left_base"
     frame, pose = "left_base", ha.Pose.of((0, 0, 0), (0, 0, 0, 1))
-    for one in transforms:
-        assert one.parent_frame_id == frame
-        frame, (place, turn) = one.child_frame_id, (one.translation, one.rotation)
+    for transform in transforms:
+        assert transform.parent_frame_id == frame
+        frame, (place, turn) = transform.child_frame_id, (transform.translation, transform.rotation)
         pose = pose @ ha.Pose.of((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
     state = wire.State.decode(body(0))
     assert state.joints is not None and frame == "left_flange"
     np.testing.assert_allclose(pose.matrix, forward(robot("iiwa14"), state.joints.q), atol=1e-9)
-    names = [one.child_frame_id for one in transforms]
+    names = [transform.child_frame_id for transform in transforms]
     assert names == [*(f"left_link_{index}" for index in range(8)), "left_flange"], "as in the URDF"

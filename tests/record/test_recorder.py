@@ -52,7 +52,7 @@ def test_what_happens_is_in_the_file(peer: Peer, tmp_path: Path) -> None:
     assert run.facts["robot"] == "iiwa14" and run.facts["cabinet"] == "test"
     (motion,) = run.motions
     assert (motion.id, motion.text, motion.cause) == (11, "Ptp", "finished")
-    texts = [one.text for one in run.events]
+    texts = [event.text for event in run.events]
     assert "begin here" in texts and any("a word from the cabinet" in text for text in texts)
     np.testing.assert_allclose(run["q"][0], peer.q)
 
@@ -183,7 +183,7 @@ def test_fri_cycles_are_recorded_at_their_own_rate(arm: ha.Arm, tmp_path: Path) 
     assert np.diff(run["fri.sequence"]).tolist() == [1] * (len(run["fri.t"]) - 1)
     np.testing.assert_allclose(run["fri.q"][-1], HOME, atol=0.05)
     assert run["fri.t"][0] >= 0.0 and run["fri.t"][-1] <= run.t[-1] + 1.0
-    assert any(one.text == "Fri" for one in run.motions)
+    assert any(motion.text == "Fri" for motion in run.motions)
 
 
 def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
                     if s.q_sent[0] > begin.q_ipo[0] + 0.005:
                         break
             last = client.state
-        assert any("listening to" in one.text for one in client.events()), (
+        assert any("listening to" in event.text for event in client.events()), (
             "the client's own events are left to it"
         )
     run = ha.load(tmp_path / "fri.mcap")
@@ -212,8 +212,8 @@ def test_an_fri_client_is_recorded_message_by_message(tmp_path: Path) -> None:
     assert run["fri.sequence"][-1] <= last.sequence
     assert run["fri.t"][0] == 0.0 and run.duration == pytest.approx(run["fri.t"][-1])
     assert np.nanmax(run["fri.q_sent"][:, 0]) > begin.q_ipo[0] + 0.005
-    assert [one.text for one in run.notes] == ["commands are effective"]
-    assert any("COMMANDING_ACTIVE" in one.text for one in run.events if one.kind == "fri")
+    assert [note.text for note in run.notes] == ["commands are effective"]
+    assert any("COMMANDING_ACTIVE" in event.text for event in run.events if event.kind == "fri")
     assert len(run.between("commands are effective", "end")["fri.t"]) < len(run["fri.t"])
     assert "cycles" in str(run) and len(run.to_pandas(fri=True)) == len(run["fri.t"])
     with pytest.raises(HeptarmError), ha.record_client(client, tmp_path / "fri.mcap" / "run.mcap"):

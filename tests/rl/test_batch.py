@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import inf
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,7 +120,7 @@ def test_finer_steps_of_the_engine_would_move_the_arms_alike(monkeypatch: pytest
         arms = BatchReach(ReachTask(), envs=4, randomisation=STRONG, seed=3, starts="together")
         drive(arms, 20)
         paths.append([arms.step(np.full((4, 7), 0.8)).tip for _ in range(20)])
-    away = np.linalg.norm(np.subtract(*paths), axis=-1)
+    away = np.linalg.norm(np.diff(paths, axis=0)[0], axis=-1)
     assert away.max() < 0.002
     assert np.sqrt((away**2).mean()) < 0.0006
 
@@ -128,10 +129,8 @@ def test_the_plant_moves_alike() -> None:
     """The plant of the virtual cabinet, at 1 kHz with its own servo, agrees with the training simulator."""
     task = ReachTask()
     goals = task.targets(np.random.default_rng(4), 2)
-    trained, plant = (
-        BatchReach(task, envs=2, starts="together", seed=4, **engine)
-        for engine in ({}, {"engine": PlantEngine})
-    )
+    engines: tuple[dict[str, Any], ...] = ({}, {"engine": PlantEngine})
+    trained, plant = (BatchReach(task, envs=2, starts="together", seed=4, **engine) for engine in engines)
     assert (trained.reset(goals) == plant.reset(goals)).all()
     for index in range(45):
         action = np.full((2, 7), 0.8 if index < 20 else -0.3 if index < 30 else 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,7 +85,7 @@ def test_misuse_is_refused() -> None:
 # ---------------------------------------------------------------------------------- Stable-Baselines3
 
 
-def vector(envs: int, task: ReachTask) -> object:
+def vector(envs: int, task: ReachTask) -> Any:
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     from heptarm.rl.sim.vector_env import VectorReach
 
@@ -137,7 +138,7 @@ def test_its_ppo_learns_on_the_same_simulator() -> None:
         )
 
         def policy(observation: np.ndarray) -> np.ndarray:
-            return student.predict(observation.astype(np.float32), deterministic=True)[0]
+            return np.asarray(student.predict(observation.astype(np.float32), deterministic=True)[0])
 
         before = evaluate(policy, 50, task=task).mean
         student.learn(150_000)
@@ -159,11 +160,9 @@ def test_warp_moves_the_arms_alike() -> None:
         hard = Randomisation(
             latency=(0, 2), bandwidth=(5.0, 40.0), payload=(0.0, 2.0), stiffness=(300.0, 3000.0)
         )
+        engines: tuple[dict[str, Any], ...] = ({"engine": WarpEngine}, {})
         for draw in (NONE, hard):
-            warp, batch = (
-                BatchReach(task, envs=8, randomisation=draw, **engine)
-                for engine in ({"engine": WarpEngine}, {})
-            )
+            warp, batch = (BatchReach(task, envs=8, randomisation=draw, **engine) for engine in engines)
             random = np.random.default_rng(0)
             for index in range(40):
                 action = random.uniform(-1, 1, (8, 7))

@@ -9,18 +9,21 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError
 from heptarm.rl.policy import Policy
 from heptarm.rl.task import ReachTask
 
+Layers = list[tuple[npt.ArrayLike, npt.ArrayLike]]
+
 
 def policy(task: ReachTask | None = None) -> Policy:
     task = task or ReachTask(feature="kinematic")
     random = np.random.default_rng(0)
     widths = (task.observation_size, 32, 16, task.action_size)
-    layers = [(random.normal(size=(a, b)), random.normal(size=b)) for a, b in pairwise(widths)]
+    layers: Layers = [(random.normal(size=(a, b)), random.normal(size=b)) for a, b in pairwise(widths)]
     size = task.observation_size
     return Policy(
         task, layers=layers, mean=random.normal(size=size), std=random.uniform(1, 2, size), facts={"seed": 7}
@@ -97,7 +100,7 @@ def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
 
 def test_layers_that_do_not_fit_are_refused() -> None:
     task = ReachTask()
-    fine = [(np.zeros((17, 7)), np.zeros(7))]
+    fine: Layers = [(np.zeros((17, 7)), np.zeros(7))]
     ones = np.ones(17)
     with pytest.raises(ShapeError, match="outputs"):
         Policy(task, layers=[(np.zeros((17, 3)), np.zeros(3))], mean=ones, std=ones)

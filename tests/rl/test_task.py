@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -138,7 +140,7 @@ def test_a_task_survives_its_file() -> None:
         ({"spread": -1.0}, "spread"),
     ],
 )
-def test_what_makes_no_task_is_refused_by_name(entries: dict, text: str) -> None:
+def test_what_makes_no_task_is_refused_by_name(entries: dict[str, Any], text: str) -> None:
     with pytest.raises(CommandRejected, match=text):
         ReachTask(**entries)
 
@@ -171,6 +173,6 @@ def test_levels_of_randomisation_grow() -> None:
         {"velocity_noise": 1.0},
     ],
 )
-def test_ranges_that_are_none_are_refused(entries: dict) -> None:
+def test_ranges_that_are_none_are_refused(entries: dict[str, Any]) -> None:
     with pytest.raises(LimitError, match=next(iter(entries))):
         Randomisation(**entries)

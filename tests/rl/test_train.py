@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,11 +31,11 @@ UPDATE = 16 * 8
 
 
 def recipe(updates: int = 6, **changes: object) -> Recipe:
-    given: dict = {"steps": updates * UPDATE, "settings": SMALL, "seed": 3, **changes}
+    given: dict[str, Any] = {"steps": updates * UPDATE, "settings": SMALL, "seed": 3, **changes}
     return Recipe(ReachTask(steps=20, feature="kinematic"), **given)
 
 
-def curve(trained: Trained) -> list[tuple[float, ...]]:
+def curve(trained: Trained) -> list[tuple[float | None, ...]]:
     """The learning curve without wall times; NaN as None."""
     rows = [{k: v for k, v in asdict(row).items() if k != "seconds"} for row in trained.history]
     return [tuple(None if v != v else v for v in row.values()) for row in rows]
@@ -149,6 +150,33 @@ def test_what_cannot_go_on_reports_why(tmp_path: Path) -> None:
         train(resume=path)
 
 
+def test_a_recipe_of_an_older_checkpoint_is_read_under_the_names_of_the_literature() -> None:
+    entries = Recipe().as_dict()
+    assert Recipe.from_dict(entries) == Recipe()
+    older = {
+        "rate": 5e-4,
+        "discount": 0.9,
+        "trace": 0.8,
+        "clip": 0.1,
+        "value": 0.5,
+        "gradient": 2.0,
+        "entropy": 0.01,
+    }
+    names = {
+        "learning_rate",
+        "gamma",
+        "gae_lambda",
+        "clip_range",
+        "value_coef",
+        "max_grad_norm",
+        "entropy_coef",
+    }
+    kept = {name: value for name, value in entries["settings"].items() if name not in names}
+    read = Recipe.from_dict({**entries, "settings": kept | older}).settings
+    assert (read.learning_rate, read.gamma, read.gae_lambda, read.clip_range) == (5e-4, 0.9, 0.8, 0.1)
+    assert (read.value_coef, read.max_grad_norm, read.entropy_coef) == (0.5, 2.0, 0.01)
+
+
 def test_bad_arguments_are_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(CommandRejected, match=r"\.npz"):
         train(recipe(1), out="policy.pt")
@@ -161,7 +189,7 @@ def test_bad_arguments_are_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(LimitError, match="minibatches"):
         ppo.PpoSettings(envs=3, horizon=5, minibatches=4)
     with pytest.raises(LimitError, match="rate"):
-        ppo.PpoSettings(rate=0.0)
+        ppo.PpoSettings(learning_rate=0.0)
     monkeypatch.setenv("WORLD_SIZE", "2")
     monkeypatch.setenv("RANK", "2")
     with pytest.raises(LimitError, match="RANK"):

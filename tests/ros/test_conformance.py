@@ -13,7 +13,7 @@ from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalRefused, GoalResult, TrajectoryGoal
 from heptarm.ros.trajectory.runner import GoalFeedback, MeasuredJoints, TrajectoryRunner
 from heptarm.ros.trajectory.trajectory import KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 from tests.conformance.case import HOME
 from tests.conformance.cases import CASES
@@ -25,7 +25,7 @@ PERIOD = 0.01
 class Bare:
     """A client of a runner; the arm is a few numbers."""
 
-    preempted = (GoalOutcome.PREEMPTED,)
+    preempted: tuple[GoalOutcome, ...] = (GoalOutcome.PREEMPTED,)
     timely = True
     empty_stops = True
 

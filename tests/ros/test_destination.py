@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -34,13 +34,13 @@ class Scene:
         self.stream, self.position = FakeStream(), 0.0
         self.arrivals = 0
         state: Callable[[], Any] = lambda: SimpleNamespace(position=self.position)  # noqa: E731
-        self.keeper = DestinationKeeper(self.stream, state, period=1e-3, arrived=self._arrived)
+        self.keeper = DestinationKeeper(cast(Any, self.stream), state, period=1e-3, arrived=self._arrived)
 
     def _arrived(self) -> None:
         self.arrivals += 1
 
     def go(self, position: float, *, stays: bool = False) -> None:
-        self.keeper.go(Destination(lambda state: state.position == position, stays))
+        self.keeper.go(Destination(lambda state: cast(Any, state).position == position, stays))
 
     def until(self, what: Callable[[], bool]) -> None:
         deadline = time.monotonic() + 30.0

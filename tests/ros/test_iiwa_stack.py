@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.ros.interface import iiwa_stack
-from heptarm.ros.interface.iiwa_settings import IiwaStackSettings
 from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.presets import iiwa_stack
+from heptarm.ros.interface.presets.iiwa_settings import IiwaStackSettings
 from heptarm.ros.interface.service import ServiceResponse
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Position

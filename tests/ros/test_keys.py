@@ -16,7 +16,7 @@ from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration
 def test_a_dump_of_the_parameters_has_no_key(tmp_path: Path) -> None:
     key = new_key()
     write_key_file(tmp_path / "cell.key", key)
-    assert "key" not in {one.name for one in PARAMETERS}
+    assert "key" not in {parameter.name for parameter in PARAMETERS}
     with pytest.raises(CommandRejected, match="unknown parameter 'key'"):
         NodeConfiguration.of({"key": key})
     configuration = NodeConfiguration.of({"target": "sim://iiwa7", "key_file": str(tmp_path / "cell.key")})

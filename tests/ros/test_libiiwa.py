@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, ShapeError
-from heptarm.ros.interface.libiiwa import NO_ERROR, VALUE_ERROR, LibiiwaServer
 from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.interface.offered import offered
+from heptarm.ros.interface.presets.libiiwa import NO_ERROR, VALUE_ERROR, LibiiwaServer
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 
@@ -36,16 +37,16 @@ def context() -> FakeContext:
 
 
 @pytest.fixture
-def ask(context: FakeContext):
+def ask(context: FakeContext) -> Callable[..., Any]:
     server = LibiiwaServer()
 
     def call(name: str, **request: Any) -> Any:
-        return server.service(name, "").handler(context, SimpleNamespace(**request))
+        return server.service(name, "").handler(cast(Any, context), SimpleNamespace(**request))
 
     return call
 
 
-def test_a_mode_has_the_values_that_were_set_before(ask, context: FakeContext) -> None:
+def test_a_mode_has_the_values_that_were_set_before(ask: Callable[..., Any], context: FakeContext) -> None:
     ask("set_joint_stiffness", data=[100.0 * k for k in range(1, 8)])
     assert context.mode is None, "the current mode is position"
     ask("set_control_mode", data="JOINT_IMPEDANCE")
@@ -54,7 +55,9 @@ def test_a_mode_has_the_values_that_were_set_before(ask, context: FakeContext) -
     assert context.mode.damping[0] == 0.5, "the current mode changes at once"
 
 
-def test_angles_are_those_of_kuka_and_a_million_is_no_limit(ask, context: FakeContext) -> None:
+def test_angles_are_those_of_kuka_and_a_million_is_no_limit(
+    ask: Callable[..., Any], context: FakeContext
+) -> None:
     ask("set_cartesian_stiffness", **SIX, float_param=50.0)
     ask("set_cartesian_max_velocity", **{**dict.fromkeys("xyabc", 1e6), "z": 2.0})
     ask("set_control_mode", data="cartesian_impedance")
@@ -64,7 +67,9 @@ def test_angles_are_those_of_kuka_and_a_million_is_no_limit(ask, context: FakeCo
     assert context.mode.max_velocity[2] == 2.0 and math.isnan(context.mode.max_velocity[0])
 
 
-def test_a_refused_value_leaves_the_others_and_an_error_that_is_read_once(ask, context: FakeContext) -> None:
+def test_a_refused_value_leaves_the_others_and_an_error_that_is_read_once(
+    ask: Callable[..., Any], context: FakeContext
+) -> None:
     ask("set_control_mode", data="joint_impedance")
     before = context.mode
     for name, data, kind in (
@@ -82,7 +87,7 @@ def test_a_refused_value_leaves_the_others_and_an_error_that_is_read_once(ask, c
     assert context.mode.stiffness[0] == 2000.0
 
 
-def test_conditions_are_one_guard_until_they_are_reset(ask, context: FakeContext) -> None:
+def test_conditions_are_one_guard_until_they_are_reset(ask: Callable[..., Any], context: FakeContext) -> None:
     ask("set_force_condition", data=[NAN, NAN, 15.0, NAN, NAN, 1.0])
     ask("set_joint_torque_condition", data=[NAN] * 3 + [-5.0] + [NAN] * 6 + [10.0] + [NAN] * 3)
     text = str(context.driver.guard)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -47,8 +47,10 @@ def pose(x: float, y: float, z: float, turn: tuple[float, ...] = (0.0, 0.0, 0.0,
     return SimpleNamespace(position=SimpleNamespace(x=x, y=y, z=z), orientation=orientation)
 
 
-def stamped(frame: str = "", *numbers: float) -> SimpleNamespace:
-    return SimpleNamespace(header=SimpleNamespace(frame_id=frame), pose=pose(*(numbers or (0.5, 0.1, 0.4))))
+def stamped(frame: str = "", *numbers: Any) -> SimpleNamespace:
+    return SimpleNamespace(
+        header=SimpleNamespace(frame_id=frame), pose=pose(*cast(Any, numbers or (0.5, 0.1, 0.4)))
+    )
 
 
 def message(kind: int, **fields: Any) -> SimpleNamespace:

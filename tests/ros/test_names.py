@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,19 +27,22 @@ class FakeDriver:
     configuration = NodeConfiguration.of({})
 
 
+DRIVER: Any = FakeDriver()
+
+
 def test_nan_keeps_a_joint() -> None:
-    target = joint_target(FakeDriver(), [], [NAN, 1.0, NAN, NAN, NAN, NAN, NAN])
+    target = joint_target(DRIVER, [], [NAN, 1.0, NAN, NAN, NAN, NAN, NAN])
     assert target[1] == 1.0 and (np.delete(target, 1) == np.delete(HERE, 1)).all()
 
 
 @pytest.mark.parametrize("quat", [(NAN,) * 4, (0.0,) * 4])
-def test_no_orientation_keeps_it(quat) -> None:
-    assert pose_target(FakeDriver(), (NAN, NAN, 0.3), quat) == Pose.of([0.4, 0.1, 0.3], POSE.quat)
+def test_no_orientation_keeps_it(quat: tuple[float, ...]) -> None:
+    assert pose_target(DRIVER, (NAN, NAN, 0.3), quat) == Pose.of([0.4, 0.1, 0.3], POSE.quat)
 
 
 def test_half_an_orientation_is_none() -> None:
     with pytest.raises(ShapeError, match="four numbers"):
-        pose_target(FakeDriver(), (0.4, 0.1, 0.5), (NAN, 0.0, 0.0, 1.0))
+        pose_target(DRIVER, (0.4, 0.1, 0.5), (NAN, 0.0, 0.0, 1.0))
 
 
 def test_every_driver_has_joint_states_and_the_action() -> None:

@@ -9,7 +9,7 @@ from heptarm.fri.loop.user_api import Output, Params
 from heptarm.ros.trajectory.fri_execution import _FriStream
 from heptarm.ros.trajectory.fri_law import follow
 from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
-from heptarm.ros.trajectory.runner import ExecutionSettings, MeasuredJoints, TrajectoryRunner
+from heptarm.ros.trajectory.runner import ControlStep, ExecutionSettings, MeasuredJoints, TrajectoryRunner
 from heptarm.values.robot import robot
 
 NAMES = tuple(f"A{i}" for i in range(1, 8))
@@ -38,7 +38,7 @@ class Stage:
         self.numbers: list[int] = []
         self.step()
 
-    def step(self):
+    def step(self) -> ControlStep:
         """One step; the arm is there at once."""
         self.now += PERIOD
         step = self.runner.advance(self.now, MeasuredJoints(self.now, self.q, np.zeros(7), self.scaling))
@@ -227,7 +227,7 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
 
 
 def test_over_fri_a_process_that_was_held_up_compares_the_clocks_by_its_own_message(
-    session: Session, monkeypatch
+    session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         session, "history", lambda size: [Message(session.t + k * PERIOD) for k in range(5, size)]
@@ -236,7 +236,9 @@ def test_over_fri_a_process_that_was_held_up_compares_the_clocks_by_its_own_mess
     assert overlay._between(session.state) == pytest.approx(100.0)  # type: ignore[arg-type]
 
 
-def test_over_fri_clocks_that_part_before_a_goal_moves_do_not_delay_it(session: Session, monkeypatch) -> None:
+def test_over_fri_clocks_that_part_before_a_goal_moves_do_not_delay_it(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The controller loses 20 ms while the arm waits for the start: that is corrected at once."""
     runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
     start = 101.0
@@ -260,7 +262,9 @@ def test_over_fri_clocks_that_part_before_a_goal_moves_do_not_delay_it(session: 
     assert np.abs(np.array(done) - reported)[100:].max() < 1e-9
 
 
-def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(session: Session, monkeypatch) -> None:
+def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The controller loses 20 ms at once: the commands catch up gradually, without a step."""
     runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
     runner.accept(goal(), now=100.0, state=MeasuredJoints(100.0, HOME, np.zeros(7)))

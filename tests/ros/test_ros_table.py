@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,8 +17,9 @@ SCRIPT = Path(__file__).parents[2] / "scripts" / "ros_table.py"
 
 
 @pytest.fixture(scope="module")
-def table():
+def table() -> Iterator[Any]:
     spec = importlib.util.spec_from_file_location("ros_table", SCRIPT)
+    assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules["ros_table"] = module
     spec.loader.exec_module(module)
@@ -25,7 +28,7 @@ def table():
 
 
 @pytest.mark.parametrize("ros", ["ROS 1", "ROS 2"])
-def test_everything_a_node_declares_is_on_the_page(table, ros: str) -> None:
+def test_everything_a_node_declares_is_on_the_page(table: Any, ros: str) -> None:
     page = table.PAGE.read_text(encoding="utf-8")
     found = table.declared(table.SOURCES[ros])
     assert len(found) >= 15 and ("action", "~/follow_joint_trajectory") in found
@@ -34,7 +37,7 @@ def test_everything_a_node_declares_is_on_the_page(table, ros: str) -> None:
     assert not missing, "run .venv/bin/python scripts/ros_table.py"
 
 
-def test_every_public_member_of_the_api_has_a_row_and_every_row_a_member(table) -> None:
+def test_every_public_member_of_the_api_has_a_row_and_every_row_a_member(table: Any) -> None:
     assert set(table.API) == set(table.PARTS)
     for part in table.PARTS:
         there, reported = set(table.members(part)), set(table.API[part])
@@ -44,7 +47,7 @@ def test_every_public_member_of_the_api_has_a_row_and_every_row_a_member(table) 
 
 
 @pytest.mark.parametrize("ros", ["ROS 1", "ROS 2"])
-def test_what_the_rows_name_is_declared_by_both_nodes(table, ros: str) -> None:
+def test_what_the_rows_name_is_declared_by_both_nodes(table: Any, ros: str) -> None:
     declared = {name for _, name in table.declared(table.SOURCES[ros])}
     for part, rows in table.API.items():
         for member, entry in rows.items():
@@ -52,7 +55,7 @@ def test_what_the_rows_name_is_declared_by_both_nodes(table, ros: str) -> None:
             assert set(table.names_of(entry)) <= declared, f"{part}.{member}"
 
 
-def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table) -> None:
+def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table: Any) -> None:
     reported = {
         name for rows in table.API.values() for entry in rows.values() for name in table.names_of(entry)
     }
@@ -68,7 +71,7 @@ def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table) -> N
     }  # ROS' own, and what Python does not need
 
 
-def test_other_drivers_names_stand_for_ours(table) -> None:
+def test_other_drivers_names_stand_for_ours(table: Any) -> None:
     ours = {name for _, name in table.declared(table.SOURCES["ROS 1"])}
     for preset in PRESETS.values():
         assert {entry.native for entry in preset.entries} <= ours

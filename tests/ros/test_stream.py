@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.point_stream import PointStream, is_streamed
 from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
-from heptarm.ros.trajectory.stream import PointStream, is_streamed
 from heptarm.ros.trajectory.trajectory import KinematicState
 from heptarm.values.robot import robot
 

@@ -270,7 +270,7 @@ def stamp(message: Any) -> float:
 class Client:
     """A client for the cases of conformance."""
 
-    preempted = (GoalOutcome.PREEMPTED,)
+    preempted: tuple[GoalOutcome, ...] = (GoalOutcome.PREEMPTED,)
     timely = False
     empty_stops = True
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from pathlib import Path
 
 from heptarm_msgs.msg import Status
 from sensor_msgs.msg import JointState
@@ -27,7 +28,7 @@ def test_arguments_are_explained(ros: None) -> None:
         assert f"  {argument}" in said, said
 
 
-def test_the_node_is_started_with_its_parameters(ros: None, spare: Stage, tmp_path) -> None:
+def test_the_node_is_started_with_its_parameters(ros: None, spare: Stage, tmp_path: Path) -> None:
     values = tmp_path / "arm.yaml"
     values.write_text("state_rate: 50.0\nservo:\n  rate: 50.0\n")
     command = ["roslaunch", "--wait", "heptarm_ros1", "heptarm.launch"]

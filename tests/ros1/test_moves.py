@@ -26,7 +26,7 @@ def poses(client: Client) -> SimpleClient:
     return SimpleClient("/heptarm/move_pose", MovePoseAction)
 
 
-def test_a_motion_of_joints_reports_how_far_it_is(client: Client, joints) -> None:
+def test_a_motion_of_joints_reports_how_far_it_is(client: Client, joints: SimpleClient) -> None:
     reported: list[float] = []
     goal = MoveJointsGoal(position=HOME, speed=0.5)
     joints.send_goal(goal, feedback_cb=lambda feedback: reported.append(feedback.progress))
@@ -38,7 +38,7 @@ def test_a_motion_of_joints_reports_how_far_it_is(client: Client, joints) -> Non
     assert np.abs(rests(client) - HOME).max() < 2e-3
 
 
-def test_lines_and_arcs(client: Client, joints, poses) -> None:
+def test_lines_and_arcs(client: Client, joints: SimpleClient, poses: SimpleClient) -> None:
     joints.send_goal_and_wait(MoveJointsGoal(position=HOME, speed=0.5), LONG)
     rests(client)
     seen = collect("/heptarm/pose", PoseStamped)
@@ -59,7 +59,7 @@ def test_lines_and_arcs(client: Client, joints, poses) -> None:
     assert abs(top - there.via.pose.position.z) < 3e-3
 
 
-def test_cancelling_brakes_on_the_path(client: Client, joints) -> None:
+def test_cancelling_brakes_on_the_path(client: Client, joints: SimpleClient) -> None:
     here = rests(client)
     joints.send_goal(MoveJointsGoal(joint_names=["A1"], position=[here[0] + 2.0], speed=0.3))
     until(lambda: client.place().dq[0] > 0.1, "the arm does not set out")
@@ -69,7 +69,7 @@ def test_cancelling_brakes_on_the_path(client: Client, joints) -> None:
     assert rests(client)[0] < here[0] + 1.9
 
 
-def test_another_motion_takes_the_place_and_a_trajectory_too(client: Client, joints) -> None:
+def test_another_motion_takes_the_place_and_a_trajectory_too(client: Client, joints: SimpleClient) -> None:
     here = rests(client)
     other = SimpleClient("/heptarm/move_joints", MoveJointsAction)
     joints.send_goal(MoveJointsGoal(joint_names=["A1"], position=[here[0] - 2.0], speed=0.3))
@@ -88,7 +88,9 @@ def test_another_motion_takes_the_place_and_a_trajectory_too(client: Client, joi
         (["A1"], [0.1], 3.0, "speed"),
     ],
 )
-def test_a_senseless_motion_is_rejected_in_words(joints, names, values, speed, word) -> None:
+def test_a_senseless_motion_is_rejected_in_words(
+    joints: SimpleClient, names: list[str], values: list[float], speed: float, word: str
+) -> None:
     goal = MoveJointsGoal(joint_names=names, position=values, speed=speed)
     assert joints.send_goal_and_wait(goal, LONG) == GoalStatus.REJECTED
     assert not joints.get_result().success and word in joints.get_result().message

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
 
+from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import arrives, goal, long, point, quiet, rests, step
 from tests.conformance.streams import streamed
 from tests.ros1.peer import Client, NodeProcess, call, collect, fresh, publisher, until
@@ -160,9 +161,7 @@ def test_life_cycle(client: Client) -> None:
     assert client.result(client.send(step(client))).code == 0
 
 
-def step_nowhere(client: Client):
-    from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
-
+def step_nowhere(client: Client) -> TrajectoryGoal:
     return TrajectoryGoal(client.joints, (TrajectoryPoint(1.0, (0.0,) * 7),))
 
 

@@ -58,7 +58,7 @@ def save(picture: np.ndarray) -> None:
 def orange(picture: np.ndarray) -> np.ndarray:
     """Which pixels have the colour of the arm's rings, shape (height, width)."""
     red, green, blue = (picture[..., index].astype(int) for index in range(3))
-    return (red > 120) & (red - green > 50) & (green - blue > 10)
+    return np.asarray((red > 120) & (red - green > 50) & (green - blue > 10))
 
 
 def test_rviz_shows_the_arm_and_its_motion(

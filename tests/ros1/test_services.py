@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,14 +27,14 @@ from tests.conformance.case import rests, step, succeeds
 from tests.ros1.peer import Client, call, publisher, until
 
 
-def ask(name: str, kind=Trigger, /, **request: object) -> str:
+def ask(name: str, kind: Any = Trigger, /, **request: object) -> str:
     answer = call(f"/heptarm/{name}", kind, **request)
     assert answer.success, answer.message
-    return answer.message
+    return str(answer.message)
 
 
 @pytest.fixture(autouse=True)
-def as_it_was(client: Client):
+def as_it_was(client: Client) -> Iterator[None]:
     yield
     until(lambda: call("/heptarm/mode/position", Trigger).success, "a motion is still under way")
 
@@ -55,7 +57,7 @@ def test_a_goal_runs_under_joint_impedance_and_a_wrong_stiffness_is_refused(clie
 
 def test_cartesian_and_sine_impedance_hold_the_arm(client: Client) -> None:
     here = rests(client)
-    empty = {
+    empty: dict[str, list[float]] = {
         name: [] for name in ("nullspace", "additional_force", "max_force", "max_velocity", "max_deviation")
     }
     stiffness = [4000.0] * 3 + [300.0] * 3

@@ -10,6 +10,7 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Iterator
+from typing import Any
 
 import actionlib
 import numpy as np
@@ -76,8 +77,8 @@ class Crowd:
         self._thread.start()
 
     def _connect(self, server: xmlrpc.client.ServerProxy, topic: str, name: str) -> socket.socket:
-        _, _, found = server.requestTopic(name, topic, [["TCPROS"]])
-        _, host, port = found  # type: ignore[misc]
+        answer: Any = server.requestTopic(name, topic, [["TCPROS"]])
+        _, _, (_, host, port) = answer
         fields = {
             "callerid": name,
             "topic": topic,

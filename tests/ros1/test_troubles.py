@@ -14,7 +14,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
-from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import long, quiet, rests, step
 from tests.conformance.stage import Stage
 from tests.ros1.peer import Client, NodeProcess, call, collect, until
@@ -120,9 +120,7 @@ def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: Nod
     assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
-def step_anywhere(client: Client):
-    from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
-
+def step_anywhere(client: Client) -> TrajectoryGoal:
     return TrajectoryGoal(client.joints, (TrajectoryPoint(5.0, (0.0,) * 7),))
 
 

@@ -81,7 +81,7 @@ def nodes() -> Iterator[Callable[..., NodeProcess]]:
     running: list[NodeProcess] = []
 
     def start(target: str, **words: object) -> NodeProcess:
-        running.append(NodeProcess(target, **(PATIENT | words)))  # type: ignore[arg-type]
+        running.append(NodeProcess(target, **(PATIENT | words)))
         return running[-1]
 
     yield start

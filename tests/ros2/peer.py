@@ -42,7 +42,7 @@ from tests.conformance.stage import Stage
 #: Discovery can take some seconds, and a busy machine many more [s].
 PATIENCE = 120.0
 #: Time limits of a node on a busy machine.
-PATIENT: dict[str, object] = {"servo__watchdog": 2.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
+PATIENT: dict[str, Any] = {"servo__watchdog": 2.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
 #: Parameters that cases change.
 DEFAULTS: dict[str, object] = {
     "max_deceleration_on_cancel": 2.0,
@@ -367,7 +367,7 @@ def fresh(ros: Ros, found: list[Any]) -> Any:
 class Client:
     """A client for the cases of conformance."""
 
-    preempted = (GoalOutcome.ABORTED,)
+    preempted: tuple[GoalOutcome, ...] = (GoalOutcome.ABORTED,)
     timely = False
     empty_stops = False
 
@@ -431,19 +431,19 @@ class Client:
         return [SentGoal(handle.accepted, handle=handle) for handle in handles]
 
     def cancel(self, sent: SentGoal) -> bool:
-        handle, _ = sent.handle  # type: ignore[misc]
+        handle, _ = sent.handle
         answer = self.ros.wait(handle.cancel_goal_async(), "cancelling is not answered")
         return bool(answer.goals_canceling)
 
     def result(self, sent: SentGoal, timeout: float = PATIENCE) -> ReceivedResult:
-        _, future = sent.handle  # type: ignore[misc]
+        _, future = sent.handle
         answer = self.ros.wait(future, "the goal does not end", timeout)
         return ReceivedResult(
             OUTCOMES[answer.status], ErrorCode(answer.result.error_code), answer.result.error_string
         )
 
     def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
-        handle, _ = sent.handle  # type: ignore[misc]
+        handle, _ = sent.handle
         return list(self._reported[id(handle)])
 
     def restore(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import shlex
 import time
+from collections.abc import Callable
 from typing import Any
 
 import yaml
@@ -114,7 +115,13 @@ def lifecycle(ros: Ros, verb: str, node: str, name: str) -> object:
     return "Transitioning successful"
 
 
-VERBS = {"topic": topic, "service": service, "action": action, "param": param, "lifecycle": lifecycle}
+VERBS: dict[str, Callable[..., object]] = {
+    "topic": topic,
+    "service": service,
+    "action": action,
+    "param": param,
+    "lifecycle": lifecycle,
+}
 
 
 def run(ros: Ros, text: str) -> list[str]:

@@ -52,8 +52,8 @@ def test_every_link_has_a_mesh_and_an_inertia(model: str, packages: Path) -> Non
     shape = ET.parse(ROOT / f"src/heptarm/sim/models/{model.replace('med', 'iiwa')}.xml").getroot()
     inertial = shape.find(".//body[@name='link_0']/inertial")
     assert inertial is not None
-    assert float(base.find("mass").get("value")) == float(inertial.get("mass", ""))  # type: ignore[union-attr,arg-type]
-    values = [float(base.find("inertia").get(name)) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")]  # type: ignore[union-attr,arg-type]
+    assert float(base.find("mass").get("value")) == float(inertial.get("mass", ""))  # type: ignore[arg-type]
+    values = [float(base.find("inertia").get(name)) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")]  # type: ignore[arg-type]
     assert values == pytest.approx([float(one) for one in inertial.get("fullinertia", "").split()])
 
 

@@ -20,7 +20,8 @@ class Moves:
     """A client of one action."""
 
     def __init__(self, ros: Ros, kind: Any, name: str) -> None:
-        self.ros, self.kind, self.reported = ros, kind, []
+        self.ros, self.kind = ros, kind
+        self.reported: list[float] = []
         self._client = ros.act(kind, name)
 
     def start(self, **goal: Any) -> Any:

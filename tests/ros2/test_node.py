@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,7 +144,7 @@ def test_an_integer_is_a_number_as_users_write_it(ros: Ros, spare: Stage, nodes:
     ],
 )
 def test_a_parameter_that_cannot_be_ends_the_node_with_one_line(
-    spare: Stage, values: dict[str, object], words: str
+    spare: Stage, values: dict[str, Any], words: str
 ) -> None:
     node = NodeProcess(spare.target, name="wrong", space="/alone", **values)
     assert node.process.wait(PATIENCE) == 1
@@ -325,7 +326,7 @@ def test_servo_topics_and_their_watchdog(client: Client) -> None:
 
     def away() -> bool:
         publisher.publish(message)
-        return sign * (client.place().q[6] - here[6]) > 0.1
+        return bool(sign * (client.place().q[6] - here[6]) > 0.1)
 
     until(away, "it does not follow")
     rest = rests(client)  # silence

@@ -27,7 +27,7 @@ from heptarm.ros.interface.services import SERVICES
 from heptarm.ros.interface.topics import TOPICS
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, joint_parameters
 from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
-from heptarm.ros.trajectory.stream import is_streamed
+from heptarm.ros.trajectory.point_stream import is_streamed
 from heptarm.values.robot import ROBOTS
 from tests.conformance.stage import Stage
 from tests.interrupts import ctrl_c_interrupts
@@ -53,20 +53,18 @@ def numbers(text: str | None) -> np.ndarray:
 def turn(axis: np.ndarray, angle: float) -> np.ndarray:
     x, y, z = axis
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k)
 
 
 def tip(arm: ET.Element, q: np.ndarray, last: str) -> np.ndarray:
     """The pose of a link, shape (4, 4), by following the joints from the root."""
     into = {
-        joint.find("child").get("link"): joint
-        for joint in arm.iter("joint")
-        if joint.find("child") is not None
-    }  # type: ignore[union-attr]
+        child.get("link"): joint for joint in arm.iter("joint") if (child := joint.find("child")) is not None
+    }
     chain = []
     while last in into:
         chain.append(into[last])
-        last = into[last].find("parent").get("link")  # type: ignore[union-attr,assignment]
+        last = into[last].find("parent").get("link")  # type: ignore[assignment]
     pose = np.eye(4)
     values = iter(q)
     for joint in reversed(chain):
@@ -74,7 +72,7 @@ def tip(arm: ET.Element, q: np.ndarray, last: str) -> np.ndarray:
         step = np.eye(4)
         step[:3, 3] = numbers(None if origin is None else origin.get("xyz"))
         if joint.get("type") == "revolute":
-            step[:3, :3] = turn(numbers(joint.find("axis").get("xyz")), next(values))  # type: ignore[union-attr]
+            step[:3, :3] = turn(numbers(joint.find("axis").get("xyz")), next(values))
         pose = pose @ step
     return pose
 
@@ -94,9 +92,9 @@ def test_an_arm_expands_with_the_limits_of_its_data_sheet(model: str) -> None:
         (robot.dq_max, "velocity"),
         (robot.tau_max, "effort"),
     ):
-        reported = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[union-attr,arg-type]
+        reported = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[arg-type]
         np.testing.assert_allclose(reported, values, rtol=1e-7)
-    mass = sum(float(m.get("value")) for m in arm.iter("mass"))  # type: ignore[arg-type]
+    mass = sum(float(m.get("value", "nan")) for m in arm.iter("mass"))
     assert 20.0 < mass < 35.0
 
 

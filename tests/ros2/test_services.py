@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -16,7 +17,7 @@ from tests.ros2.peer import Client, Ros, until
 
 
 @pytest.fixture
-def ask(ros: Ros, client: Client):
+def ask(ros: Ros, client: Client) -> Iterator[Callable[..., Any]]:
     """Calls a service, which must succeed."""
 
     def call(name: str, kind: Any = Trigger, /, *, refused: bool = False, **request: Any) -> Any:
@@ -36,14 +37,16 @@ def test_every_service_answers_success_and_message() -> None:
         assert {"success", "message"} <= set(response.get_fields_and_field_types()), row.name
 
 
-def test_a_goal_runs_under_joint_impedance_and_a_wrong_stiffness_is_refused(client: Client, ask) -> None:
+def test_a_goal_runs_under_joint_impedance_and_a_wrong_stiffness_is_refused(
+    client: Client, ask: Callable[..., Any]
+) -> None:
     assert "JointImpedance" in ask("mode/joint_impedance", SetJointImpedance, stiffness=[1500.0]).message
     succeeds(client, step(client))
     answer = ask("mode/joint_impedance", SetJointImpedance, refused=True, stiffness=[9000.0] * 7)
     assert "9000" in answer.message and "5000" in answer.message
 
 
-def test_a_pause_holds_a_goal_and_a_resume_lets_it_go_on(client: Client, ask) -> None:
+def test_a_pause_holds_a_goal_and_a_resume_lets_it_go_on(client: Client, ask: Callable[..., Any]) -> None:
     for name in ("mode/position", "pause", "resume"):
         client.ros.find(Trigger, f"{client.name}/{name}")
     sent = client.send(step(client, time=20.0, size=6.0))
@@ -60,7 +63,7 @@ def test_a_pause_holds_a_goal_and_a_resume_lets_it_go_on(client: Client, ask) ->
     assert client.result(sent).code == 0
 
 
-def test_tools_control_and_lists(client: Client, ask) -> None:
+def test_tools_control_and_lists(client: Client, ask: Callable[..., Any]) -> None:
     rests(client)
     tip = Pose(position=Point(z=0.12), orientation=Quaternion(w=1.0))
     ask("attach_tool", AttachTool, name="gripper", mass=1.2, com=Point(z=0.06), tcp=tip)

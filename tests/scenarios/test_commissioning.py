@@ -41,7 +41,8 @@ READ = {
 
 def tables() -> Iterator[tuple[str, list[dict[str, str]]]]:
     """Section and rows of each table of the page that states how sure its rows are."""
-    section, columns, found = "", [""], []
+    section, columns = "", [""]
+    found: list[dict[str, str]] = []
     for line in [*PAGE.read_text(encoding="utf-8").splitlines(), ""]:
         section = line.removeprefix("## ") if line.startswith("## ") else section
         cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
@@ -149,8 +150,9 @@ def test_every_step_of_fri_agrees_on_the_virtual_cabinet() -> None:
             return commissioning.commission(slow, commissioning.SimulatedPerson(slow), only=["fri"])
 
     def late(report: object) -> str:
-        differs = isinstance(report, commissioning.CommissioningReport) and not report.ok
-        return "FRI answers came late" if differs and "came too late" in report.markdown() else ""  # type: ignore[union-attr]
+        if not isinstance(report, commissioning.CommissioningReport) or report.ok:
+            return ""
+        return "FRI answers came late" if "came too late" in report.markdown() else ""
 
     report = retry(attempt, late)
     verdicts = {one.step.name: one.verdict.value for one in report.outcomes}

@@ -55,5 +55,5 @@ def test_each_name_means_something(features: ModuleType) -> None:
 def test_each_scenario_shows_rows_that_there_are(features: ModuleType) -> None:
     _, rows = features.load()
     known = {row.id for row in rows}
-    for one in testing.scenarios():
-        assert set(one.rows) <= known, one.name
+    for scenario in testing.scenarios():
+        assert set(scenario.rows) <= known, scenario.name

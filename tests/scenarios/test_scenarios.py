@@ -105,7 +105,7 @@ def shows_in_real_time(arm: ha.Arm, name: str) -> None:
 
 
 def _check(report: Report, name: str) -> None:
-    assert [one.scenario.name for one in report.outcomes] == [name]
+    assert [outcome.scenario.name for outcome in report.outcomes] == [name]
     assert report.outcomes[0].verdict is Verdict.SHOWN, report.table()
     assert report.outcomes[0].measured
 
@@ -179,7 +179,7 @@ def test_a_robot_is_asked_for_and_slow(arm: ha.Arm) -> None:
         "state.whole",
     ]
     report = testing.run(real, only=names, ask=ask, on_begin=began)
-    verdicts = {one.scenario.name: one for one in report.outcomes}
+    verdicts = {outcome.scenario.name: outcome for outcome in report.outcomes}
     assert verdicts["state.whole"].verdict is verdicts["motions.ptp_joints"].verdict is Verdict.SHOWN
     assert verdicts["motions.straight"].text == "not wanted"
     assert "touches" in verdicts["conditions.touch"].text

@@ -58,7 +58,7 @@ def _servo(**settings: Any) -> Callable[[Arm, Any], object]:
     return do
 
 
-def _within(call: Callable[[Any, Any], object], kind: str = "joint") -> Callable[[Arm, Any], object]:
+def _within(call: Callable[[Any, Any], object], kind: Any = "joint") -> Callable[[Arm, Any], object]:
     """Uses the running servo motion."""
 
     def do(arm: Arm, value: Any) -> object:

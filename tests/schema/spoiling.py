@@ -139,7 +139,7 @@ def checked_fields(message: schema.Message) -> set[str]:
             name, inner = f"{owner}.{one.name}", one.type
             if name in found:
                 continue
-            if bad_values(one) or one.norm is not None or (inner.kind == "list" and list(_lengths(one))):
+            if bad_values(one) or one.norm is not None or (inner.kind == "list" and any(_lengths(one))):
                 found.add(name)
             while inner.kind in ("list", "opt"):
                 assert inner.of is not None

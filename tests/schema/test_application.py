@@ -14,7 +14,7 @@ from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.target import Target
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import Message
-from tests.cabinet.peer import NONCE, Closed, Peer
+from tests.cabinet.peer import NONCE, Closed, Peer, is_of
 from tests.schema.spoiling import SPEC, Case, cases
 
 PATIENCE = 30.0
@@ -126,18 +126,12 @@ def test_each_bad_target_is_counted_and_reported(cabinet: PrivateCabinet, kind: 
             if not isinstance(case.message, kind):
                 continue
             number = peer.ask(wire.ServoOpen(watchdog=2.0)).id
-            peer.wait_for(
-                wire.MotionStarted, lambda event, number=number: event.id == number, timeout=PATIENCE
-            )  # type: ignore[misc]
+            peer.wait_for(wire.MotionStarted, is_of(number), timeout=PATIENCE)
             peer.send(dataclasses.replace(case.message, servo=number))
             assert isinstance(peer.ask(wire.ServoClose(servo=number)), wire.Accepted)
-            status = peer.wait_for(
-                wire.ServoStatus, lambda reported, number=number: reported.servo == number, timeout=PATIENCE
-            )  # type: ignore[misc]
+            status = peer.wait_for(wire.ServoStatus, is_of(number), timeout=PATIENCE)
             assert (status.refused, status.applied, status.code) == (1, 0, case.bad.code), (case, status)
-            peer.wait_for(
-                wire.MotionFinished, lambda event, number=number: event.id == number, timeout=PATIENCE
-            )  # type: ignore[misc]
+            peer.wait_for(wire.MotionFinished, is_of(number), timeout=PATIENCE)
 
 
 def test_a_bad_hello_gets_no_session(cabinet: PrivateCabinet) -> None:

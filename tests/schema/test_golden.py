@@ -11,8 +11,8 @@ import pytest
 from tests.schema.python_side import recoded
 
 VECTORS = [
-    (one["message"], one["type"], bytes.fromhex(one["body"]))
-    for one in json.loads((Path(__file__).resolve().parents[2] / "schema/golden/vectors.json").read_text())
+    (load["message"], load["type"], bytes.fromhex(load["body"]))
+    for load in json.loads((Path(__file__).resolve().parents[2] / "schema/golden/vectors.json").read_text())
 ]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import nan
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,8 +29,8 @@ UNKNOWN, RANGE, CONDITION, LIMIT, UNSUPPORTED = 42, 2, 5, 50, 40
 FAR = (0.0, 2.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 HOLD = wire.Hold(duration=1.0)
 STEP = wire.LinRel(offset=wire.Pose(xyz=(0.0, 0.0, 0.01), quat=(0.0, 0.0, 0.0, 1.0)))
-SPRING = mode_message(CartesianImpedance())
-SINE = mode_message(SineImpedance())
+SPRING: Any = mode_message(CartesianImpedance())
+SINE: Any = mode_message(SineImpedance())
 TOOL = wire.ToolInfo(name="t", mass=1.0, com=(0.0,) * 3, inertia=(0.0,) * 6)
 ORIGIN = wire.Pose(xyz=(0.0,) * 3, quat=(0.0, 0.0, 0.0, 1.0))
 LAMP, BUTTON = "MediaFlange.LEDBlue", "MediaFlange.UserButton"
@@ -54,7 +55,7 @@ class Wrong:
     code: int = UNKNOWN
 
 
-def moving(motion: Motion, **more: object) -> Callable[[Arm], object]:
+def moving(motion: Motion, **more: Any) -> Callable[[Arm], object]:
     return lambda arm: arm.start(motion, **more)
 
 

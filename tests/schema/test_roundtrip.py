@@ -50,8 +50,8 @@ def test_a_damaged_body_is_refused_or_read_but_nothing_else(
 
 def _group_by_group(body: bytes) -> State:
     groups = StateGroups(body)
-    state = State(**{one.name: groups.get(one.name) for one in fields(State)})
-    stamps = [group.stamp for one in fields(State) if (group := getattr(state, one.name)) is not None]
+    state = State(**{field.name: groups.get(field.name) for field in fields(State)})
+    stamps = [group.stamp for field in fields(State) if (group := getattr(state, field.name)) is not None]
     assert groups.stamp == max(stamps, default=0) and groups.get("no such group") is None
     return state
 
@@ -86,11 +86,11 @@ def test_the_groups_of_received_bytes_have_the_numbers_of_the_messages(seed: int
         assert group.stamp == message.stamp
         if name == "safety":
             bits = {one.name.lower() for one in SafetyBits if one.name and one & message.bits}
-            assert bits == {one.name for one in fields(group) if getattr(group, one.name) is True}
+            assert bits == {field.name for field in fields(group) if getattr(group, field.name) is True}
             continue
-        for one in fields(group):
-            read = getattr(group, one.name)
-            wanted = getattr(message, {"id": "motion"}.get(one.name, one.name))
+        for field in fields(group):
+            read = getattr(group, field.name)
+            wanted = getattr(message, {"id": "motion"}.get(field.name, field.name))
             np.testing.assert_array_equal(read, wanted)  # a number may be NaN
             assert not (isinstance(read, np.ndarray) and read.flags.writeable)
 

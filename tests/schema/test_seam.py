@@ -92,7 +92,7 @@ def test_an_order_comes_back_as_it_was(motion: seam.PlantMotion) -> None:
 
 
 def test_every_member_of_the_union_has_come_back() -> None:
-    assert {type(one) for one in (*MOTIONS, *MOTIONS[5].segments)} == set(get_args(seam.PlantMotion))  # type: ignore[union-attr]
+    assert {type(one) for one in (*MOTIONS, *MOTIONS[5].segments)} == set(get_args(seam.PlantMotion))
 
 
 def test_an_unknown_motion_is_refused() -> None:
@@ -152,7 +152,7 @@ def test_sections_of_the_memory_follow_each_other() -> None:
     ],
 )
 def test_a_wrong_schema_is_refused(tmp_path: Path, old: str, new: str, complaint: str) -> None:
-    text = (plant.HERE / "plant.toml").read_text(encoding="utf-8")
+    text = (Path(plant.__file__).parent / "plant.toml").read_text(encoding="utf-8")
     assert old in text
     (tmp_path / "plant.toml").write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(ValueError, match=complaint):

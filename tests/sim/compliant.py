@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
-from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.control_laws.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
+from heptarm.sim.control_laws.laws import MeasuredState
 from heptarm.sim.plant.world import specification
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
@@ -56,7 +56,14 @@ class Arm:
         self.mass = np.zeros((nv, nv))
         self.start = np.array(q, dtype=np.float64)
         self.sensed = MeasuredState(
-            d.qpos[:7], d.qvel[:7], self.mass[:7, :7], d.qfrc_bias[:7], d.qfrc_passive[:7], *[self.start] * 3
+            d.qpos[:7],
+            d.qvel[:7],
+            self.mass[:7, :7],
+            d.qfrc_bias[:7],
+            d.qfrc_passive[:7],
+            self.start,
+            self.start,
+            self.start,
         )
         self.push = np.zeros(6)  # on the motion frame, base axes
         self.time = 0.0

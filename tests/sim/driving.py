@@ -8,7 +8,7 @@ import numpy as np
 
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 
 READY = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)

@@ -10,7 +10,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.interpolator import FAST_JERK
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
 from tests.sim import motions
@@ -54,34 +54,45 @@ KINDS = {
 class Ideal(Plant):
     """A plant that follows at once."""
 
-    def tick(self) -> None:
+    def tick(self, most: int = 1) -> int:
         self._advance()
         _, now, after = self.interpolator.command
         self._q[:] = after
         self._dq[:] = (after - now) / TICK
         self.tick_count += 1
+        return 1
 
     @property
     def speed(self) -> Array:
         """Of the set-points, shape (7,) [rad/s]."""
-        return self._dq.copy()
+        return np.array(self._dq)
 
     @property
     def acceleration(self) -> Array:
         """Of the set-points, shape (7,) [rad/s²]."""
         before, now, after = self.interpolator.command
-        return (after - 2 * now + before) / TICK**2
+        return np.asarray((after - 2 * now + before) / TICK**2)
 
     @property
     def is_under_way(self) -> bool:
         """Whether the set-points move, or a motion brakes that has not come to its end."""
         run = self.interpolator.run
-        braking = run is not None and run.cancelled and not run.ended
+        braking = run is not None and run.cancelled and run.phase != "settling"
         return braking or bool(self._dq.any())
 
     def press(self) -> None:
         """Press the emergency stop."""
         self.safety.request_stop(StopRequest.EMERGENCY_STOP)
+
+    @property
+    def _q(self) -> Array:
+        """Its measured positions, shape (7,) [rad]."""
+        return np.asarray(self.data.qpos[:7])
+
+    @property
+    def _dq(self) -> Array:
+        """Its velocities, shape (7,) [rad/s]."""
+        return np.asarray(self.data.qvel[:7])
 
 
 def stopping_time(plant: Plant, how: str) -> float:

@@ -33,7 +33,7 @@ class Limits(TypedDict, total=False):
 
 def joint_dynamics(given: Limits) -> seam.JointDynamics:
     names = ("velocity", "acceleration", "jerk")
-    return seam.JointDynamics(**{one: tuple(given.get(f"joint_{one}", _OPEN)) for one in names})  # type: ignore[misc,arg-type]
+    return seam.JointDynamics(**{one: tuple(given.get(f"joint_{one}", _OPEN)) for one in names})  # type: ignore[arg-type]
 
 
 def path_dynamics(given: Limits) -> seam.CartesianDynamics:

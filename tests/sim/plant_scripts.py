@@ -12,7 +12,7 @@ from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import HOME, Plant
 from heptarm.sim.plant.sensor_errors import sensor_errors
 from heptarm.sim.plant.world import Box
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.robot import Body, robot
 from tests.sim import motions

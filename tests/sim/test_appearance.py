@@ -17,7 +17,7 @@ from heptarm.sim.picture import ArmPicture, Viewpoint
 from heptarm.sim.plant.appearance import DRAWN_GROUP, HIDDEN_GROUP, LINKS, ArmMeshes
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.world import MODELS, compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import ROBOTS
 
 ROOT = Path(__file__).parents[2]
@@ -202,7 +202,7 @@ def test_a_picture_shows_the_arm_where_the_kinematics_has_it() -> None:
     for q in POSTURES[:1] + ((-0.8, 0.4, 0.0, -1.6, 0.0, 1.0, 0.0),):
         image = picture.draw(np.array(q))
         assert image.shape == (200, 240, 3)
-        arm = (image < 245).any(axis=2)
+        arm = np.asarray((image < 245).any(axis=2))
         assert 0.02 < arm.mean() < 0.3
         pose = forward(ROBOTS["iiwa14"], np.array(q))
         inside = pose[:3, 3] - 0.03 * pose[:3, 2]  # in the middle of link 7

@@ -13,7 +13,7 @@ from heptarm.planning.planner import plan
 from heptarm.planning.seam import PlantMotion
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, Track, numbers, ready, run
@@ -50,7 +50,7 @@ def square(start: Pose, blending: tuple[float, float, float]) -> tuple[PlantMoti
 
 
 def speeds(track: Track, plant: Plant) -> Array:
-    return np.linalg.norm(np.diff(points(plant, track.q_cmd), axis=0), axis=1) * 1e3
+    return np.asarray(np.linalg.norm(np.diff(points(plant, track.q_cmd), axis=0), axis=1) * 1e3)
 
 
 def check_limits(track: Track, plant: Plant) -> None:

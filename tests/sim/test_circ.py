@@ -13,7 +13,7 @@ from heptarm.planning.motion import PlanError
 from heptarm.planning.seam import Circ
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.circle import arc
 from heptarm.values.pose import Pose
 from tests.sim import motions

@@ -211,7 +211,8 @@ def test_a_servo_motion_breaks_too() -> None:
 
 
 def test_an_observer_hears_edges_whatever_moves() -> None:
-    plant, heard = ready(), []
+    plant = ready()
+    heard: list[bool] = []
     number = plant.condition_monitor.observe(
         WrenchAbove(frame=OWN, components=ALL, threshold=5.0), heard.append, at_once=True
     )

@@ -7,11 +7,11 @@ import pytest
 
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.planning.seam import MeasuringFrame, WrenchAbove, WrenchComponents
-from heptarm.sim.control.laws import STIFFNESS
+from heptarm.sim.control_laws.laws import STIFFNESS
 from heptarm.sim.controller.command import ConditionWatch, MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.world import Box
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
 from tests.sim import motions

@@ -19,7 +19,7 @@ from tests.sim.driving import READY, Ear, numbers, ready
 
 HERE = np.array(READY)
 NAN = math.nan
-KINDS = {"hold": motions.hold(), "servo": motions.servo(), "direct": motions.direct()}
+KINDS: dict[str, Any] = {"hold": motions.hold(), "servo": motions.servo(), "direct": motions.direct()}
 COMPLIANT = CartesianImpedance((500.0, 500.0, 500.0, 100.0, 100.0, 100.0), frame="base")
 
 

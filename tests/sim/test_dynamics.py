@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -46,14 +47,15 @@ MOTIONS: dict[str, Callable[..., PlantMotion]] = {
         segments=motions.spline(
             motions.spl(there(-0.02, 0.08, 0.02, 0.2)), motions.spl(there(0, 0.16, 0))
         ).segments,
-        dynamics=motions.path_dynamics(limits),
-        joints=motions.joint_dynamics(limits),
+        dynamics=motions.path_dynamics(cast(Any, limits)),
+        joints=motions.joint_dynamics(cast(Any, limits)),
     ),
     "spline_joints with its own limits": lambda **limits: seam.JointSpline(
-        points=(motions.ptp(JOINTS), motions.ptp(FURTHER)), dynamics=motions.joint_dynamics(limits)
+        points=(motions.ptp(JOINTS), motions.ptp(FURTHER)), dynamics=motions.joint_dynamics(cast(Any, limits))
     ),
     "batch with its own limits": lambda **limits: seam.Batch(
-        motions=(motions.ptp(JOINTS), motions.ptp(FURTHER)), dynamics=motions.joint_dynamics(limits)
+        motions=(motions.ptp(JOINTS), motions.ptp(FURTHER)),
+        dynamics=motions.joint_dynamics(cast(Any, limits)),
     ),
 }
 CARTESIAN = ("lin", "lin_rel", "circ", "spline", "spline with its own limits")

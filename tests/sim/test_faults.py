@@ -19,7 +19,7 @@ from heptarm.planning.planner import plan
 from heptarm.sim.controller import queue as queue_module
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
 

@@ -50,9 +50,9 @@ def test_it_is_drawn_and_a_scenes_tool_is_on_it() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     tops = [
-        float((one.vertices @ data.geom_xmat[one.index].reshape(3, 3).T)[:, 2].max())
-        + data.geom_xpos[one.index][2]
-        for one in drawn_shapes(model)
+        float((shape.vertices @ data.geom_xmat[shape.index].reshape(3, 3).T)[:, 2].max())
+        + data.geom_xpos[shape.index][2]
+        for shape in drawn_shapes(model)
     ]
     assert max(tops) == pytest.approx(1.332, abs=1e-6)
     with_tool = compiled("iiwa14+touch", scene=Scene.of("bins"))

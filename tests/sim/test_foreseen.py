@@ -6,24 +6,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heptarm._library import Unavailable
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from tests.sim import motions
 from tests.sim.driving import READY
-
-try:
-    tick_library()
-except Unavailable as reason:
-    pytest.skip(f"no compiled part: {reason}", allow_module_level=True)
 
 FAR, NEAR = (0.8, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8), (0.1, 0.5, 0.0, -1.3, 0.0, 0.9, 0.001)
 BATCH = MotionCommand(1, motions.batch(*(motions.ptp(one) for one in (FAR, NEAR))))
@@ -50,6 +42,12 @@ class Parts:
 
     def __init__(self, plant: Plant) -> None:
         self._plant, self.ticks = plant, list[int]()
+
+    def started(self) -> None:
+        """The motion begins."""
+
+    def finished(self, cause: str, text: str) -> None:
+        """The motion has ended."""
 
     def reached(self, part: int) -> None:
         """A part begins."""

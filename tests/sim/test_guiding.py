@@ -162,14 +162,15 @@ def test_without_limits_of_its_own_it_is_bounded(force: tuple[float, ...]) -> No
     assert ear.causes == ["started", "done"]
 
 
-@pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 60.0)])
+@pytest.mark.parametrize("force", [(15.0, 0.0, 0.0), (0.0, 15.0, 0.0), (0.0, 0.0, 60.0), (60.0, 60.0, 0.0)])
 def test_floating_joints_are_damped_and_bounded(force: tuple[float, ...]) -> None:
     plant, ear = ready(), Ear()
     plant.submit(MotionCommand(1, motions.hold(10.0), mode=JointImpedance(0.0, damping=0.0), listener=ear))
     plant.step(50)
-    _, dq = push_along(plant, force, 2.0)
+    q, dq = push_along(plant, force, 2.0)
     fastest = np.abs(dq)
     assert fastest.max() > 0.1 and (fastest <= 0.52 * plant.robot.dq_max).all()
+    assert speeds(plant, q, dq).max() <= 0.26
     plant.step(1000)
     assert np.abs(plant.snapshot.dq).max() < 1e-2, "it comes to rest where it is left"
     assert ear.causes == ["started"]

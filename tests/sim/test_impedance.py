@@ -12,7 +12,7 @@ import pytest
 
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.model.kinematics import jacobian
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import CartesianImpedance
@@ -241,7 +241,7 @@ def test_stiffness_changes_under_load_without_a_blow() -> None:
     arm.step(1.5)
     assert arm.law.deviation[2] == pytest.approx(-0.05, rel=0.02)
     before = arm.torque
-    arm.law.change(replace(compliant_mode, stiffness=(3000.0,) * 3 + (100.0,) * 3))
+    arm.law.change(replace(compliant_mode, stiffness=(3000.0,) * 3 + (100.0,) * 3))  # type: ignore[arg-type]
     for _ in range(100):
         arm.tick()
         assert np.abs(arm.torque - before).max() < 12.0

@@ -12,7 +12,7 @@ import heptarm as ha
 from heptarm import model
 from heptarm.arm.translate.motions import item
 from heptarm.planning.lookahead import FramesOfArm, PlannedProgram, look_ahead
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
@@ -75,8 +75,8 @@ def test_the_axes_of_a_relative_line() -> None:
 
 def test_a_blended_program_has_no_stop_and_an_exact_one_has() -> None:
     corners = (moved(y=0.1), moved(x=-0.1, y=0.1), moved(x=-0.1))
-    blended = ahead(*(ha.lin(one, speed_mps=0.2, blend_m=0.02) for one in corners))
-    exact = ahead(*(ha.lin(one, speed_mps=0.2) for one in corners))
+    blended = ahead(*(ha.lin(corner, speed_mps=0.2, blend_m=0.02) for corner in corners))
+    exact = ahead(*(ha.lin(corner, speed_mps=0.2) for corner in corners))
     assert blended.is_blended == (True, True, False) and exact.is_blended == (False,) * 3
     assert blended.duration < exact.duration - 0.2
     begins = np.searchsorted(blended.t, blended.begins[1:])

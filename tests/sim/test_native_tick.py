@@ -1,9 +1,10 @@
-"""The arithmetic of a tick in C does what the one in Python does: two plants follow the same scripts."""
+"""The arithmetic of a tick does what its oracle in Python does: two plants follow the same scripts."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,21 +12,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from heptarm._library import SWITCH, Unavailable
+from heptarm._library import Unavailable
 from heptarm.planning.seam import StateWords
-from heptarm.planning.table import ahead_library
+from heptarm.planning.table import MANY, MotionTable, SetPointRows
+from heptarm.sim.control_laws.laws import MeasuredState, PositionLaw
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant import native
-from heptarm.sim.plant.native import tick_library
+from heptarm.sim.plant import plant as plant_module
 from heptarm.sim.plant.plant import Plant
+from heptarm.values.checks import Array
+from heptarm.values.robot import ROBOTS
+from tests.oracles.set_points import ahead
+from tests.oracles.tick import PythonTick, position_torque
 from tests.sim import motions
 from tests.sim.driving import READY
 from tests.sim.plant_scripts import PLANT_SCRIPTS
-
-try:
-    tick_library()
-except Unavailable as reason:
-    pytest.skip(f"no compiled part: {reason}", allow_module_level=True)
 
 #: Words of a state that are integers.
 WHOLE = [
@@ -44,16 +45,21 @@ SAME, SAME_LOAD = 2e-12, 1e-9
 
 @contextmanager
 def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Without the compiled parts."""
-    try:
-        with monkeypatch.context() as patched:
-            patched.setenv(SWITCH, "1")
-            tick_library.cache_clear()
-            ahead_library.cache_clear()
-            yield
-    finally:
-        tick_library.cache_clear()
-        ahead_library.cache_clear()
+    """With the oracles instead of the compiled parts."""
+    with monkeypatch.context() as patched:
+        patched.setattr(plant_module, "NativeTick", PythonTick)
+        patched.setattr(SetPointRows, "compute", _compute)
+        patched.setattr(PositionLaw, "_undisturbed", staticmethod(position_torque))
+        yield
+
+
+def _compute(rows: SetPointRows, table: MotionTable, time: float, step: float, last: Array) -> int:
+    """`SetPointRows.compute` by its oracle."""
+    times, places, joints = ahead(table, time, step, last, rows._leap)
+    count = len(times)
+    rows.times[:count], rows.places[:count] = array("d", times), array("d", places)
+    rows.joints, rows.is_last = joints, count < MANY
+    return count
 
 
 @pytest.mark.parametrize("name", PLANT_SCRIPTS)
@@ -72,25 +78,46 @@ def test_every_state_of_a_script_is_the_same(name: str, monkeypatch: pytest.Monk
     assert np.ptp(found[:, StateWords.Q], axis=0).max() > 1e-3  # something has moved
 
 
-def test_a_robot_that_cannot_compile_computes_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("seed", range(20))
+def test_the_law_of_position_control_is_that_of_its_oracle(seed: int) -> None:
+    chance = np.random.default_rng(seed)
+    full = chance.normal(size=(9, 9))  # of a world with two more joints
+    vectors = chance.normal(size=(7, 7))
+    sensed = MeasuredState(vectors[0], vectors[1], full[:7, :7], *vectors[2:])
+    expected = position_torque(sensed)
+    scale = 1.0 + np.abs(full[:7, :7]).sum(axis=1) * 4e6
+    assert (np.abs(PositionLaw().torque(sensed) - expected) < 1e-15 * 16 * scale).all()
+    preload = chance.normal(size=7)
+    locked = PositionLaw(preload, is_locked=True).torque(sensed)
+    assert (np.abs(locked - expected - preload) < 1e-15 * 16 * scale).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_written_state_is_that_of_the_oracle(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At random postures, on straight arms too, where status and quaternion change."""
+    found = Plant(name, q=READY)
     with in_python(monkeypatch):
-        plant = Plant("iiwa7", q=READY)
-        plant.step(5)
-    assert plant.shared.read(5) is not None
+        expected = Plant(name, q=READY)
+    chance, low, high = np.random.default_rng(4), found.robot.q_min, found.robot.q_max
+    for k in range(200):
+        q = chance.uniform(low, high) * chance.integers(0, 2, 7)
+        for plant in (found, expected):
+            plant.data.qpos[:7] = q
+            plant._native.write(k, q, words=(1, 2, 3), times=(0.5, 1.5))
+            plant._native.publish(k)
+        one, other = (plant.shared.read(k) for plant in (found, expected))
+        assert one is not None and other is not None
+        assert (one[WHOLE].view(np.int64) == other[WHOLE].view(np.int64)).all()
+        w = StateWords.POSE.stop - 1
+        if abs(one[w]) < 1e-9:  # a half turn: both quaternions mean it
+            one[w - 3 : w + 1] *= np.sign(one[w - 3 : w] @ other[w - 3 : w])
+        assert np.abs(one - other).max() < 1e-14
 
 
-def test_a_mujoco_that_does_not_show_its_functions_is_called_from_python(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    tick_library.cache_clear()
-    with monkeypatch.context() as patched:
-        patched.setattr(native, "_CALLED", {"mj_no_such_function": "step1"})
-        with pytest.raises(Unavailable, match="shows no mj_no_such_function"):
-            native._mujoco()
-        plant = Plant("iiwa7", q=READY)
-        plant.step(5)
-    tick_library.cache_clear()
-    assert plant.shared.read(5) is not None
+def test_a_mujoco_that_does_not_show_its_functions_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "_CALLED", {"mj_no_such_function": "step1"})
+    with pytest.raises(Unavailable, match="shows no mj_no_such_function"):
+        Plant("iiwa7", q=READY)
 
 
 def test_a_motion_in_position_control_is_computed_in_c_alone(monkeypatch: pytest.MonkeyPatch) -> None:

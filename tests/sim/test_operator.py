@@ -132,7 +132,7 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
     place = plant.signals.place("Cell.Door", is_output=False)
     plant.signals.place("Flange.Door", is_output=False)
     pressed: list[tuple[str, int]] = []
-    operator.press = lambda bar, slot: not pressed.append((bar, slot))  # type: ignore[func-returns-value]
+    operator.press = lambda bar, slot: not pressed.append((bar, slot))
     operator.schedule("set cell.door true@0.01")
     operator.schedule("set Cell.Lid true@0.01")  # there is none: the arm continues
     for _ in range(20):

@@ -10,7 +10,7 @@ from heptarm.model import dynamics
 from heptarm.model.kinematics import forward
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import Body, symmetric
 from tests.sim import motions

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,7 +96,7 @@ def _never(_: bool) -> None:
     raise AssertionError
 
 
-CAUSES = {
+CAUSES: dict[str, Callable[[Any, Any], object]] = {
     "a motion": lambda plant, operator: plant.submit(_motion()),
     "a condition": lambda plant, operator: plant.condition_monitor.observe(
         seam.SignalIs(place=0, value=True), _never, at_once=False

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.planning.seam import SLOTS, OperationMode, SafetyFlags, StateWords
+from heptarm.planning.seam import SLOTS, OperationMode, Ptp, SafetyFlags, StateWords
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.interpolator import REDUCED_SPEED
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
@@ -98,7 +98,8 @@ def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(asked
     plant.resume()
     run(plant)
     assert ear.causes == ["started", "done"]
-    assert np.abs(plant.snapshot.q - KINDS["ptp"].motion.q).max() < 1e-4
+    motion = KINDS["ptp"].motion
+    assert isinstance(motion, Ptp) and np.abs(plant.snapshot.q - motion.q).max() < 1e-4
     assert flags(plant) & SafetyFlags.BRAKES_OPEN
 
 

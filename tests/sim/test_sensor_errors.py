@@ -10,7 +10,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant import sensor_errors as errors
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import SensorErrors, parse_sensors, sensor_errors
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
 from tests.sim import motions

@@ -13,7 +13,7 @@ from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready
@@ -204,6 +204,20 @@ def test_the_override_and_a_pause_slow_it_down(kind: str) -> None:
     assert np.abs(commands(plant, 2500)[-1] - HERE - 0.2).max() < 1e-6
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_change_of_the_override_keeps_every_axis_within_its_acceleration(kind: str) -> None:
+    """An axis that accelerates or brakes already has no room for the whole change."""
+    plant, _ = serving(kind)
+    random = np.random.default_rng(12)
+    path = [np.array([HERE] * 3)]
+    for number, override in enumerate([0.3, 1.0, 0.0, 0.6, 1.0, 0.05, 1.0, 0.3, 1.0] * 2):
+        plant.override = override
+        plant.shared.post(7, HERE + random.uniform(-0.9, 0.9, 7))
+        path.append(commands(plant, 60 + 40 * (number % 4)))
+    within_limits(plant, np.vstack(path))
+    assert np.ptp(np.vstack(path), axis=0).min() > 0.1
+
+
 # ------------------------------------------------------------------------------- joint impedance
 
 
@@ -223,6 +237,24 @@ def test_without_stiffness_the_arm_floats_away_from_a_push() -> None:
     plant.apply_wrench((0.0, 3.0, 0.0))
     plant.step(1000)
     assert np.abs(plant.snapshot.q - HERE).max() > 0.05
+
+
+@pytest.mark.parametrize("push", [-1.0, 1.0])
+def test_behind_a_compliant_arm_at_its_limit_the_set_points_are_inside(push: float) -> None:
+    """The arm gives a hair beyond its limit, and position control began there."""
+    start = HERE.copy()
+    start[3] = ready().robot.q_min[3]
+    plant = Plant("iiwa14", q=tuple(start.tolist()))
+    plant.submit(MotionCommand(1, motions.hold(0.3), mode=JointImpedance(3000.0)))
+    plant.submit(MotionCommand(2, motions.ptp(tuple(HERE.tolist()))))
+    plant.apply_wrench((push, 0.0, 0.0))
+    given = []
+    while not plant.idle:
+        plant.tick()
+        given.append((plant.snapshot.q[3], plant.snapshot.q_cmd[3]))
+    q, set_points = np.array(given).T
+    assert (set_points >= plant.robot.q_min[3] - 1e-9).all()
+    assert (q.min() < plant.robot.q_min[3] - 1e-6) == (push < 0.0)
 
 
 @pytest.mark.parametrize("stiffness", [100.0, 1000.0, 5000.0])

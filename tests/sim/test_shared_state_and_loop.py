@@ -199,7 +199,7 @@ print("".join(map(str, found)))
 def test_all_objects_are_collected_while_the_robot_rests() -> None:
     command = [sys.executable, "-c", _COLLECTIONS]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
-    moving, resting, moving_again = (set(one) for one in re.split("(2+)", done.stdout.strip()))
+    moving, resting, moving_again = (set(part) for part in re.split("(2+)", done.stdout.strip()))
     assert (moving, resting, moving_again) == ({"1"}, {"2"}, {"1"})
 
 

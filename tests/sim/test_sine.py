@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.control.cartesian_impedance import RAMP, OverlaidForce
-from heptarm.values.arrays import Array
+from heptarm.sim.control_laws.cartesian_impedance import RAMP, OverlaidForce
+from heptarm.values.checks import Array
 from heptarm.values.mode.directions import DIRECTIONS
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance

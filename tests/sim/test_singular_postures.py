@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.planning.geometry import Slerp
 from heptarm.planning.motion import PlanError
 from heptarm.planning.seam import PlantMotion
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from tests.sim import motions
 from tests.sim.driving import READY, numbers, run
@@ -28,8 +29,8 @@ ROUND = {
 }
 
 
-def ready(q: npt.ArrayLike = READY) -> Plant:
-    return Plant("iiwa14", q=q)
+def ready(q: Sequence[float] | Array = READY) -> Plant:
+    return Plant("iiwa14", q=tuple(map(float, q)))
 
 
 @pytest.mark.parametrize("degrees", ROUND.values(), ids=ROUND)
@@ -92,6 +93,31 @@ def test_half_a_turn_goes_where_the_arm_can_follow(a7: float, noise: float) -> N
     track = run(plant, MotionCommand(1, motions.lin(numbers(goal))))
     turned = np.degrees(track.q_cmd[-1][6]) - a7
     assert turned == pytest.approx(180 if a7 < 0 else -180, abs=0.01)
+
+
+@pytest.mark.parametrize("a7", [-150, -60, 60, 150])
+@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+def test_half_a_turn_in_a_spline_goes_where_the_arm_can_follow(a7: float, noise: float) -> None:
+    start = deg(0, 30, 0, -90, 0, 60, a7)
+    plant = ready(q=start)
+    here = Pose.from_matrix(forward(plant.robot, start))
+    via = Pose.of(here.xyz + [0.0, 0.05, 0.0], here.quat)
+    goal = Pose.of(here.xyz + [0.0, 0.1, 0.02], here.quat) @ Pose.xyz_abc(a=pi + noise)
+    one = motions.spline(motions.spl(numbers(via)), motions.spl(numbers(goal)))
+    track = run(plant, MotionCommand(1, one))
+    turned = np.degrees(track.q_cmd[-1][6] - track.q_cmd[0][6])
+    assert (turned > 90) == (a7 < 0), turned
+    assert Pose.from_matrix(forward(plant.robot, track.q_cmd[-1])).angle_to(goal) < 1e-6
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+def test_a_pose_between_two_that_are_half_a_turn_apart_does_not_depend_on_noise(noise: float) -> None:
+    start = Pose.xyz_abc(0.5, 0.0, 0.4, 0.3, 0.2, pi - 0.1)
+    goal = start @ Pose.xyz_abc(a=pi + noise)
+    middle = start.interpolate(goal, 0.5)
+    assert middle.angle_to(start.interpolate(start @ Pose.xyz_abc(a=pi), 0.5)) < 1e-6
+    line = Slerp(start.quat, goal.quat)
+    assert abs(float(np.array(line.at(0.5)) @ middle.quat)) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_half_a_turn_that_no_direction_allows_is_refused() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,16 @@ from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
 
-LIMITS = {"velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5), "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0)}
+LIMITS: dict[str, Any] = {
+    "velocity": (0.2, 0.2, 0.2, 0.5, 0.5, 0.5),
+    "acceleration": (1.0, 1.0, 1.0, 3.0, 3.0, 3.0),
+}
 TCP = Pose.xyz_abc(0.02, 0.0, 0.15, 0.3, 0.0, 0.2)
 
 
@@ -176,11 +180,11 @@ QUICK: dict[str, Any] = {"velocity": (0.5,) * 3 + (1.0,) * 3, "acceleration": (2
 HOME = (0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0)
 
 
-def at(*degrees: float) -> tuple[Plant, Ear, Pose]:
+def at(*degrees: float, **limits: Any) -> tuple[Plant, Ear, Pose]:
     """A plant with a quick straight servo motion, and the pose at its start."""
     plant, ear = Plant("iiwa14", q=tuple(np.radians(degrees).tolist())), Ear()
     start = Pose.from_matrix(forward(plant.robot, plant.snapshot.q_cmd))
-    plant.submit(MotionCommand(7, motions.straight(**QUICK), listener=ear))
+    plant.submit(MotionCommand(7, motions.straight(**(limits or QUICK)), listener=ear))
     plant.step(2)
     return plant, ear, start
 
@@ -199,6 +203,41 @@ def followed(plant: Plant, target: Callable[[], Pose], ticks: int) -> Array:
     assert (np.abs(speed) / robot.dq_max).max() <= 1.0
     assert (np.abs(np.diff(speed, axis=0)) * 1e3 / robot.ddq_max).max() <= 1.0
     return q
+
+
+#: Ticks at which the override changes, and what it is from then on.
+OVERRIDES = {0: 0.3, 120: 1.0, 260: 0.0, 420: 0.6, 430: 1.0, 600: 0.05, 750: 1.0, 1000: 0.3, 1100: 1.0}
+
+
+@pytest.mark.parametrize("seed", [2, 12, *range(100, 100 + longer(0, 60))])
+def test_a_change_of_the_override_keeps_every_axis_within_its_acceleration(seed: int) -> None:
+    """Raising the override within a stream once took 12.3 rad/s² of an axis that may 10."""
+    random = np.random.default_rng(seed)
+    plant, ear, start = at(*HOME, velocity=(0.8,) * 3 + (2.0,) * 3, acceleration=(4.0,) * 3 + (8.0,) * 3)
+    goal, ticks = start, 0
+
+    def target() -> Pose:
+        nonlocal goal, ticks
+        if ticks % 200 == 0:
+            turn = Pose.xyz_abc(0, 0, 0, *random.uniform(-1.2, 1.2, 3))
+            goal = moved(start, *random.uniform(-0.4, 0.4, 3)) @ turn
+        ticks += 10
+        return goal
+
+    for begin, end in pairwise([*OVERRIDES, 1400]):
+        plant.override = OVERRIDES[begin]
+        q = followed(plant, target, end - begin)
+    assert ear.causes == ["started"] and np.abs(q[-1] - q[0]).max() > 0.0
+
+
+@pytest.mark.parametrize("a7", [-150, -60, 60, 150])
+@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+def test_half_a_turn_goes_where_the_arm_can_follow(a7: float, noise: float) -> None:
+    plant, ear, start = at(0, 30, 0, -90, 0, 60, a7)
+    goal = start @ Pose.xyz_abc(a=np.pi + noise)
+    q = followed(plant, lambda: goal, 4500)
+    assert np.degrees(q[-1][6]) - a7 == pytest.approx(180 if a7 < 0 else -180, abs=0.01)
+    assert ear.causes == ["started"]
 
 
 def turned(start: Pose, a: float = 0.0, b: float = 0.0) -> Pose:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from heptarm._library import SWITCH
 from heptarm.planning.motion import TICK
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
-from heptarm.planning.table import MANY, MANY_IN_PYTHON, SetPointRows, ahead_library
+from heptarm.planning.seam import PlantMotion
+from heptarm.planning.table import MANY, MotionTable, SetPointRows
 from heptarm.planning.time_scaling import TabulatedProfile
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
+from tests.oracles.set_points import ahead
 from tests.sim import motions
 from tests.sim.driving import READY
 
@@ -22,23 +23,12 @@ IIWA = robot("iiwa14")
 START = np.array(READY)
 FAR, NEAR = (1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8), (0.002, 0.5, 0.0, -1.3, 0.0, 0.9, 0.001)
 NO_LIMIT = np.full(7, 10.0)
-MOTIONS = {
+MOTIONS: dict[str, PlantMotion] = {
     "ptp": motions.ptp(FAR),
     "slow": motions.ptp(FAR, joint_velocity=(0.3,) * 7),
     "short": motions.ptp(NEAR),
     "three with rests": motions.batch(*(motions.ptp(one) for one in (FAR, NEAR, READY))),
 }
-
-
-@pytest.fixture(params=["C", "Python"], autouse=True)
-def language(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    if request.param == "Python":
-        monkeypatch.setenv(SWITCH, "1")
-    ahead_library.cache_clear()
-    if request.param == "C" and ahead_library() is None:
-        pytest.skip("no compiler here")
-    yield request.param
-    ahead_library.cache_clear()
 
 
 def follow(planned: Plan, step: float, leap: Array = NO_LIMIT) -> tuple[list[int], Array]:
@@ -55,7 +45,7 @@ def follow(planned: Plan, step: float, leap: Array = NO_LIMIT) -> tuple[list[int
 
 @pytest.mark.parametrize("factor", [1.0, 0.37])
 @pytest.mark.parametrize("name", MOTIONS)
-def test_they_are_those_of_the_path_and_its_profile(name: str, factor: float, language: str) -> None:
+def test_they_are_those_of_the_path_and_its_profile(name: str, factor: float) -> None:
     planned = plan(IIWA, MOTIONS[name], START)
     assert planned.path is not None and planned.timing is not None
     profile = planned.timing.profile
@@ -65,7 +55,32 @@ def test_they_are_those_of_the_path_and_its_profile(name: str, factor: float, la
     assert (times == passed).all()  # as it grows tick by tick
     assert np.abs(places - np.clip([profile.at(time)[0] for time in times], 0.0, 1.0)).max() < 1e-14
     assert np.abs(joints - [planned.path.at(place, START) for place in places]).max() < 1e-14
-    assert set(counts[:-1]) <= {MANY if language == "C" else MANY_IN_PYTHON}
+    assert set(counts[:-1]) <= {MANY}
+
+
+@settings(deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_they_are_those_of_the_oracle(seed: int) -> None:
+    """Over random tables, also such that no planner makes: with leaps of the place; it never goes back."""
+    chance = np.random.default_rng(seed)
+    count, duration = int(chance.integers(1, 6)), float(chance.uniform(0.01, 0.3))
+    pieces = np.column_stack([np.sort(chance.uniform(0, 0.2, count)), chance.uniform(0, 4.0, (count, 4))])
+    place = -0.05
+    for piece, end in zip(pieces, [*pieces[1:, 0], duration], strict=True):
+        piece[1] = place = place + chance.choice([0.0, 0.05])
+        place += np.polyval([*piece[:1:-1], 0.0], max(0.0, end - piece[0]))
+    edges = np.unique(np.concatenate([[0.0, 1.0], chance.uniform(0, 1, int(chance.integers(0, 4)))]))
+    lines = np.column_stack([edges[:-1], edges[1:], chance.normal(size=(len(edges) - 1, 14))])
+    table = MotionTable(pieces, lines, duration)
+    leap = np.full(7, chance.choice([0.05, 0.5, 10.0]))
+    rows, last = SetPointRows(leap), lines[0, 2:9]
+    time, step = float(chance.uniform(0, 0.1)), float(chance.uniform(0.1, 1.0)) * TICK
+    times, places, joints = ahead(table, time, step, last, leap)
+    found = rows.compute(table, time, step, last)
+    assert found == len(times) and rows.is_last == (found < MANY)
+    assert list(rows.times[:found]) == times.tolist()
+    assert np.abs(np.array(rows.places[:found]) - places).max(initial=0.0) < 1e-15
+    assert np.abs(rows.joints[:found] - joints).max(initial=0.0) < 1e-14
 
 
 def test_a_profile_of_samples_consists_of_pieces() -> None:
@@ -84,6 +99,15 @@ def test_the_first_that_an_axis_cannot_follow_is_none_of_them() -> None:
     count = int((steps[:, 5] > leap[5]).argmax())
     assert 0 < count < len(steps) / 2
     assert len(follow(planned, TICK, leap)[1]) == count
+
+
+def test_a_place_at_the_end_of_the_path_is_the_end(language: str) -> None:
+    pieces = np.array([[0.0, 0.0, 1.0, 0.0, 0.0]])  # s = t
+    lines = np.array([[0.0, 1.0, *START, *np.full(7, 0.1)]])
+    rows = SetPointRows(NO_LIMIT)
+    assert rows.compute(MotionTable(pieces, lines, 3.0), 0.0, 0.25, START) == 3 and rows.is_last
+    assert list(rows.places[:3]) == [0.25, 0.5, 0.75]
+    assert rows.joints[:3] == pytest.approx(START + 0.1 * np.array([[0.25], [0.5], [0.75]]))
 
 
 def test_paths_in_space_have_no_table() -> None:

@@ -11,7 +11,7 @@ from heptarm.model.kinematics import forward
 from heptarm.planning.seam import Condition, PathReached, PathReference, SignalIs
 from heptarm.sim.controller.command import ConditionWatch, MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from tests.sim import motions
 from tests.sim.driving import READY, ready, run

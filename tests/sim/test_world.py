@@ -14,7 +14,7 @@ from heptarm.sim.plant.scene import Scene, Wiring, names
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.sim.runtime.operator import SimulatedOperator
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import Body
 from tests.sim import motions

@@ -15,12 +15,12 @@ from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
 from heptarm.sim.plant.plant import Plant, Snapshot
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode, Position
 from tests.sim_fri.rig import READY, State
 
@@ -100,7 +100,8 @@ class Lockstep:
 
     def burst(self, ticks: int) -> None:
         """Hold messages back, then let them arrive together."""
-        self._held = held = []
+        held: list[bytes] = []
+        self._held = held
         self.run(ticks * 1e-3)
         self._held, now = None, self.plant.time_ns
         for datagram in held:

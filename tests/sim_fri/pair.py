@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from heptarm.fri.protocol import messages as m
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.faults import NONE, FaultyLink, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import Event, OverlayEnded, SessionConfiguration

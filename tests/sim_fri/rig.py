@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.planning.seam import TICK_NS, HeaderWords
-from heptarm.sim.control.laws import Superposition
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.control_laws.laws import Superposition
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, Reading
 from heptarm.sim.fri.settings import Event, OverlayEnded, Refused, SessionConfiguration, StateChanged
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode
 from heptarm.values.robot import RobotModel, robot
 from tests.oracles.fri.codec import decode_monitoring, encode_command
@@ -68,7 +69,7 @@ class Arm:
     @property
     def leaps(self) -> Array:
         """Largest step of each axis in a tick, shape (7,) [rad]."""
-        return np.abs(np.diff(np.array(self.track), axis=0)).max(axis=0)
+        return np.asarray(np.abs(np.diff(np.array(self.track), axis=0)).max(axis=0))
 
 
 def mirror(message: m.Monitoring) -> m.Command:
@@ -183,6 +184,6 @@ class Rig:
     def reported(self) -> list[str]:
         return [event.text for event in self.events if isinstance(event, (Refused, OverlayEnded))]
 
-    def command(self, **fields: object) -> None:
+    def command(self, **fields: Any) -> None:
         """From now on the client commands the mirrored values, except for these fields."""
         self.client.law = lambda message: replace(mirror(message), **fields)

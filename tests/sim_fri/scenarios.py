@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from dataclasses import replace
 
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
@@ -17,25 +18,25 @@ from tests.sim_fri.rig import State
 QUALITY = "possible connection problem"
 
 
-def _lines(pair: Pair, **faults: float) -> None:
-    pair.there, pair.back = (FaultyLink(LinkFaults(seed=random.randrange(10**6), **faults)) for _ in range(2))
+def _lines(pair: Pair, faults: LinkFaults) -> None:
+    pair.there, pair.back = (FaultyLink(replace(faults, seed=random.randrange(10**6))) for _ in range(2))
 
 
 def lossy(pair: Pair) -> str:
     """A tenth of all datagrams is lost."""
-    _lines(pair, loss=0.1)
+    _lines(pair, LinkFaults(loss=0.1))
     return QUALITY
 
 
 def bursts(pair: Pair) -> str:
     """Datagrams are held back for 5 ms and arrive together."""
-    _lines(pair, burst=0.1, burst_time=0.005)
+    _lines(pair, LinkFaults(burst=0.1, burst_time=0.005))
     return QUALITY
 
 
 def silent(pair: Pair) -> str:
     """200 ms in which nothing arrives."""
-    _lines(pair, loss=1.0)
+    _lines(pair, LinkFaults(loss=1.0))
     pair.run(200)
     return QUALITY
 
@@ -74,13 +75,13 @@ def foreign(pair: Pair) -> str:
 
 def reordered(pair: Pair) -> str:
     """A third of all datagrams is overtaken by the next one."""
-    _lines(pair, reorder=0.3)
+    _lines(pair, LinkFaults(reorder=0.3))
     return QUALITY
 
 
 def corrupt(pair: Pair) -> str:
     """A fifth of all datagrams is damaged; their check sums show it."""
-    _lines(pair, corrupt=0.2)
+    _lines(pair, LinkFaults(corrupt=0.2))
     return QUALITY
 
 
@@ -122,7 +123,7 @@ def duplicates(times: int) -> int:
     pair = Pair(SessionConfiguration(Version.V1_15))
     pair.active(MotionOverlay())
     for turn in range(1, times + 1):
-        _lines(pair, duplicate=0.3)
+        _lines(pair, LinkFaults(duplicate=0.3))
         pair.run(20)
         assert pair.controller.state is pair.session.state is State.COMMANDING_ACTIVE
         assert pair.session.counters.duplicated >= turn and pair.controller.traffic.stale >= turn

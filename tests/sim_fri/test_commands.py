@@ -11,8 +11,8 @@ import pytest
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
-from heptarm.sim.fri import cartesian, controller
-from heptarm.sim.fri.controller import MIRRORED
+from heptarm.sim.fri import cartesian, controller_side
+from heptarm.sim.fri.controller_side import MIRRORED
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.pose import Pose
@@ -184,7 +184,7 @@ def test_an_illegal_position_ends_the_motion_and_the_arm_has_not_moved(
         (POSE, {"pose": None}, "no Cartesian pose"),
         (POSE, {"pose": m.Transformation("p", (nan, 0, 0, 1, 0, 0, 0))}, "must be finite"),
         (POSE, {"pose": m.Transformation("p", (400, 0, 400, 2, 0, 0, 0))}, "unit quaternion"),
-        (POSE, {"pose": m.Transformation("p", (4000.0, 0, 400, 1, 0, 0, 0))}, "is not reachable"),
+        (POSE, {"pose": m.Transformation("p", (4000.0, 0, 400, 1, 0, 0, 0))}, "4.001 m from the shoulder"),
         (POSE, {"redundancy": m.Redundancy(m.RedundancyStrategy.E1, inf)}, "redundancy"),
         (POSE, {"redundancy": m.Redundancy(m.RedundancyStrategy.E1, 0.5)}, "Illegal axis delta"),
     ],
@@ -251,7 +251,7 @@ def test_the_next_overlay_begins_where_the_arm_is() -> None:
 def test_a_client_that_does_not_mirror_never_commands(
     overlay: MotionOverlay, fields: dict[str, object], text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(controller, "SYNCHRONISATION", 200_000_000)
+    monkeypatch.setattr(controller_side, "SYNCHRONISATION", 200_000_000)
     rig = Rig(Version.V2_5)
     rig.client.waiting = lambda message: replace(mirror(message), **fields)  # type: ignore[arg-type]
     rig.waiting(overlay).until(State.MONITORING_READY)
@@ -280,3 +280,14 @@ def test_a_pose_from_its_own_joints_is_found_from_near() -> None:
         near = q + generator.uniform(-0.02, 0.02, 7)
         goal = cartesian.matrix(cartesian.transformation(robot, tuple(q.tolist())))
         assert cartesian.joints(robot, goal, q[2], near) == pytest.approx(q, abs=1e-6)
+
+
+@pytest.mark.parametrize("axis", [2, 4, 6])
+def test_a_pose_of_a_straight_joint_is_found_as_well(axis: int) -> None:
+    robot, q = Rig().arm.robot, np.array(READY)
+    q[axis - 1] = 2e-4
+    near = q + 0.01
+    goal = cartesian.matrix(cartesian.transformation(robot, tuple(q.tolist())))
+    found = cartesian.joints(robot, goal, q[2], near)
+    assert forward(robot, found) == pytest.approx(goal, abs=1e-9)
+    assert found[2] == pytest.approx(q[2], abs=1e-12) and np.abs(found - near).max() < 0.05

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -79,7 +80,7 @@ def test_in_silence_nothing_passes() -> None:
 
 
 def test_the_same_seed_gives_the_same_faults() -> None:
-    faults = {"loss": 0.1, "duplicate": 0.1, "corrupt": 0.1, "reorder": 0.1, "jitter": 0.003}
+    faults: dict[str, Any] = {"loss": 0.1, "duplicate": 0.1, "corrupt": 0.1, "reorder": 0.1, "jitter": 0.003}
     assert sent(LinkFaults(seed=5, **faults)) == sent(LinkFaults(seed=5, **faults))
     assert sent(LinkFaults(seed=5, **faults)) != sent(LinkFaults(seed=6, **faults))
 
@@ -88,8 +89,9 @@ def test_the_same_seed_gives_the_same_faults() -> None:
     ("name", "value"), [("loss", 1.1), ("corrupt", -0.1), ("delay", -1.0), ("jitter", float("nan"))]
 )
 def test_nonsense_is_refused(name: str, value: float) -> None:
+    wrong: dict[str, Any] = {name: value}
     with pytest.raises(LimitError, match=name):
-        LinkFaults(**{name: value})
+        LinkFaults(**wrong)
 
 
 # ------------------------------------------------------------------------------ sessions under faults
@@ -177,9 +179,7 @@ def test_small_faults_keep_commanding(faults: LinkFaults, least: m.Quality, seed
     "faults",
     [{"loss": 0.1}, {"burst": 0.05}, {"jitter": 0.02}, {"corrupt": 0.2}, {"delay": 0.03}, {"reorder": 0.3}],
 )
-def test_great_faults_end_commanding_by_quality(
-    faults: dict[str, float], version: Version, seed: int
-) -> None:
+def test_great_faults_end_commanding_by_quality(faults: dict[str, Any], version: Version, seed: int) -> None:
     both = LinkFaults(seed=seed, **faults)
     trial = Trial(FaultScenario(to_client=both, from_client=both), version)
     while not trial.causes and trial.rig.now < 3_000 * MS:

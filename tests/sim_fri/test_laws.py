@@ -12,7 +12,7 @@ from bench.fri.hold import BENT, COMPLIANT, FORCE, GAP, OFFSET
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
 from tests.sim_fri.lockstep import Lockstep

@@ -12,12 +12,12 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from tests.sim_fri.rig import READY, Client, Law, State, mirror

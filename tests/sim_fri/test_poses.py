@@ -23,7 +23,7 @@ from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import SessionConfiguration, describe
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.standalone_fri import Standalone, StandaloneSettings
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from tests.sim_fri.rig import READY
 from tests.sim_fri.rig import State as Session

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from heptarm.sim.fri.limits import COAST, OVERSPEED, CommandInterpolator
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 
 ARM = robot("iiwa14")

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -112,7 +113,7 @@ class Bench:
 
 @contextmanager
 def bench(
-    version: Version = Version.V1_15, *args: int, scenario: FaultScenario | None = None
+    version: Version = Version.V1_15, *args: Any, scenario: FaultScenario | None = None
 ) -> Iterator[Bench]:
     bench = Bench(SessionConfiguration(version, *args), scenario)
     try:
@@ -284,12 +285,12 @@ def turns(standalone: Standalone, peer: Peer, count: int) -> None:
 
 
 @contextmanager
-def offered(arm: Arm, **settings: object) -> Iterator[tuple[Standalone, Peer, list[str]]]:
+def offered(arm: Arm, **settings: Any) -> Iterator[tuple[Standalone, Peer, list[str]]]:
     """A stand-alone controller whose time is its ticks, and a peer."""
     said: list[str] = []
     version = Version.V2_5
     peer = Peer(version)
-    options = {
+    options: dict[str, Any] = {
         "configuration": SessionConfiguration(version),
         "client": peer.address,
         "port": 0,
@@ -298,7 +299,7 @@ def offered(arm: Arm, **settings: object) -> Iterator[tuple[Standalone, Peer, li
     with peer.socket:
         standalone = Standalone(
             arm, StandaloneSettings(**options), listener=lambda event: said.append(describe(event))
-        )  # type: ignore[arg-type]
+        )
         try:
             standalone.server.open()
             yield standalone, peer, said

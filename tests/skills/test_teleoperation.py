@@ -8,12 +8,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import devices, skills
+from heptarm import devices, model, skills
 from heptarm.errors import NotReady
 from tests.conftest import RunningCabinet
 from tests.retry import busy, retry
@@ -95,7 +96,8 @@ def test_the_arm_moves_while_the_dead_man_button_is_held_and_ends_by_the_quit_bu
 
 
 def test_a_dead_man_button_that_is_stuck_moves_nothing_until_it_was_released(arm: ha.Arm) -> None:
-    y, released = arm.state.pose.y, []
+    y = arm.state.pose.y
+    released: list[float] = []
 
     def decide(reading: int) -> devices.DeviceInput:
         if reading < 30:
@@ -144,11 +146,27 @@ def test_a_device_that_is_gone_is_an_error_and_the_arm_rests(arm: ha.Arm) -> Non
     assert np.abs(arm.wait_for_rest().dq).max() < 2e-3
 
 
+def test_the_elbow_follows_a_posture(arm: ha.Arm) -> None:
+    start = arm.state.pose
+    posture = model.solve(arm.robot, start, e1=-0.5, near=HOME)
+    skills.teleoperate(
+        arm,
+        Person(lambda _: of([0.0] * 6, *(["START"] if arm.state.q[2] < -0.4 else []))),
+        dead_man="",
+        posture=posture,
+        watchdog=2.0,
+        duration=60.0,
+    )
+    assert arm.state.q[2] < -0.4 and arm.state.pose.distance_to(start) < 1e-2
+    with pytest.raises(ha.HeptarmError, match="elbow"):
+        skills.teleoperate(arm, Person(lambda _: of(LEFT)), elbow="sideways")  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("settings", "word"),
     [({"scale": 0.0}, "scale"), ({"turn_scale": 9.0}, "turn_scale"), ({"duration": -1.0}, "duration")],
 )
-def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict, word: str) -> None:
+def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict[str, Any], word: str) -> None:
     with pytest.raises(ha.LimitError, match=word):
         skills.teleoperate(arm, Person(lambda _: of(LEFT)), **settings)
     with pytest.raises(ha.ShapeError, match="device must be an input device"):
@@ -157,6 +175,7 @@ def test_bad_settings_are_refused_by_name(arm: ha.Arm, settings: dict, word: str
 
 def test_heptarm_jog_moves_by_the_keys_of_a_terminal(arm: ha.Arm, cabinet: RunningCabinet) -> None:
     command = [sys.executable, "-m", "heptarm.cli.main", "jog", "--target", cabinet.target, "--scale", "0.1"]
+    command += ["--elbow", "center"]
 
     def attempt() -> subprocess.CompletedProcess[str]:
         y = arm.state.pose.y

@@ -1,4 +1,4 @@
-"""A client of FRI in C++, written without heptarm and without an SDK, commands `heptarm sim --fri`.
+"""A client of FRI in C++, written without heptarm and without an SDK, commands `heptarm sim fri`.
 
 `LONG=1` runs every period with every command mode and every version, otherwise a few that cover each of them.
 """
@@ -75,7 +75,7 @@ def client(sine: Path, version: str, seconds: float) -> Iterator[tuple[int, subp
 
 @contextmanager
 def controller(port: int, *arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """`heptarm sim --fri`, ended as by Ctrl-C."""
+    """`heptarm sim fri`, ended as by Ctrl-C."""
     command = [*HEPTARM, "sim", "--fri-client", f"127.0.0.1:{port}", "--fri-port", "0", *arguments]
     with ctrl_c_interrupts():
         started = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -35,7 +35,7 @@ class Conformance:
         raise AssertionError("make() is the subclass's")
 
     @pytest.fixture
-    def pair(self):
+    def pair(self) -> Iterator[Pair]:
         ours, theirs = self.make()
         yield ours, theirs
         ours.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import select
 import socket
 import struct
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,7 +16,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heptarm._library import SWITCH
 from heptarm.errors import RemoteProtocolError
 from heptarm.io.exchange import Exchange, ReceiveState, compiled_link
 from heptarm.io.tcp import MSG_DONTWAIT
@@ -323,6 +323,6 @@ def test_the_end_of_a_connection_is_left_to_the_transport(line: Line) -> None:
     assert line.state(State.TYPE, 0) is False
 
 
-def test_without_the_compiled_part_there_is_none(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(SWITCH, "1")
+def test_in_a_python_without_its_lock_there_is_none(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False)
     assert line.functions(open_pair(None)[0]) is None

@@ -50,10 +50,10 @@ def test_states_at_rest_are_on_the_grid_of_their_rate_and_all_the_same(
 ) -> None:
     resting.subscribe(rate=1000)
     states = list(resting.states(duration=1.0, size=5000))[1:]
-    stamps = np.array([one.stamp for one in states])
+    stamps = np.array([state.stamp for state in states])
     assert (np.diff(stamps) > 0).all() and (np.diff(stamps) % 1_000_000 == 0).all()
-    assert len(states) > 100 and (np.ptp([one.q for one in states], axis=0) < 1e-6).all()
-    assert all(one.safety.ready_to_move for one in states)
+    assert len(states) > 100 and (np.ptp([state.q for state in states], axis=0) < 1e-6).all()
+    assert all(state.safety.ready_to_move for state in states)
     rest(cabinet)  # also while it is observed
 
 

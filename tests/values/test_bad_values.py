@@ -20,7 +20,7 @@ import heptarm.when
 from heptarm import HeptarmError
 from heptarm.fri import Output, Params
 from heptarm.modes import CartesianImpedance, SineImpedance
-from heptarm.values.arrays import array, numbers, shown
+from heptarm.values.checks import array, numbers, shown
 from heptarm.when import force, io, path, torque
 from tests import bad_values
 from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_of, wrong

@@ -72,7 +72,7 @@ def test_planes_turn_by_the_right_hand() -> None:
     ("make", "error", "words"),
     [
         (lambda: circ(VIA, VIA), CommandRejected, "via and end 0 m apart .give a point"),
-        (lambda: circ(VIA, [1, 2, 3]), ShapeError, "end"),
+        (lambda: circ(VIA, [1, 2, 3]), ShapeError, "end"),  # type: ignore[arg-type]
         (lambda: circ(VIA, END, orientation="sideways"), CommandRejected, "sideways"),
         (lambda: circ(VIA, END, orientation="ignore"), CommandRejected, "spline"),
         (
@@ -117,7 +117,7 @@ NO_CIRCLES = {
 def test_points_without_a_circle_are_refused(name: str) -> None:
     *points, parameter, words = NO_CIRCLES[name]
     with pytest.raises(CommandRejected, match=words) as refused:
-        circle_through(*(Pose.at(*one) for one in points))  # type: ignore[misc]
+        circle_through(*(Pose.at(*one) for one in points))
     assert refused.value.parameter == parameter and refused.value.allowed and refused.value.hint
 
 

@@ -91,7 +91,7 @@ def test_nodes_are_in_postfix_order_and_one_of_two_is_written_out() -> None:
         ~TOUCH,
         HIT,
         ~TOUCH & HIT,
-        (TOUCH ^ HIT).expanded,
+        (TOUCH ^ HIT).expanded,  # type: ignore[attr-defined]
     ]
     assert all(part == TOUCH ^ HIT for _, part in condition_nodes(TOUCH ^ HIT))
 

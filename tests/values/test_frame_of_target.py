@@ -47,7 +47,9 @@ def test_arcs_and_ellipses_lie_in_the_frame() -> None:
     quarter = ha.arc(start, math.pi / 2, centre=(0, 0, 0.2), frame=TABLE)
     assert quarter.end.xyz == pytest.approx(TABLE.rotation @ (0.0, 0.1, 0.2) + TABLE.xyz)
     whole = ha.ellipse(start, 0.05, centre=(0, 0, 0.2), plane="xz", frame="/Table")
-    flat = np.array([one.target.y for one in whole.segments if isinstance(one, type(ha.spl(start)))])
+    flat = np.array(
+        [segment.target.y for segment in whole.segments if isinstance(segment, type(ha.spl(start)))]
+    )
     assert whole.frame == "/Table" and flat == pytest.approx(np.zeros(36), abs=1e-12)
 
 

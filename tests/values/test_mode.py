@@ -6,6 +6,7 @@ import math
 import pickle
 from collections.abc import Callable
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,9 +87,9 @@ def test_arrays_are_copied_and_frozen() -> None:
 
 
 def test_a_copy_with_other_values_is_checked_as_well() -> None:
-    assert replace(COMPLIANT, damping=1.0).stiffness.tolist() == COMPLIANT.stiffness.tolist()
+    assert replace(COMPLIANT, damping=1.0).stiffness.tolist() == COMPLIANT.stiffness.tolist()  # type: ignore[arg-type]
     with pytest.raises(LimitError, match=r"damping\[0\] must .*got 2"):
-        replace(COMPLIANT, damping=2.0)
+        replace(COMPLIANT, damping=2.0)  # type: ignore[arg-type]
 
 
 def test_a_constant_force_acts_where_it_was_asked_for() -> None:
@@ -138,7 +139,7 @@ def test_times_of_a_pattern() -> None:
 @pytest.mark.parametrize("make", MAKERS)
 def test_what_is_legal_here_is_legal_on_the_wire(make: Callable[[], Mode]) -> None:
     mode = make()
-    sent: wire.Message
+    sent: wire.Mode
     if isinstance(mode, JointImpedance):
         sent = wire.JointImpedance(stiffness=tuple(mode.stiffness), damping=tuple(mode.damping))
     elif isinstance(mode, CartesianImpedance):
@@ -146,10 +147,11 @@ def test_what_is_legal_here_is_legal_on_the_wire(make: Callable[[], Mode]) -> No
     elif isinstance(mode, SineImpedance):
         names = ("amplitude", "frequency", "phase", "bias", "force_limit", "position_limit")
         times = ("total_time", "rise_time", "hold_time", "fall_time", "stay_active")
+        values: dict[str, Any] = {name: tuple(getattr(mode, name)) for name in names}
+        values |= {name: getattr(mode, name) for name in times}
         sent = wire.SineImpedance(
             base=_cartesian(mode.base),
-            **{name: tuple(getattr(mode, name)) for name in names},
-            **{name: getattr(mode, name) for name in times},
+            **values,
         )
     else:
         sent = wire.PositionMode()
@@ -187,14 +189,14 @@ def six(index: int, value: float) -> list[float]:
         (lambda: JointImpedance([1.0] * 6 + [5001]), LimitError, r"stiffness\[6\] must .*got 5001"),
         (lambda: JointImpedance(NAN), LimitError, r"stiffness\[0\] must .*got nan"),
         (lambda: JointImpedance(1.0, damping=1.1), LimitError, r"damping\[0\] must be in \[0, 1\], got 1.1"),
-        (lambda: JointImpedance(1.0, damping=None), ShapeError, "must be one number or 7 numbers"),
+        (lambda: JointImpedance(1.0, damping=None), ShapeError, "must be one number or 7 numbers"),  # type: ignore[arg-type]
         (lambda: CartesianImpedance(3000.0), LimitError, r"\[3\] must be in \[0, 300\] Nm/rad.*\"abc\": 200"),
         (lambda: CartesianImpedance({"xyz": 9000}), LimitError, r"stiffness\[0\] must .*got 9000"),
         (lambda: CartesianImpedance({}), ShapeError, "must have groups of the directions"),
         (lambda: CartesianImpedance({"q": 1}), ShapeError, "must have groups of the directions"),
         (lambda: CartesianImpedance({"xy": 1, "x": 2}), ShapeError, "each direction at most once"),
-        (lambda: CartesianImpedance({1: 2}), ShapeError, "must have groups of the directions"),
-        (lambda: CartesianImpedance({"z": "stiff"}), ShapeError, "must be one number or 6 numbers"),
+        (lambda: CartesianImpedance({1: 2}), ShapeError, "must have groups of the directions"),  # type: ignore[dict-item]
+        (lambda: CartesianImpedance({"z": "stiff"}), ShapeError, "must be one number or 6 numbers"),  # type: ignore[dict-item]
         (lambda: CartesianImpedance(max_force={"z": -1}), LimitError, r"max_force\[2\] must"),
         (lambda: CartesianImpedance([1.0] * 7), ShapeError, r"stiffness must have shape .*got \(7,\)"),
         (lambda: CartesianImpedance(six(2, 5001)), LimitError, r"\[2\] must be in \[0, 5000\] N/m, got 5001"),
@@ -218,7 +220,7 @@ def six(index: int, value: float) -> list[float]:
         (lambda: CartesianImpedance(max_force=six(4, -1)), LimitError, r"must be in \[0, 1e\+06\] Nm"),
         (lambda: CartesianImpedance(max_force=[math.inf] * 6), LimitError, r"max_force\[0\] must .*got inf"),
         (lambda: CartesianImpedance(max_force_stops=True), CommandRejected, "without a max_force"),
-        (lambda: CartesianImpedance(max_force_stops=1), ShapeError, "must be True or False"),
+        (lambda: CartesianImpedance(max_force_stops=1), ShapeError, "must be True or False"),  # type: ignore[arg-type]
         (lambda: CartesianImpedance(max_velocity=six(0, 0)), LimitError, r"must be in \(0, 100\] m/s"),
         (lambda: CartesianImpedance(max_deviation=six(5, 0)), LimitError, r"must be in \(0, 100\] rad"),
         (
@@ -228,7 +230,7 @@ def six(index: int, value: float) -> list[float]:
         ),
         (lambda: CartesianImpedance(frame=""), ShapeError, "frame must be a name of 1 to 128 bytes, got ''"),
         (lambda: CartesianImpedance(frame="x" * 129), ShapeError, "1 to 128 bytes"),
-        (lambda: SineImpedance(JointImpedance(1.0)), ShapeError, "must be a CartesianImpedance"),
+        (lambda: SineImpedance(JointImpedance(1.0)), ShapeError, "must be a CartesianImpedance"),  # type: ignore[arg-type]
         (lambda: SineImpedance(amplitude=six(0, -1)), LimitError, r"must be in \[0, 500\] N"),
         (lambda: SineImpedance(frequency=six(0, 16)), LimitError, r"must be in \[0, 15\] Hz"),
         (
@@ -241,14 +243,14 @@ def six(index: int, value: float) -> list[float]:
         (lambda: SineImpedance(position_limit=six(3, 101)), LimitError, r"must be in \[0, 100\] rad"),
         (lambda: SineImpedance(rise_time=-1.0), LimitError, r"rise_time must be in \[0, 1e\+06\] s, got -1"),
         (lambda: SineImpedance(fall_time=NAN), LimitError, "fall_time must .*got nan"),
-        (lambda: SineImpedance(hold_time="long"), ShapeError, "must be a number"),
+        (lambda: SineImpedance(hold_time="long"), ShapeError, "must be a number"),  # type: ignore[arg-type]
         (
             lambda: SineImpedance(rise_time=2, fall_time=2, total_time=3),
             CommandRejected,
             "at least .* = 4 s, got 3 s",
         ),
         (lambda: SineImpedance(stay_active=True), CommandRejected, "a pattern without an end"),
-        (lambda: SineImpedance.force(z="down"), ShapeError, "z must be a number"),
+        (lambda: SineImpedance.force(z="down"), ShapeError, "z must be a number"),  # type: ignore[arg-type]
         (lambda: SineImpedance.force(c=1, stiffness=400), LimitError, r"stiffness must .*got 400"),
         (
             lambda: SineImpedance.sine("w", frequency=1, amplitude=1),
@@ -256,7 +258,7 @@ def six(index: int, value: float) -> list[float]:
             "direction must be one of .*got 'w'",
         ),
         (
-            lambda: SineImpedance.sine(["x"], frequency=1, amplitude=1),
+            lambda: SineImpedance.sine(["x"], frequency=1, amplitude=1),  # type: ignore[arg-type]
             ShapeError,
             "must be one of x, y, z",
         ),
@@ -277,7 +279,7 @@ def six(index: int, value: float) -> list[float]:
             r"total_time must be in \(0, 1e\+06\] s, got 0",
         ),
         (
-            lambda: SineImpedance.spiral("xy", frequency=1, amplitude=1, total_time=None),
+            lambda: SineImpedance.spiral("xy", frequency=1, amplitude=1, total_time=None),  # type: ignore[arg-type]
             ShapeError,
             "total_time must be a number",
         ),

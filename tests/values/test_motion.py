@@ -144,29 +144,29 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: ptp([1, 2]), ShapeError, r"q must have shape \(7,\), got \(2,\)"),
         (lambda: ptp([[0.0] * 7]), ShapeError, r"q must have shape .*got \(1, 7\)"),
         (lambda: ptp("home"), ShapeError, "must be 7 numbers"),
-        (lambda: ptp(None), ShapeError, "must be 7 numbers"),
-        (lambda: ptp([None] * 7), ShapeError, "must be 7 numbers"),
+        (lambda: ptp(None), ShapeError, "must be 7 numbers"),  # type: ignore[arg-type]
+        (lambda: ptp([None] * 7), ShapeError, "must be 7 numbers"),  # type: ignore[arg-type]
         (lambda: ptp([True] * 7), ShapeError, "must be 7 numbers"),
         (lambda: ptp([NAN] * 7), LimitError, "q must have .* one joint at least"),
         (lambda: spline_joints([[0.0] * 6 + [NAN]]), LimitError, r"points\[0\]\[6\] must .*got nan"),
         (lambda: spline_joints([ptp([0.0] * 6 + [NAN])]), LimitError, r"points\[0\]\[6\] must .*got nan"),
         (lambda: ptp([math.inf] + [0.0] * 6), LimitError, r"q\[0\] must .*got inf"),
-        (lambda: ptp(Q, speed=0), LimitError, r"speed\[0\] must be in \(0, 1\], got 0"),
-        (lambda: ptp(Q, speed=1.1), LimitError, r"speed\[0\] must be in \(0, 1\], got 1.1"),
+        (lambda: ptp(Q, speed=0), LimitError, r"speed must be in \(0, 1\], got 0"),
+        (lambda: ptp(Q, speed=1.1), LimitError, r"speed must be in \(0, 1\], got 1.1"),
         (lambda: ptp(Q, speed=NAN), LimitError, r"speed\[0\] must .*got nan"),
         (lambda: ptp(Q, speed=[0.1] * 6), ShapeError, r"speed must have shape .*got \(6,\)"),
         (lambda: ptp(Q, acceleration=[0.1] * 6 + [2]), LimitError, r"acceleration\[6\] must .*got 2"),
-        (lambda: ptp(Q, jerk=-1), LimitError, r"jerk\[0\] must .*got -1"),
+        (lambda: ptp(Q, jerk=-1), LimitError, r"jerk must .*got -1"),
         (lambda: ptp(Q, blend_rel=1.5), LimitError, r"blend_rel must be in \[0, 1\], got 1.5"),
         (lambda: ptp(Q, blend_m=-0.1), LimitError, r"blend_m must be in \[0, 2\] m, got -0.1"),
-        (lambda: ptp(Q, blend_rad="much"), ShapeError, "blend_rad must be a number, got 'much'"),
+        (lambda: ptp(Q, blend_rad="much"), ShapeError, "blend_rad must be a number, got 'much'"),  # type: ignore[arg-type]
         (lambda: ptp(Q, near=Q), CommandRejected, "near given with joint positions"),
         (lambda: ptp(Q, redundancy=Redundancy(0.1)), CommandRejected, "leave no choice"),
         (lambda: ptp(Q, moving="flange"), CommandRejected, "leave no choice"),
         (lambda: ptp(POSE, near=[0.0] * 3), ShapeError, r"near must have shape .*got \(3,\)"),
         (lambda: ptp(POSE, near=Q, redundancy=Redundancy(0.1)), CommandRejected, "give one of them"),
-        (lambda: ptp(POSE, redundancy=0.3), ShapeError, "must be a Redundancy"),
-        (lambda: lin(Q), ShapeError, r"(?s)must be a Pose.*build one"),
+        (lambda: ptp(POSE, redundancy=0.3), ShapeError, "must be a Redundancy"),  # type: ignore[arg-type]
+        (lambda: lin(Q), ShapeError, r"(?s)must be a Pose.*build one"),  # type: ignore[arg-type]
         (lambda: lin(POSE, speed_mps=0), LimitError, r"speed_mps must be in \(0, 10\] m/s, got 0"),
         (lambda: lin(POSE, speed_mps=NAN), LimitError, "speed_mps must .*got nan"),
         (lambda: lin(POSE, speed_mps=math.inf), LimitError, "speed_mps must .*got inf"),
@@ -178,16 +178,16 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: lin(POSE, jerk_radps3=2e5), LimitError, "jerk_radps3 must .*got 200000"),
         (lambda: lin(POSE, moving=""), ShapeError, "moving must be a name of 1 to 128 bytes, got ''"),
         (lambda: lin(POSE, moving="x" * 129), ShapeError, "1 to 128 bytes"),
-        (lambda: lin(POSE, moving=3), ShapeError, "must be a name"),
-        (lambda: lin_rel(z="down"), ShapeError, "must be 6 numbers"),
+        (lambda: lin(POSE, moving=3), ShapeError, "must be a name"),  # type: ignore[arg-type]
+        (lambda: lin_rel(z="down"), ShapeError, "must be 6 numbers"),  # type: ignore[arg-type]
         (lambda: lin_rel(z=NAN), LimitError, r"offset\[2\] must .*got nan"),
         (lambda: lin_rel(frame=""), ShapeError, "frame must be a name .*got ''"),
-        (lambda: LinRel(Q), ShapeError, "offset must be a Pose"),
+        (lambda: LinRel(Q), ShapeError, "offset must be a Pose"),  # type: ignore[arg-type]
         (lambda: hold(0), LimitError, r"seconds must be in \(0, 1e\+06\] s, got 0"),
         (lambda: hold(-1), LimitError, "seconds must .*got -1"),
         (lambda: hold(NAN), LimitError, "seconds must .*got nan"),
         (lambda: hold(2e6), LimitError, "seconds must .*got 2e"),
-        (lambda: hold("long"), ShapeError, "must be a number"),
+        (lambda: hold("long"), ShapeError, "must be a number"),  # type: ignore[arg-type]
         (lambda: ptp(Q).limited_to(0.0), LimitError, r"speed must be in \(0, 1\], got 0"),
         (lambda: hold().limited_to(2.0), LimitError, "speed must .*got 2"),
         (lambda: Dynamics(speed_mps=11.0), LimitError, "speed_mps must .*got 11"),
@@ -199,7 +199,7 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: Redundancy(status=8), LimitError, "status must be 0 to 7, or -1 for not given, got 8"),
         (lambda: Redundancy(status=-2), LimitError, "status must .*got -2"),
         (lambda: Redundancy(turn=128), LimitError, "turn must .*got 128"),
-        (lambda: Redundancy(turn=1.5), LimitError, "turn must .*got 1.5"),
+        (lambda: Redundancy(turn=1.5), LimitError, "turn must .*got 1.5"),  # type: ignore[arg-type]
     ],
 )
 def test_refuses_with_value_range_and_remedy(
@@ -240,10 +240,10 @@ def test_help_lists_every_keyword() -> None:
             "dynamics has speed_mps, which ptp does not have",
         ),
         (lambda: spl(POSE, dynamics=DYNAMICS), CommandRejected, "joint_speed, which spl does not have"),
-        (lambda: lin(POSE, dynamics=0.3), ShapeError, "dynamics must be a Dynamics, got 0.3"),
-        (lambda: lin(POSE, speed=0.3), TypeError, "unexpected keyword argument 'speed'; .*speed_mps"),
-        (lambda: ptp(Q, speed_mps=0.3), TypeError, "unexpected keyword argument 'speed_mps'"),
-        (lambda: Dynamics(speed=0.3), TypeError, "unexpected keyword argument 'speed'"),
+        (lambda: lin(POSE, dynamics=0.3), ShapeError, "dynamics must be a Dynamics, got 0.3"),  # type: ignore[arg-type]
+        (lambda: lin(POSE, speed=0.3), TypeError, "unexpected keyword argument 'speed'; .*speed_mps"),  # type: ignore[call-arg]
+        (lambda: ptp(Q, speed_mps=0.3), TypeError, "unexpected keyword argument 'speed_mps'"),  # type: ignore[call-arg]
+        (lambda: Dynamics(speed=0.3), TypeError, "unexpected keyword argument 'speed'"),  # type: ignore[call-arg]
     ],
 )
 def test_limits_that_a_motion_does_not_have_are_refused(
@@ -251,3 +251,16 @@ def test_limits_that_a_motion_does_not_have_are_refused(
 ) -> None:
     with pytest.raises(error, match=text):
         make()
+
+
+def test_the_repr_leaves_out_what_is_at_its_default() -> None:
+    assert repr(ptp(Q)) == f"Ptp(q={ptp(Q).q!r})"
+    assert repr(ptp(Q, speed=0.5).dynamics) == f"Dynamics(joint_speed={np.full(7, 0.5)!r})"
+    assert repr(Dynamics()) == "Dynamics()"
+
+
+def test_a_percentage_is_told_from_a_fraction() -> None:
+    with pytest.raises(
+        LimitError, match=r"speed must be in \(0, 1\], got 50 \(it is a fraction: did you mean 0.5\?"
+    ):
+        ptp(Q, speed=50)

@@ -157,10 +157,10 @@ def test_frozen() -> None:
             "rotvec must be at most one turn.* deg",
         ),
         (lambda: Pose.at().rotated(a=90), LimitError, "a must be in .* rad, got 90 rad"),
-        (lambda: Pose.at().shifted("0.1"), ShapeError, "x must be a number"),
+        (lambda: Pose.at().shifted("0.1"), ShapeError, "x must be a number"),  # type: ignore[arg-type]
         (lambda: Pose.at().shifted(z=0.1, frame="flange"), ShapeError, "frame must be one of 'base', 'tool'"),
         (lambda: Pose.at().interpolate(Pose.at(), 50), LimitError, r"fraction must be in \[0, 1\], got 50"),
-        (lambda: Pose.at().interpolate((1, 2, 3), 0.5), ShapeError, "other must be a Pose"),
+        (lambda: Pose.at().interpolate((1, 2, 3), 0.5), ShapeError, "other must be a Pose"),  # type: ignore[arg-type]
     ],
 )
 def test_refuses(make: object, error: type[Exception], text: str) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,3 +40,10 @@ def test_check_names_axis_value_and_range() -> None:
 def test_unknown() -> None:
     with pytest.raises(CommandRejected, match="robot must be one of iiwa7, iiwa14, med7, med14, got 'ur5'"):
         robot("ur5")
+
+
+def test_a_copy_of_a_model_equals_it_and_another_robot_does_not() -> None:
+    model, other = robot("iiwa14"), robot("iiwa7")
+    for copied in (copy.copy(model), copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        assert copied == model and hash(copied) == hash(model) and copied != other
+    assert replace(model, d_wf=model.d_wf + 0.01) != model

@@ -54,10 +54,10 @@ def test_the_points_of_an_ellipse_lie_on_it(other: float, angle: float, normal: 
     motion = ellipse(A, other, centre=centre, plane=normal, angle=angle)
     across = np.cross(axis, first) / radius
     for segment in motion.segments:
-        at = segment.target.xyz - centre  # type: ignore[union-attr]
+        at = segment.target.xyz - centre
         assert at @ axis == pytest.approx(lever @ axis, abs=1e-9)
         assert (at @ first / radius**2) ** 2 + (at @ across / other) ** 2 == pytest.approx(1.0, abs=1e-9)
-    end = motion.segments[-1].target.xyz - centre - (lever @ axis) * axis  # type: ignore[union-attr]
+    end = motion.segments[-1].target.xyz - centre - (lever @ axis) * axis
     assert end == pytest.approx(math.cos(angle) * first + math.sin(angle) * other * across, abs=1e-9)
     assert len(motion.segments) == round(abs(angle) / (2 * math.pi) * 36)
 

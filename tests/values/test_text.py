@@ -193,7 +193,7 @@ RESULT = ha.Result(ha.Cause.FINISHED, duration=1.25)
     [
         (STATE.wrench, ["force 1.00 2.00 -3.50 N   torque 0.10 0.20 0.30 Nm"]),
         (
-            Wrench(0, *np.ones((2, 3)), np.full(3, 30.0), np.zeros(3)),
+            Wrench(0, *np.ones((2, 3)), np.full(3, 30.0), np.zeros(3)),  # type: ignore[call-arg]
             ["force 1.00 1.00 1.00 N", "inaccurate here"],
         ),
         (modes.Position(), ["position control"]),

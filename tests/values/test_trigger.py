@@ -9,12 +9,12 @@ import heptarm as ha
 from heptarm.do import notify, set_output
 from heptarm.values.condition.force import force
 from heptarm.values.condition.signals import path
-from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.motion import Triggered
 from heptarm.values.result import MotionEvent
 
 HERE = ha.Pose.at(0.5, 0.0, 0.4)
 THERE = ha.Pose.at(0.5, 0.1, 0.4)
-MOTIONS: list[Motion] = [
+MOTIONS: list[Triggered] = [
     ha.ptp(np.zeros(7)),
     ha.ptp(HERE),
     ha.lin(HERE),
@@ -27,7 +27,7 @@ MOTIONS: list[Motion] = [
 
 
 @pytest.mark.parametrize("motion", MOTIONS, ids=lambda motion: type(motion).__name__)
-def test_every_motion_takes_triggers_and_stays_what_it_was(motion: Motion) -> None:
+def test_every_motion_takes_triggers_and_stays_what_it_was(motion: Triggered) -> None:
     one = motion.trigger(force > 10, notify("touch"))
     two = one.trigger(path.after(0.1), set_output("LEDBlue", True))
     assert motion.triggers == () and len(one.triggers) == 1
@@ -62,7 +62,7 @@ def test_of_a_spline_only_the_whole_has_triggers() -> None:
     with pytest.raises(ha.CommandRejected, match=r"segments\[1\] has triggers"):
         ha.spline([HERE, ha.lin(THERE).trigger(path.after(0.1), notify())])
     with pytest.raises(ha.CommandRejected, match=r"points\[0\] has triggers"):
-        ha.spline_joints([ha.ptp(np.zeros(7)).trigger(path.after(0.1), notify())])  # type: ignore[list-item]
+        ha.spline_joints([ha.ptp(np.zeros(7)).trigger(path.after(0.1), notify())])
 
 
 def test_only_a_notice_has_a_label() -> None:

@@ -24,7 +24,7 @@ VECTORS = {
     ).items()
 }
 TOKEN, NOW, LIMIT = VECTORS["token"], 1_234_567_890, 500_000_000
-TARGET = wire.ServoJoints(servo=9, watchdog=0.2, q=tuple(0.1 * axis for axis in range(7)))  # type: ignore[arg-type]
+TARGET = wire.ServoJoints(servo=9, watchdog=0.2, q=tuple(0.1 * axis for axis in range(7)))
 PONG = wire.Pong(sent=NOW - 1000, received=NOW)
 
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codes import Code
-from heptarm.wire.frames import HEADER, pack
+from heptarm.wire.frames import pack
 from heptarm.wire.key import KeyExchange, without_mac
-from heptarm.wire.messages import Accepted, Challenge, Hello, Ping, Proof, SetOverride, Stop, Welcome
+from heptarm.wire.messages import HEADER, Accepted, Challenge, Hello, Ping, Proof, SetOverride, Stop, Welcome
 from heptarm.wire.session import RECEIVED, SENT, Received, Session, Side
 from heptarm.wire.states import SessionState
 from tests.cabinet import fake
@@ -261,7 +261,7 @@ def test_tags_go_on_after_the_sequence_number_wraps() -> None:
     client.counts[SENT] = cabinet.counts[RECEIVED] = 0xFFFFFFFF
     first = client.send(Ping(sent=1))
     second = client.send(Ping(sent=2))
-    assert [one.message for one in pour(first + second, cabinet)] == [Ping(sent=1), Ping(sent=2)]  # type: ignore[union-attr]
+    assert [one.message for one in pour(first + second, cabinet)] == [Ping(sent=1), Ping(sent=2)]
     up, _ = KeyExchange(KEY).tags(client._nonce, cabinet._nonce)
     assert up.of(second[:-16]) != second[-16:]  # what was sent before the wrap fits no more
     up.begin_round()

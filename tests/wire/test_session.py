@@ -24,6 +24,7 @@ from heptarm.wire.messages import (
     Groups,
     Hello,
     JointState,
+    Message,
     OneWay,
     Ping,
     Refusal,
@@ -83,7 +84,7 @@ def test_a_refusal_of_another_version_is_understood() -> None:
     frame = bytearray(pack(Refusal.TYPE, body, seq=0))
     frame[2] = 1
     (event,) = pour(bytes(frame), client)
-    assert isinstance(event, Received) and event.message.major == 1  # type: ignore[union-attr]
+    assert isinstance(event, Received) and event.message.major == 1
     assert client.state is SessionState.CLOSED
 
 
@@ -117,7 +118,13 @@ def test_request_ids_are_never_zero() -> None:
 def test_what_a_side_may_not_send() -> None:
     client, cabinet = open_pair()
     before = client.counts[SENT]
-    for message, request in [(Accepted(id=1), 1), (Stop(), 0), (Ping(sent=0), 3), (client.hello(name=""), 0)]:
+    cases: list[tuple[Message, int]] = [
+        (Accepted(id=1), 1),
+        (Stop(), 0),
+        (Ping(sent=0), 3),
+        (client.hello(name=""), 0),
+    ]
+    for message, request in cases:
         with pytest.raises(LocalProtocolError):
             client.send(message, request=request)
     with pytest.raises(LocalProtocolError, match="no request 9"):
@@ -213,7 +220,7 @@ def test_a_state_is_decoded_when_wanted() -> None:
 # ------------------------------------------------------------------------------------ bytes
 
 
-def conversation() -> tuple[bytes, list[object]]:
+def conversation() -> tuple[bytes, list[Received | StateReceived]]:
     """Messages of a cabinet in a session, and the events that a client must derive from them."""
     client, cabinet = Session(Side.CLIENT, nonce=NONCES[0]), Session(Side.CABINET, nonce=NONCES[1])
     pour(client.send(client.hello(name="t")), cabinet)

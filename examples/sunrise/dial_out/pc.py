@@ -4,6 +4,7 @@ import socket
 import struct
 import sys
 import time
+from typing import Any
 
 STATE, PTP, LIN, STOP, TOUCH, END = 1, 2, 3, 4, 5, 99
 HOME = [0.0, 0.5236, 0.0, -1.5708, 0.0, 1.0472, 0.0]
@@ -17,7 +18,7 @@ robot, _ = server.accept()
 robot.settimeout(120)
 
 
-def receive(count):
+def receive(count: int) -> bytes:
     data = b""
     while len(data) < count:
         part = robot.recv(count - len(data))
@@ -27,7 +28,7 @@ def receive(count):
     return data
 
 
-def send(command, *values):
+def send(command: int, *values: float) -> dict[str, Any]:
     robot.sendall(struct.pack(f">ii{len(values)}d", 4 + 8 * len(values), command, *values))
     (length,) = struct.unpack(">i", receive(4))
     answer = struct.unpack(">iii21d", receive(length))
@@ -41,7 +42,7 @@ def send(command, *values):
     }
 
 
-def settle():
+def settle() -> dict[str, Any]:
     time.sleep(0.05)
     while send(STATE)["moving"]:
         time.sleep(0.02)

@@ -20,10 +20,11 @@ SCRIPT = [
     ("Next job?", "answer 4"),
 ]
 
-command = [sys.executable, "-m", "heptarm.cli.main", "sim", "--app", *sys.argv[1:]]
+command = [sys.executable, "-m", "heptarm.cli.main", "sim", "app", *sys.argv[1:]]
 sim = subprocess.Popen(
     command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1
 )
+assert sim.stdin and sim.stdout
 script = list(SCRIPT)
 for line in sim.stdout:
     print(line, end="", flush=True)

@@ -7,7 +7,7 @@ import time
 
 
 class Robot:
-    def __init__(self, host, port):
+    def __init__(self, host: str, port: int) -> None:
         for _ in range(600):  # until the application listens
             try:
                 self.socket = socket.create_connection((host, port), timeout=60)
@@ -16,11 +16,11 @@ class Robot:
                 time.sleep(0.1)
         self.lines = self.socket.makefile("r", encoding="ascii", newline="\n")
 
-    def ask(self, *words):
+    def ask(self, *words: object) -> str:
         self.socket.sendall((" ".join(str(word) for word in words) + "\n").encode("ascii"))
         return self.lines.readline().strip()
 
-    def numbers(self, *words):
+    def numbers(self, *words: object) -> list[float]:
         return [float(word) for word in self.ask(*words).split("_")[1:]]
 
 

@@ -44,7 +44,12 @@ class Commands:
             for row in table.topics
         ]
         self._thread = TopicThread(
-            node, [one for one in self._subscriptions if one.callback_group is one_topic]
+            node,
+            [
+                subscription
+                for subscription in self._subscriptions
+                if subscription.callback_group is one_topic
+            ],
         )
         self._services = [
             node.create_service(

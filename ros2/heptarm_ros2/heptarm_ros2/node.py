@@ -36,6 +36,8 @@ from heptarm_ros2.trajectory import TrajectoryAction
 
 #: Pause between two attempts of the autostart [s].
 _RETRY = 2.0
+#: Names, or their beginnings, of parameters that are not ours.
+_OTHERS = ("use_sim_time", "qos_overrides", "start_type_description_service")
 
 
 class HeptarmNode(LifecycleNode):
@@ -60,6 +62,7 @@ class HeptarmNode(LifecycleNode):
         for one in parameters.joint_parameters(self.get_parameter("joint_names").value or []):
             self._declare(one)
         self.configuration = NodeConfiguration.of({})
+        self._warn_of_unknown()
         if hasattr(self, "add_pre_set_parameters_callback"):  # Humble refuses an integer for a number
             self.add_pre_set_parameters_callback(self._before_set)
         self.add_on_set_parameters_callback(self._on_set)
@@ -83,6 +86,14 @@ class HeptarmNode(LifecycleNode):
         given = self.declare_parameter(one.name, one.default, ParameterDescriptor(dynamic_typing=True)).value
         self.undeclare_parameter(one.name)
         self.declare_parameter(one.name, one.check(given), descriptor, ignore_override=True)
+
+    def _warn_of_unknown(self) -> None:
+        """Name given parameters that the node does not have: rclpy ignores them without a word."""
+        known = self._values()
+        given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        unknown = sorted(name for name in given if not name.startswith(_OTHERS))
+        if unknown:
+            self.get_logger().warning(parameters.unknown_text(unknown, known))
 
     def _values(self) -> dict[str, object]:
         names = [one.name for one in parameters.PARAMETERS]

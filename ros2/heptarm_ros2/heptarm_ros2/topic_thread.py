@@ -80,19 +80,19 @@ class TopicThread:
         if handle is None:
             return
         with contextlib.suppress(InvalidHandle), handle, contextlib.ExitStack() as held:
-            for one in self._subscriptions:
-                held.enter_context(one.handle)
+            for subscription in self._subscriptions:
+                held.enter_context(subscription.handle)
             waiting = rclpy_implementation.WaitSet(len(self._subscriptions), 1, 0, 0, 0, 0, handle)
             while not self._ending and self._context.ok():
                 waiting.clear_entities()
-                for one in self._subscriptions:
-                    waiting.add_subscription(one.handle)
+                for subscription in self._subscriptions:
+                    waiting.add_subscription(subscription.handle)
                 waiting.add_guard_condition(self._ended.handle)
                 waiting.wait(_LOOK)
                 ready = waiting.get_ready_entities("subscription")
-                for one in self._subscriptions:
-                    if one.handle.pointer in ready and not self._ending:
-                        self._take(one)
+                for subscription in self._subscriptions:
+                    if subscription.handle.pointer in ready and not self._ending:
+                        self._take(subscription)
 
     def _take(self, subscription: Subscription) -> None:
         taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)

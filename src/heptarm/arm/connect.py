@@ -23,7 +23,7 @@ from heptarm.io.clock import RealClock
 from heptarm.io.keys import find_key
 from heptarm.io.targets import SavedTarget
 from heptarm.io.transport import Transport
-from heptarm.values.arrays import finite, flag, instance, within, word
+from heptarm.values.checks import finite, flag, instance, within, word
 from heptarm.values.robot import FLANGES, ROBOTS, robot
 from heptarm.values.robot import flange as flange_of
 from heptarm.wire import messages as wire

@@ -43,7 +43,9 @@ def flange_warning(robot: RobotModel, joints: Joints, reported: Cartesian, expec
         return (
             f"{text}, and no media flange explains that: check the robot's type, its mastering and the tool"
         )
-    for one in FLANGES.values():
-        if abs(one.height - height) <= allowed:
-            return f'{text}: it likely is "{one.name}" ({one.title}); connect with flange="{one.name}"'
+    for flange in FLANGES.values():
+        if abs(flange.height - height) <= allowed:
+            return (
+                f'{text}: it likely is "{flange.name}" ({flange.title}); connect with flange="{flange.name}"'
+            )
     return f"{text}: its flange likely is {1e3 * height:.1f} mm high; connect with flange={height:.4f}"

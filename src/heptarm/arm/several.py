@@ -29,8 +29,8 @@ from heptarm.arm.motion.handle import MotionHandle, check_timeout
 from heptarm.arm.verbs import camera_feed
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
-from heptarm.values.arrays import flag, instance, shown, within
 from heptarm.values.camera import Camera
+from heptarm.values.checks import flag, instance, shown, within
 from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
@@ -238,7 +238,7 @@ def states_together(*arms: Arm) -> StatesOfArms:
         raise ShapeError("arms must be one or more arms, got none", parameter="arms")
     moment = min(state.sampled for state in newest)
     histories = [(state, *arm.history()) for arm, state in zip(arms, newest, strict=True)]
-    chosen = tuple(min(one, key=lambda state: abs(state.sampled - moment)) for one in histories)
+    chosen = tuple(min(history, key=lambda state: abs(state.sampled - moment)) for history in histories)
     times = [state.sampled for state in chosen]
     return StatesOfArms(moment * 1e-9, chosen, (max(times) - min(times)) * 1e-9)
 

@@ -28,12 +28,12 @@ from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
-from heptarm.arm.motion import program
+from heptarm.arm.motion import program_request
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
 from heptarm.arm.motion.preview import ProgramPreview
-from heptarm.arm.motion.program import ProgramTerms
+from heptarm.arm.motion.program_request import ProgramTerms
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import (
@@ -51,8 +51,8 @@ from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.planning.search import STATES, TIMEOUT, Goal
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
-from heptarm.values.arrays import array, callback, instance, integer, shown, within, word
 from heptarm.values.camera import Camera
+from heptarm.values.checks import array, callback, instance, integer, shown, within, word
 from heptarm.values.clearance import CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
@@ -534,7 +534,7 @@ class ArmVerbs(Sealed):
             StaleState: the newest state is too old, or lacks the joints.
             MissingExtra: the planner is not installed.
         """
-        motions = program.listed(motion)
+        motions = program_request.listed(motion)
         return self._foresight.preview(
             motions,
             self._terms(mode=mode, speed=speed, until=until, then=then),
@@ -655,12 +655,12 @@ class ArmVerbs(Sealed):
             ModeConflict: this thread is in the block of a servo motion or an FRI session.
             LocalProtocolError: called from a callback.
         """
-        motions = program.listed(motion)
+        motions = program_request.listed(motion)
         if timeout is not None:
             check_timeout(timeout)
         self._connection.check_may_wait("arm.move()")
         self._connection.check_no_block("arm.move()")
-        if timeout is None and program.is_endless(motions, self._connection.robot):
+        if timeout is None and program_request.is_endless(motions, self._connection.robot):
             raise ShapeError(
                 "this program ends only when it is cancelled, so that move() would never return",
                 parameter="timeout",
@@ -700,7 +700,7 @@ class ArmVerbs(Sealed):
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            motions = program.listed(motion)
+            motions = program_request.listed(motion)
             return self._send(motions, self._terms(mode=mode, speed=speed, until=until, then=then, when=when))
 
     @contextlib.contextmanager
@@ -790,9 +790,9 @@ class ArmVerbs(Sealed):
         return check_reaction(then)
 
     def _send(self, motions: tuple[Motion, ...], terms: ProgramTerms) -> MotionHandle:
-        made = program.checked(self._connection, self._tooling, motions, terms)
+        made = program_request.checked(self._connection, self._tooling, motions, terms)
         self._foresight.examine(made)
-        return program.send(self._connection, made)
+        return program_request.send(self._connection, made)
 
     @overload
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from heptarm.errors import LimitError
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.wire import messages as wire
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm._library import Unavailable
 from heptarm.arm.fri.diagnosis import cause
 from heptarm.arm.fri.settings import PORTS
 from heptarm.cli.options import (
@@ -34,7 +33,7 @@ from heptarm.fri.loop.client import Client
 from heptarm.fri.loop.echo import floor
 from heptarm.fri.loop.user_api import State
 from heptarm.fri.protocol.messages import Quality
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 from heptarm.values.files import refuse_existing
 
 #: Messages kept for the picture.
@@ -175,14 +174,12 @@ def _wait_beside_echo(client: Client, seconds: float) -> Array:
     """Measure the echo meanwhile, with the period of the session: the machine is then the same for both.
 
     Returns:
-        Receipt to reply of the echo [s]; empty without a C compiler.
+        Receipt to reply of the echo [s].
     """
     with ThreadPoolExecutor(1) as pool:
         echo = pool.submit(floor, min(seconds, _ECHO_TIME), period=client.state.period)
-        nothing = _wait(client, seconds)
-        with suppress(Unavailable):
-            return echo.result()
-    return nothing
+        _wait(client, seconds)
+        return echo.result()
 
 
 def _measure(client: Client, lost: int, missed: int, before: int) -> Measurement:

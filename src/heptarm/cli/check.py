@@ -147,10 +147,13 @@ def _table(report: Report) -> Table:
     table = Table(box=None, pad_edge=False)
     for name in ("", "scenario", "s", "shows"):
         table.add_column(name, overflow="fold")
-    for one in report.outcomes:
-        words = one.scenario.title if not one.text else f"{one.scenario.title}: {one.text}"
-        style = _STYLES[one.verdict]
+    for outcome in report.outcomes:
+        words = outcome.scenario.title if not outcome.text else f"{outcome.scenario.title}: {outcome.text}"
+        style = _STYLES[outcome.verdict]
         table.add_row(
-            f"[{style}]{one.verdict.value}[/]", one.scenario.name, f"{one.seconds:.1f}", escape(words)
+            f"[{style}]{outcome.verdict.value}[/]",
+            outcome.scenario.name,
+            f"{outcome.seconds:.1f}",
+            escape(words),
         )
     return table

@@ -77,9 +77,9 @@ def run(
                 return
             style = _STYLES[last.verdict]
             console.print(f"[{style}]{last.verdict.value:8}[/] {last.step.name}  {escape(last.text)}")
-            for one in last.comparisons:
-                agrees = "" if one.agrees else "[red]differs[/] "
-                words = f"{one.quantity}: {one.measured} (expected: {one.expected})"
+            for comparison in last.comparisons:
+                agrees = "" if comparison.agrees else "[red]differs[/] "
+                words = f"{comparison.quantity}: {comparison.measured} (expected: {comparison.expected})"
                 console.print(f"         {agrees}{escape(words)}")
 
         report = commission(arm, person(arm, yes=yes, console=console), only=only, on_end=ended)

@@ -25,7 +25,7 @@ from heptarm.cli.options import (
 )
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.files import refuse_existing
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.ptp import ptp
@@ -198,12 +198,12 @@ def _table(steps: list[DemoStep]) -> Table:
     table.add_column("duration", justify="right")
     table.add_column("residual", justify="right")
     table.add_column("cause")
-    for one in steps:
-        residual = "" if np.isnan(one.residual) else f"{one.residual:.1e} rad"
-        duration = "" if one.cause == "refused" else f"{one.end - one.begin:.2f} s"
-        cause = one.cause + (f": {one.text}" if one.text else "")
+    for step in steps:
+        residual = "" if np.isnan(step.residual) else f"{step.residual:.1e} rad"
+        duration = "" if step.cause == "refused" else f"{step.end - step.begin:.2f} s"
+        cause = step.cause + (f": {step.text}" if step.text else "")
         # a text is no markup: its brackets are to be seen
-        table.add_row(one.name, duration, residual, Text(cause), style=None if one.as_designed else "red")
+        table.add_row(step.name, duration, residual, Text(cause), style=None if step.as_designed else "red")
     return table
 
 

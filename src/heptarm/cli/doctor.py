@@ -547,7 +547,7 @@ def _latency(client: Client) -> tuple[float, float, float]:
     """Median, 99 % and longest latency since the quality was good [s]: the first answers are always slow."""
     states = client.history()
     first = next((i for i, one in enumerate(states) if one.quality >= Quality.GOOD), 0)
-    delays = [one.latency for one in states[first:]]
+    delays = [state.latency for state in states[first:]]
     return float(np.median(delays)), float(np.percentile(delays, 99)), max(delays)
 
 

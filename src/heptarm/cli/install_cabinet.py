@@ -117,7 +117,7 @@ def _options(text: str) -> tuple[str, ...]:
     Raises:
         CommandRejected: there is no such option.
     """
-    names = [one.strip() for one in text.split(",") if one.strip()]
+    names = [part.strip() for part in text.split(",") if part.strip()]
     for name in names:
         if name not in OPTIONS:
             allowed = ", ".join(OPTIONS)
@@ -128,7 +128,7 @@ def _options(text: str) -> tuple[str, ...]:
                 allowed=allowed,
                 hint="for example --without fri,hand-guiding",
             )
-    return tuple(one for one in OPTIONS if one in names)
+    return tuple(option for option in OPTIONS if option in names)
 
 
 def _set_key(project: Path, key: str) -> None:

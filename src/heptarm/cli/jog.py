@@ -18,8 +18,9 @@ from heptarm.devices.gamepad import gamepad
 from heptarm.devices.keyboard import HELP, keyboard
 from heptarm.devices.spacemouse import spacemouse
 from heptarm.errors import HeptarmError, NotReady
+from heptarm.model.velocity import Elbow
 from heptarm.skills.teleoperation import RATE, SCALE, TURN_SCALE, teleoperate
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 
 _ACCESS = Access()
 _DEVICES: dict[str, Callable[[], InputDevice]] = {
@@ -46,6 +47,10 @@ def jog(
     dead_man: Annotated[
         str | None, Parameter(help="Button to hold while the arm moves. Default: that of the device.")
     ] = None,
+    elbow: Annotated[
+        Elbow,
+        Parameter(help="What the elbow does: keep its angle, or keep the joints away from their limits."),
+    ] = "keep",
     seconds: Annotated[
         float | None, Parameter(name="--for", help="How long [s]. Default: until its quit button.")
     ] = None,
@@ -76,6 +81,7 @@ def jog(
                 frame=frame,
                 duration=limit,
                 rate=RATE,
+                elbow=elbow,
                 while_true=_display(arm) if sys.stderr.isatty() else None,
             )
         finally:

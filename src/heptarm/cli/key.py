@@ -79,15 +79,15 @@ def _typed() -> str:
 def show(*, as_json: Json = False) -> int:
     """List the cabinets that have a stored key, and whether it can be used; keys are not shown."""
     keys = stored_keys()
-    for one in keys:
-        trouble = one.trouble
+    for key in keys:
+        trouble = key.trouble
         if as_json:
-            emit({"target": one.target, "file": str(one.file), "usable": not trouble, "trouble": trouble})
+            emit({"target": key.target, "file": str(key.file), "usable": not trouble, "trouble": trouble})
         else:
-            print(f"{one.target:24} {trouble or one.file}")
+            print(f"{key.target:24} {trouble or key.file}")
     if not keys and not as_json:
         print("no keys are stored; `heptarm key new --target ADDRESS` makes one")
-    return 1 if any(one.trouble for one in keys) else 0
+    return 1 if any(key.trouble for key in keys) else 0
 
 
 def forget(*, target: Address, as_json: Json = False) -> int:

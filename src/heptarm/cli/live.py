@@ -12,7 +12,7 @@ from heptarm.cli.output import emit
 from heptarm.cli.record import wait_until_over
 from heptarm.errors import require
 from heptarm.panel.model import groups_for
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.viewers.live import live as live_view
 
 

@@ -8,20 +8,25 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-from cyclopts import App, CycloptsError, Parameter, UnusedCliTokensError
+from cyclopts import App, CycloptsError, Parameter, UnknownOptionError, UnusedCliTokensError
 
 from heptarm import __version__
 from heptarm.errors import HeptarmError, missing_extra
 
+#: Exit code after misuse of a command, as of other tools.
+_USAGE = 2
+#: What errors say in Python about angles that were given in degrees; a shell has an option for it.
+_IN_DEGREES = re.compile(r"did you mean ha\.deg\([^)]*\)\?")
 #: Commands and where their functions are.
 COMMANDS = {
     "demo": "demo:demo",
-    "sim": "sim:sim",
+    "sim": "sim.cabinet:sim",
     "panel": "panel:panel",
     "state": "state:state",
     "stop": "stop:stop",
@@ -45,7 +50,10 @@ PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_l
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
-_GROUPS = {"move": MOVES, "plan": PLANS, "key": KEYS, "targets": TARGETS, "rl": LEARNING}
+SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
+#: Groups that are commands themselves, and where they are.
+_APPS = {"sim": "sim:app"}
+_GROUPS = {"sim": SIMULATIONS, "move": MOVES, "plan": PLANS, "key": KEYS, "targets": TARGETS, "rl": LEARNING}
 
 app = App(
     name="heptarm",
@@ -59,7 +67,7 @@ app = App(
 def _summary(place: str) -> str:
     """First line of a command's docstring, read from its source."""
     module, function = place.split(":")
-    tree = ast.parse(Path(__file__).with_name(f"{module}.py").read_bytes())
+    tree = ast.parse(Path(__file__).parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
     (found,) = (one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == function)
     return (ast.get_docstring(found) or "").partition("\n")[0]
 
@@ -68,12 +76,25 @@ def _add(group: App, commands: dict[str, str], *, listed: bool) -> App:
     for name, place in commands.items():
         # the help of a command that runs is its whole docstring, so only a list has summaries
         more = {"help": _summary(place)} if listed else {}
-        group.command(f"heptarm.cli.{place}", name=name, **more)
+        group.command(f"heptarm.cli.{_APPS.get(name, place)}", name=name, **more)
     return group
 
 
+def current_spelling(tokens: list[str]) -> list[str]:
+    """Translate `heptarm sim --app FOLDER` and `--fri VERSION`, older spellings of `sim app` and `sim fri`."""
+    if tokens[:1] != ["sim"] or (tokens[1:2] and tokens[1] in SIMULATIONS):
+        return tokens
+    for place, token in enumerate(tokens):
+        option, equals, value = token.partition("=")
+        if option in ("--app", "--fri"):
+            rest = [value] * bool(equals) + tokens[place + 1 :]
+            return ["sim", option.lstrip("-"), *rest[:1], *tokens[1:place], *rest[1:]]
+    return tokens
+
+
 #: The commands on the command line: a list is printed of those below the last one that is a group.
-_words = [one for one in sys.argv[1:] if not one.startswith("-")]
+_tokens = current_spelling(sys.argv[1:])
+_words = [token for token in _tokens if not token.startswith("-")]
 _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
 _plans = App(name="plan", help="Look ahead of a motion: duration, limits, collisions; nothing moves.")
@@ -98,20 +119,22 @@ def _list_targets(
 
 
 def main() -> None:
-    """Run the command line: an error is one sentence on standard error and exit code 1."""
+    """Run the command line: an error is one sentence on standard error and exit code 1; misuse of the command, 2."""
     try:
-        code = app(print_error=False, exit_on_error=False)
+        code = app(_tokens, print_error=False, exit_on_error=False)
     except UnusedCliTokensError as error:
-        _fail(f"unexpected: {' '.join(error.unused_tokens or ())} ({_help()})")
+        _fail(f"unexpected: {' '.join(error.unused_tokens or ())} ({_help()})", code=_USAGE)
     except CycloptsError as error:
-        _fail(f"{' '.join(str(error).split())} ({_help()})")
+        _fail(f"{_misplaced(error) or ' '.join(str(error).split())} ({_help()})", code=_USAGE)
     except HeptarmError as error:
         from heptarm.arm.translate.text import printable
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise
         page = f"\n{error.page}" if error.code and sys.stderr.isatty() else ""
-        _fail(printable(str(error), lines=True) + page)
+        _fail(
+            _IN_DEGREES.sub("did you mean them in degrees? --deg", printable(str(error), lines=True)) + page
+        )
     except ModuleNotFoundError as error:
         missing = missing_extra(error.name or "")
         if missing is None or os.environ.get("HEPTARM_DEBUG"):
@@ -128,6 +151,16 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _misplaced(error: CycloptsError) -> str:
+    """Why `heptarm sim` does not take an option of one of its siblings; empty: the error is another one."""
+    if not isinstance(error, UnknownOptionError) or _words[:1] != ["sim"]:
+        return ""
+    from heptarm.cli.sim import explain_refusal
+
+    command = _words[1] if _words[1:] and _words[1] in SIMULATIONS else ""
+    return explain_refusal(command, (error.token.keyword or "").partition("=")[0])
+
+
 def _help() -> str:
     """What to type for the help of the command on the command line, as far as there is one."""
     known = ["heptarm"]
@@ -140,9 +173,9 @@ def _help() -> str:
     return " ".join([*known, "--help"])
 
 
-def _fail(sentence: str) -> NoReturn:
+def _fail(sentence: str, *, code: int = 1) -> NoReturn:
     print(f"heptarm: {sentence}", file=sys.stderr)
-    sys.exit(1)
+    sys.exit(code)
 
 
 if __name__ == "__main__":

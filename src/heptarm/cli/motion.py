@@ -27,7 +27,7 @@ from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
 from heptarm.errors import NotReady
 from heptarm.record.recording import load
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.files import refuse_existing
 from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance

@@ -17,8 +17,8 @@ from heptarm.record.convert import convert as convert_recording
 from heptarm.record.fri_client import record_client
 from heptarm.record.recorder import Recorder
 from heptarm.record.recording import load
-from heptarm.values.arrays import within
 from heptarm.values.camera import Camera
+from heptarm.values.checks import within
 from heptarm.values.files import refuse_existing
 from heptarm.values.state import GROUP_NAMES
 from heptarm.viewers.live import LiveView

@@ -19,7 +19,7 @@ from heptarm.cli.options import (
     Json,
 )
 from heptarm.cli.output import emit, state_data
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.state import State
 
 

@@ -8,7 +8,7 @@ from heptarm.devices.device import DeviceInput, InputDevice, Roles
 from heptarm.devices.gamepad import Gamepad, gamepad
 from heptarm.devices.keyboard import Keyboard, keyboard
 from heptarm.devices.spacemouse import SpaceMouse, spacemouse
-from heptarm.devices.stream import (
+from heptarm.devices.virtual import (
     RecordedDevice,
     RecordingDevice,
     SyntheticDevice,

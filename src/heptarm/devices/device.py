@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import HeptarmError, NotReady, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, shown
+from heptarm.values.checks import Array, Value, array, frozen, shown
 
 #: Deflections below this are none, since sticks do not return exactly to their centre.
 DEAD_ZONE = 0.1

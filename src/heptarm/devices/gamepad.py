@@ -17,7 +17,7 @@ import numpy as np
 
 from heptarm.devices.device import DEAD_ZONE, REST, DeviceInput, Roles, gone, without_dead_zone
 from heptarm.errors import CommandRejected, NotReady, refuse_windows, require
-from heptarm.values.arrays import instance, within
+from heptarm.values.checks import instance, within
 from heptarm.values.sealed import Sealed
 
 # Codes of the kernel's interface, as in linux/input-event-codes.h.

@@ -17,7 +17,7 @@ import numpy as np
 from heptarm.devices.device import REST, DeviceInput, Roles, gone
 from heptarm.errors import NotReady, refuse_windows
 from heptarm.io.clock import Clock, RealClock
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.sealed import Sealed
 
 #: Axis and direction of each key.

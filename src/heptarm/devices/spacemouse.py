@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from heptarm.devices.device import DEAD_ZONE, REST, DeviceInput, Roles, without_dead_zone
 from heptarm.errors import NotReady, require
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.sealed import Sealed
 
 #: Most reports that one reading handles: translation, rotation and buttons come as reports of their own.

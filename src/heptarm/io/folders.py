@@ -51,7 +51,7 @@ def private_folder(place: Path) -> Path:
     known = (settings_folder(), state_folder(), runtime_folder())
     root = next((one for one in known if one == place or one in place.parents), place)
     root.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    between = [one for one in place.parents if root in one.parents or one == root]
+    between = [parent for parent in place.parents if root in parent.parents or parent == root]
     for one in (*reversed(between), place):
         one.mkdir(mode=0o700, exist_ok=True)
         if is_private(one):

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from heptarm.io.folders import is_private, private_folder, runtime_folder
-from heptarm.values.arrays import Array, Value
+from heptarm.values.checks import Array, Value
 
 _CARD, _SUFFIX = "panel.json", ".npz"
 #: Most samples of a plan that are handed over, and the largest file that is read [bytes].

@@ -24,14 +24,14 @@ from typing import Any
 
 from heptarm.errors import CommandRejected
 from heptarm.io.folders import private_folder, settings_folder
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.files import read_text
 from heptarm.values.robot import flange
 
 try:
     import tomllib
 except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib  # type: ignore[import-not-found,no-redef]
+    import tomli as tomllib  # type: ignore[no-redef]
 
 #: Names of targets: no name of a host that has a dot, and no address.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")

@@ -14,13 +14,13 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm._library import Unavailable, extension_file
+from heptarm._library import extension_file
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.fri.loop.parameters import Param
 from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.values.arrays import Array, array, frozen, instance, integer, numbers, scalar, within, word
+from heptarm.values.checks import Array, array, frozen, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
@@ -48,14 +48,9 @@ def shared_library() -> Path:
     """The library with the laws: the compiled part of heptarm.
 
     Raises:
-        CommandRejected: it is missing.
+        Unavailable: it is missing.
     """
-    try:
-        return Path(extension_file())
-    except Unavailable as error:
-        raise CommandRejected(
-            f"the ready laws are not available: {error}", parameter="law", hint=error.hint
-        ) from None
+    return Path(extension_file())
 
 
 class ReadyLaw(LibraryLaw):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from heptarm.errors import LimitError, ShapeError
 from heptarm.model.inverse_kinematics import FOUND
 from heptarm.model.native import constants, many
-from heptarm.values.arrays import Array, finite_entries, instance, numbers
+from heptarm.values.checks import Array, finite_entries, instance, numbers
 from heptarm.values.robot import RobotModel
 
 #: Whole numbers, one for each pose.

@@ -8,7 +8,7 @@ import numpy as np
 
 from heptarm.errors import OutsideWorkspace
 from heptarm.model.kinematics import forward
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.frames import BASE
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.model.native import Joints, Reals, Square, Vector, one, reals, values_of
-from heptarm.values.arrays import Array, array, frozen, instance
+from heptarm.values.checks import Array, array, frozen, instance
 from heptarm.values.robot import Body, Friction, RobotModel
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].

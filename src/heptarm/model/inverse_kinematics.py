@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, Unreachable
 from heptarm.model.native import Joints, Matrix, Reals, Spans, constants, one, values_of
-from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
+from heptarm.values.checks import Array, array, finite, finite_entries, instance, integer, numbers
 from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.robot import RobotModel
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from heptarm.errors import ShapeError
 from heptarm.model.native import Jacobian, Joints, Matrix, Reals, Vector, Vectors, constants, one, values_of
-from heptarm.values.arrays import Array, array, instance, integer
+from heptarm.values.checks import Array, array, instance, integer
 from heptarm.values.robot import RobotModel
 
 Vec: TypeAlias = tuple[float, float, float]

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 from heptarm._library import library
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Seven joints, a homogeneous matrix, and a Jacobian in C.
@@ -59,7 +59,7 @@ def one() -> ctypes.CDLL:
     Raises:
         Unavailable: the extension is missing.
     """
-    return _typed(library(holds_gil=True, has_twin=False))
+    return _typed(library(holds_gil=True))
 
 
 @cache
@@ -69,7 +69,7 @@ def many() -> ctypes.CDLL:
     Raises:
         Unavailable: the extension is missing.
     """
-    return _typed(library(has_twin=False))
+    return _typed(library())
 
 
 class Arm(ctypes.Structure):

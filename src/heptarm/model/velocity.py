@@ -18,7 +18,7 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.inverse_kinematics import arm_angle, solve
 from heptarm.model.kinematics import jacobian
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

@@ -16,7 +16,7 @@ from heptarm.sim.plant.scene import Scene, is_mounted
 from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape
 
@@ -63,12 +63,12 @@ class DrawnWorld:
         self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
         self._handles = [
             (
-                one.index,
+                shape.index,
                 server.scene.add_mesh_simple(
-                    f"{root}/world/{one.index}", one.vertices, one.faces, color=one.colour
+                    f"{root}/world/{shape.index}", shape.vertices, shape.faces, color=shape.colour
                 ),
             )
-            for one in drawn_shapes(self._model)
+            for shape in drawn_shapes(self._model)
         ]
         server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
         self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
@@ -146,7 +146,7 @@ class DrawnGhost:
         if plan is None:
             return
         if not self._shapes:
-            self._shapes = [(one.index, self._translucent(one)) for one in drawn_shapes(self._model)]
+            self._shapes = [(shape.index, self._translucent(shape)) for shape in drawn_shapes(self._model)]
         self._data.qpos[:7] = [np.interp(t, plan.t, column) for column in plan.q.T]
         mujoco.mj_kinematics(self._model, self._data)
         quat = np.zeros(4)
@@ -244,7 +244,7 @@ class DrawnMarks:
     def show_places(self, kind: str, places: Mapping[str, Pose]) -> None:
         """Draw named frames, such as "frames" or "points", in place of those of the same kind."""
         wanted = {f"{kind}/{name}": pose for name, pose in places.items()}
-        for name in [one for one in self._places if one.startswith(f"{kind}/") and one not in wanted]:
+        for name in [place for place in self._places if place.startswith(f"{kind}/") and place not in wanted]:
             self._erase(name)
             del self._places[name]
         for name, pose in wanted.items():

@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 from urllib.parse import parse_qs, urlsplit
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.values.arrays import integer
+from heptarm.values.checks import integer
 
 LAST_PORT = 65535
 #: Makes an answer, in a thread of its own: status, media type, text.

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
-from heptarm.values.arrays import Array, Value, array
+from heptarm.values.checks import Array, Value, array
 from heptarm.values.frames import BASE
 from heptarm.values.pose import Pose
 

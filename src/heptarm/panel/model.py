@@ -21,7 +21,7 @@ from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionEr
 from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
-from heptarm.values.arrays import Array, Value, within
+from heptarm.values.checks import Array, Value, within
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.state import GROUP_NAMES, Safety, State

@@ -175,7 +175,7 @@ class ArmPage:
         times, forces = self.model.forces
         if len(times) < 2:
             return
-        top = next((one for one in _SCALES if one > 1.1 * forces.max()), _SCALES[-1])
+        top = next((scale for scale in _SCALES if scale > 1.1 * forces.max()), _SCALES[-1])
         if top != self._top:
             self._top = top
             self._plot.scales = self._scales()

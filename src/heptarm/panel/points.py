@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.values.arrays import Array, Value, array, shown
+from heptarm.values.checks import Array, Value, array, shown
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp

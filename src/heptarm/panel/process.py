@@ -334,7 +334,7 @@ def _gripper_of(arm: Arm, options: PanelOptions) -> Gripper | None:
             wiring = Wiring.of(options.gripper)
         elif arm.is_virtual and options.scene:
             scene = Scene.of(options.scene)
-            if all(one.name != GRIPPER for one in scene.read().actuators):
+            if all(actuator.name != GRIPPER for actuator in scene.read().actuators):
                 return None
             wiring = scene.wiring
         else:

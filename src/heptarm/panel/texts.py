@@ -11,7 +11,7 @@ import numpy as np
 from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.model import Advice, Readout
 from heptarm.panel.points import PointList
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel

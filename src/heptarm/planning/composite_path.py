@@ -16,7 +16,7 @@ from heptarm.model.batch import forward_batch
 from heptarm.planning.motion import PlanError
 from heptarm.planning.path import JointPath
 from heptarm.planning.time_scaling import PathConstraints
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

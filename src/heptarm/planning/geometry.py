@@ -11,10 +11,10 @@ import numpy as np
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import Vec, flange
 from heptarm.planning.motion import PlanError
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.circle import arc_of
 from heptarm.values.motion.orientation import Orientation
-from heptarm.values.pose import Pose, multiply, quaternion
+from heptarm.values.pose import Pose, multiply, quaternion, towards
 from heptarm.values.robot import RobotModel
 
 #: Quaternion x y z w.
@@ -48,19 +48,8 @@ class OrientationPath(Protocol):
         """Orientation in the base."""
 
 
-#: Half a turn, whose direction is free: cosine of half the angle between two orientations, which are known to 1e-6 rad.
-_HALF_TURN = 1e-6
-
-
-def is_half_turn(start: Array, end: Array) -> bool:
-    """Whether one orientation is half a turn from another, so that two directions lead to it."""
-    return abs(float(start @ end)) < _HALF_TURN
-
-
 class Slerp:
-    """From one orientation to another about a fixed axis, by the smaller angle.
-
-    Half a turn goes about the axis whose first component that is not 0 is positive, in base axes.
+    """From one orientation to another about a fixed axis, by the smaller angle; half a turn as in `towards`.
 
     Args:
         start: quaternion x y z w.
@@ -71,15 +60,10 @@ class Slerp:
     __slots__ = ("_from", "_half", "_to", "angle")
 
     def __init__(self, start: Array, end: Array, *, is_other: bool = False) -> None:
-        dot = float(start @ end)
-        sign = 1.0 if dot >= 0 else -1.0
-        if is_half_turn(start, end):
-            axis = multiply(end, start * np.array([-1.0, -1.0, -1.0, 1.0]))[:3]
-            leading = axis[int(np.argmax(np.abs(axis) > 1e-3))]
-            sign = 1.0 if (leading >= 0.0) != is_other else -1.0
+        end = towards(start, end, is_other=is_other)
         self._from: Quat = tuple(start.tolist())
-        self._to: Quat = tuple((sign * end).tolist())
-        self._half = acos(max(-1.0, min(1.0, sign * dot)))
+        self._to: Quat = tuple(end.tolist())
+        self._half = acos(max(-1.0, min(1.0, float(start @ end))))
         self.angle = Pose.of((0, 0, 0), start).angle_to(Pose.of((0, 0, 0), end))
 
     def at(self, s: float) -> Quat:

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 @dataclass(frozen=True, slots=True)

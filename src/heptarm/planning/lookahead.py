@@ -19,7 +19,7 @@ from heptarm.planning import seam
 from heptarm.planning.motion import PlanError
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.checks import Array, frozen
 from heptarm.values.frames import TOOL
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel

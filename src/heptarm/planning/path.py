@@ -11,7 +11,7 @@ import numpy as np
 
 from heptarm.model.inverse_kinematics import PathInverse, status_of
 from heptarm.planning.geometry import Geometry, blend_weight
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

@@ -14,7 +14,7 @@ from heptarm.planning.composite_path import CompositePath, constraints, sample
 from heptarm.planning.path import JointPath, PathLengths
 from heptarm.planning.table import MotionTable
 from heptarm.planning.time_scaling import PathTiming
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

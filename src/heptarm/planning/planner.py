@@ -14,7 +14,7 @@ from heptarm.planning.motion import (
 from heptarm.planning.plan import Plan
 from heptarm.planning.program import plan_batch, plan_motion
 from heptarm.planning.spline import plan_joint_spline, plan_spline
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

@@ -38,7 +38,7 @@ from heptarm.planning.targets import (
     programmed_speed,
     segment_limits,
 )
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 

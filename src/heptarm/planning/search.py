@@ -19,7 +19,7 @@ import numpy.typing as npt
 from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import forward_batch, solve_batch
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.values.arrays import Array, array, frozen, instance, integer, shown, within
+from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
 from heptarm.values.clearance import Clearance, PlanningWorld
 from heptarm.values.motion.planned_path import Path, Region, SearchStats, Upright
 from heptarm.values.motion.ptp import Ptp

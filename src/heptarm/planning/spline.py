@@ -6,6 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import acos
 
 import numpy as np
 
@@ -26,9 +27,16 @@ from heptarm.planning.motion import (
 )
 from heptarm.planning.path import CartesianPath, Sequential
 from heptarm.planning.plan import Plan, timed
-from heptarm.planning.targets import JointMotion, SplineSegment, joint_target, pose_of, segment_limits
-from heptarm.values.arrays import Array
-from heptarm.values.pose import Pose
+from heptarm.planning.targets import (
+    JointMotion,
+    SplineSegment,
+    goes_on,
+    joint_target,
+    pose_of,
+    segment_limits,
+)
+from heptarm.values.checks import Array
+from heptarm.values.pose import Pose, is_half_turn, towards
 from heptarm.values.robot import RobotModel
 
 
@@ -139,12 +147,22 @@ class Orientations:
     Args:
         places: fractions of the whole at which they are, shape (n,), ascending.
         quats: shape (n, 4).
+        others: half turns that go in the other direction, by the number of their start; see `towards`.
+
+    Attributes:
+        half_turns: number of the start, and fraction at the end, of each half turn.
     """
 
-    def __init__(self, places: Array, quats: Array) -> None:
+    def __init__(self, places: Array, quats: Array, *, others: frozenset[int] = frozenset()) -> None:
+        self._given = places, quats, others
         signed = quats.copy()
         for i in range(1, len(signed)):
-            signed[i] *= -1.0 if signed[i] @ signed[i - 1] < 0 else 1.0
+            signed[i] = towards(signed[i - 1], signed[i], is_other=i - 1 in others)
+        self.half_turns = [
+            (i, float(places[i + 1]))
+            for i, (one, two) in enumerate(pairwise(signed))
+            if is_half_turn(one, two)
+        ]
         self._places: list[float] = places.tolist()
         lengths = np.diff(places)
         steps = np.diff(signed, axis=0) / lengths[:, None]
@@ -163,6 +181,11 @@ class Orientations:
             slope[-1] = steps[-1]
         ends = [(q, v, none) for q, v in zip(signed, slope, strict=True)]
         self._pieces = [Quintic(h, a, b) for h, a, b in zip(lengths.tolist(), ends, ends[1:], strict=False)]
+
+    def other(self, half_turn: int) -> Orientations:
+        """The same with a half turn in the other direction."""
+        places, quats, others = self._given
+        return Orientations(places, quats, others=others | {half_turn})
 
     def at(self, s: float) -> Quat:
         """Orientation at a fraction of the whole."""
@@ -213,8 +236,10 @@ _SHORT, _STILL = 1e-5, 1e-6
 _LEVER = 0.1
 #: A larger change of direction between two segments is a corner, where the arm rests [rad].
 _CORNER = 2e-3
-#: Samples of a segment: at least, at most, and for each metre.
-_FEW, _MANY, _PER_METRE = 17, 61, 200
+#: Samples of a segment: at least, at most, for each metre, and for each radian.
+_FEW, _MANY, _PER_METRE, _PER_RADIAN = 17, 61, 200, 18
+#: Samples of a segment that tell in which direction of a half turn the arm can follow.
+_PER_SEGMENT = 60
 _LOOKS = 9
 
 
@@ -263,21 +288,37 @@ def plan_spline(robot: RobotModel, whole: seam.Spline, start: Array, tcp: Pose) 
     if not segments:
         return Plan(whole, start, start)
     lengths = np.array([segment.length for segment in segments])
-    geometry = SplineGeometry(lengths, _curves(segments), turning)
-    path = CartesianPath(robot, start, geometry, tcp, None)
+    curves = _curves(segments)
+
+    def path_of(turning: Orientations) -> CartesianPath:
+        return CartesianPath(robot, start, SplineGeometry(lengths, curves, turning), tcp, None)
+
+    for half_turn, end in turning.half_turns:  # each in the direction in which the arm can follow
+        other, looks = turning.other(half_turn), _PER_SEGMENT * len(segments)
+        if not goes_on(robot, path_of(turning).at, start, end=end, looks=looks) and goes_on(
+            robot, path_of(other).at, start, end=end, looks=looks
+        ):
+            turning = other
+    path, geometry = path_of(turning), SplineGeometry(lengths, curves, turning)
     pieces = [
         Segment(
             SubPath(path, low, high),
             segment.length,
             segment_limits(segment.motion),
             _speed_limits(geometry, segment, low, high),
-            int(np.clip(segment.length * _PER_METRE, _FEW, _MANY)),
+            _samples(geometry, segment, low, high),
         )
         for segment, (low, high) in zip(segments, pairwise(geometry.marks), strict=True)
     ]
     rests = [i for i, (one, two) in enumerate(pairwise(segments)) if _is_corner(one, two)]
     begins = _begins(len(whole.segments), [segment.part for segment in segments], geometry.marks)
     return timed(robot, whole, start, tcp, CompositePath(pieces), [*rests, len(pieces) - 1], begins)
+
+
+def _samples(geometry: SplineGeometry, segment: _SplineSegment, low: float, high: float) -> int:
+    """So many samples that its length and its rotation are seen."""
+    turn = 2.0 * acos(min(1.0, abs(float(np.dot(geometry.quat(low), geometry.quat(high))))))
+    return int(np.clip(max(segment.length * _PER_METRE, turn * _PER_RADIAN), _FEW, _MANY))
 
 
 def _begins(parts: int, kept: Sequence[int], marks: Sequence[float]) -> list[float]:

@@ -6,6 +6,7 @@ Cartesian ones bound the path.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf, isnan, nan, sqrt
 from typing import TypeAlias
@@ -27,7 +28,7 @@ from heptarm.planning.motion import (
     orientation_of,
 )
 from heptarm.planning.path import CartesianPath
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 
@@ -155,15 +156,32 @@ def cartesian_path(robot: RobotModel, motion: PathMotion, start: Array, tcp: Pos
     )
     middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))
     is_free = abs(float(middle @ middle_of_other)) < _SAME_TURN
-    return other if is_free and not _goes_on(robot, path, start) and _goes_on(robot, other, start) else path
+    return (
+        other if is_free and not goes_on(robot, path.at, start) and goes_on(robot, other.at, start) else path
+    )
 
 
-def _goes_on(robot: RobotModel, path: CartesianPath, start: Array) -> bool:
-    """Whether the arm can follow a path within its joint limits, by samples."""
+def goes_on(
+    robot: RobotModel,
+    at: Callable[[float, Array], Array],
+    start: Array,
+    *,
+    end: float = 1.0,
+    looks: int = _LOOKS,
+) -> bool:
+    """Whether the arm can follow a path within its joint limits, by samples.
+
+    Args:
+        robot: the robot.
+        at: joint positions at a path parameter, next to others, shape (7,) [rad]; Unreachable: there are none.
+        start: joint positions at 0, shape (7,) [rad].
+        end: last path parameter.
+        looks: number of samples.
+    """
     near = start
-    for s in np.linspace(0.0, 1.0, _LOOKS)[1:].tolist():
+    for s in np.linspace(0.0, end, looks)[1:].tolist():
         try:
-            q = path.at(s, near)
+            q = at(s, near)
         except Unreachable:
             return False
         if float(np.abs(q - near).max()) > LARGEST_STEP or not inside(robot, q.tolist()):

@@ -23,7 +23,7 @@ from heptarm.planning.jerk_profile import (
     brake,
     change,
 )
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Fraction of an axis' acceleration that the path's curvature may use, and the path's third derivative of the jerk.
 _CURVE, _TWIST = 0.9, 0.9

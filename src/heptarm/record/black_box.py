@@ -162,7 +162,7 @@ class BlackBox:
     def _save(self, path: Path, at: int, reason: str, sessions: tuple[Reader, ...]) -> None:
         source = self._source
         begin = at - round(BEFORE * 1e9)
-        samples = [one for one in source.kept_samples() if one.received >= begin]
+        samples = [sample for sample in source.kept_samples() if sample.received >= begin]
         entries = source.journal.since(begin)
         if state_folder() in path.parents:
             private_folder(path.parent)

@@ -10,7 +10,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recorded import FRI
 from heptarm.record.recording import Recording
-from heptarm.values.arrays import flag
+from heptarm.values.checks import flag
 from heptarm.values.files import path_of, refuse_existing
 
 

@@ -12,7 +12,7 @@ from heptarm.fri.loop.client import Client
 from heptarm.record.journal import FRI, Journal
 from heptarm.record.recorder import Recorder
 from heptarm.record.samples import SampleQueue, StateSample
-from heptarm.values.arrays import instance
+from heptarm.values.checks import instance
 from heptarm.values.files import path_of
 
 

@@ -89,7 +89,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.hex()
     if is_dataclass(value) and not isinstance(value, type):
-        found = {one.name: plain(getattr(value, one.name)) for one in fields(value)}
+        found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
         return {"type": type(value).__name__, **found}
     if isinstance(value, (list, tuple)):
         return [plain(one) for one in value]
@@ -167,4 +167,4 @@ class Journal:
 
     def end_session(self, reader: Reader) -> None:
         """Note the end of an FRI session; a recorder still takes its last cycles."""
-        self.sessions = tuple(one for one in self.sessions if one is not reader)
+        self.sessions = tuple(session for session in self.sessions if session is not reader)

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.protocol.protobuf import BYTES, FIXED32, FIXED64, fields, key, put_bytes, put_varint, varint
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.wire.messages import STATE_LAYOUT
 
 Rows = npt.NDArray[Any]
@@ -108,7 +108,7 @@ class RowLayout:
     @property
     def text(self) -> str:
         """The fields as text, for the file."""
-        return json.dumps([(one.name, one.code, one.size) for one in self.fields])
+        return json.dumps([(field.name, field.code, field.size) for field in self.fields])
 
     @classmethod
     def of_text(cls, name: str, text: str) -> RowLayout:
@@ -122,7 +122,7 @@ class RowLayout:
             _field(one.name, number, _CODES[one.code][1], is_repeated=one.size > 1)
             for number, one in enumerate(self.fields, 1)
         ]
-        message = put_bytes(1, self.name.encode()) + b"".join(put_bytes(2, one) for one in parts)
+        message = put_bytes(1, self.name.encode()) + b"".join(put_bytes(2, part) for part in parts)
         return _file_set(_file(f"heptarm/{self.name}.proto", _PACKAGE, [message]))
 
 
@@ -203,7 +203,7 @@ def _field(name: str, number: int, kind: int, type_name: str = "", *, is_repeate
 
 def _message(name: str, *entries: bytes, enum: bytes = b"") -> bytes:
     """DescriptorProto."""
-    content = put_bytes(1, name.encode()) + b"".join(put_bytes(2, one) for one in entries)
+    content = put_bytes(1, name.encode()) + b"".join(put_bytes(2, entry) for entry in entries)
     return content + (put_bytes(4, enum) if enum else b"")
 
 
@@ -211,13 +211,13 @@ def _file(name: str, package: str, messages: Sequence[bytes], needs: Sequence[st
     """FileDescriptorProto."""
     content = put_bytes(1, name.encode()) + put_bytes(2, package.encode())
     content += b"".join(put_bytes(3, one.encode()) for one in needs)
-    content += b"".join(put_bytes(4, one) for one in messages)
+    content += b"".join(put_bytes(4, message) for message in messages)
     return content + put_bytes(12, b"proto3")
 
 
 def _file_set(*files: bytes) -> bytes:
     """FileDescriptorSet; a file is behind those that it needs."""
-    return b"".join(put_bytes(1, one) for one in files)
+    return b"".join(put_bytes(1, file) for file in files)
 
 
 _TIME = "google/protobuf/timestamp.proto"

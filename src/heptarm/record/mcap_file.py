@@ -159,7 +159,7 @@ class RecordingFile:
         """
         if not samples:
             return
-        rows = state_rows([one.body for one in samples])
+        rows = state_rows([sample.body for sample in samples])
         sampled = sampling_times(rows["stamp"], to_ours) + self._epoch
         data, size, out, channel = rows.tobytes(), rows.itemsize, self._out, self._states
         for index, (one, at) in enumerate(zip(samples, sampled.tolist(), strict=True)):

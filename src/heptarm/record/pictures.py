@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.values.arrays import Array, finite, flag, frozen, integer, scalar
+from heptarm.values.checks import Array, finite, flag, frozen, integer, scalar
 from heptarm.values.files import path_of, refuse_existing
 
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.record.samples import labels
-from heptarm.values.arrays import flag
+from heptarm.values.checks import flag
 from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.robot import RobotModel
 
@@ -169,8 +169,8 @@ def _chosen(recordings: Sequence[RecordedData], signals: Sequence[str]) -> list[
     """Names to draw, checked."""
     if signals:
         for name in signals:
-            for one in recordings:
-                array = one["xyz" if name == PATH else name]
+            for recording in recordings:
+                array = recording["xyz" if name == PATH else name]
                 if array.dtype.kind not in "fiu":
                     raise CommandRejected(
                         f"signal {name!r} has no numbers to draw", parameter="signals", value=name
@@ -179,7 +179,7 @@ def _chosen(recordings: Sequence[RecordedData], signals: Sequence[str]) -> list[
     found = [
         name
         for name in USUAL
-        if all(_has_numbers(one, "xyz" if name == PATH else name) for one in recordings)
+        if all(_has_numbers(recording, "xyz" if name == PATH else name) for recording in recordings)
     ]
     if not found:
         raise CommandRejected(

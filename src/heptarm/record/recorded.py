@@ -14,7 +14,7 @@ from heptarm.errors import CommandRejected, require
 from heptarm.record.journal import NOTE
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import to_frame
-from heptarm.values.arrays import Array, finite, flag, shown
+from heptarm.values.checks import Array, finite, flag, shown
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
 from heptarm.values.robot import RobotModel, known_robot
@@ -152,7 +152,7 @@ class RecordedData:
     @property
     def notes(self) -> tuple[RecordedEvent, ...]:
         """The marks that `Recorder.note` has put."""
-        return tuple(one for one in self.events if one.kind == NOTE)
+        return tuple(event for event in self.events if event.kind == NOTE)
 
     def between(self: _Data, begin: float | str, end: float | str) -> _Data:
         """A part of the recording; its times stay those of the whole.
@@ -180,8 +180,10 @@ class RecordedData:
         return replace(
             self,
             signals=signals,
-            motions=tuple(one for one in self.motions if one.begin <= last and not one.end < first),
-            events=tuple(one for one in self.events if first <= one.t <= last),
+            motions=tuple(
+                motion for motion in self.motions if motion.begin <= last and not motion.end < first
+            ),
+            events=tuple(event for event in self.events if first <= event.t <= last),
             pictures=self.pictures.between(first, last),
         )
 
@@ -189,12 +191,12 @@ class RecordedData:
         """Time of a mark [s]."""
         if not isinstance(when, str):
             return finite(when, name, unit="s")
-        for one in self.notes:
-            if one.text == when:
-                return one.t
+        for note in self.notes:
+            if note.text == when:
+                return note.t
         if when in ("begin", "end"):
             return -np.inf if when == "begin" else np.inf
-        known = ", ".join(repr(one.text) for one in self.notes) or "none"
+        known = ", ".join(repr(note.text) for note in self.notes) or "none"
         raise CommandRejected(
             f"there is no note {shown(when)}; there are {known}", parameter=name, value=when, allowed=known
         )

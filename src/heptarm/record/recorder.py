@@ -21,7 +21,7 @@ from heptarm.record.journal import NOTE, Journal, JournalEntry, Record
 from heptarm.record.layout import STATE
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.samples import SampleQueue, StateSample, state_rows
-from heptarm.values.arrays import flag, instance, within
+from heptarm.values.checks import flag, instance, within
 from heptarm.values.files import refuse_existing
 from heptarm.values.sealed import Sealed
 

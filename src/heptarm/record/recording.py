@@ -19,7 +19,7 @@ from heptarm.record.pictures import Pictures
 from heptarm.record.plot import figure_of
 from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
 from heptarm.record.samples import signals_of
-from heptarm.values.arrays import Array, flag, frozen, instance, shown
+from heptarm.values.checks import Array, flag, frozen, instance, shown
 from heptarm.values.files import open_regular, path_of
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ class _TimeLine:
 
 
 def _recording(path: Path, content: _Content) -> Recording:
-    layouts = {one.full_name: one for one in content.layouts.values()}
+    layouts = {layout.full_name: layout for layout in content.layouts.values()}
     states = layouts.get(STATE.full_name, STATE).read(content.payloads[STATE.full_name])
     signals: dict[str, npt.NDArray[Any]] = {}
     stamps = states["stamp"]
@@ -314,15 +314,15 @@ def _motions(
     texts: dict[int, str] = {}
     begins: dict[int, float] = {}
     ends: dict[int, RecordedEvent] = {}
-    for one in events:
-        if one.kind == "request" and one.name in ("Run", "ServoOpen", "FriOpen"):
-            texts[one.id] = (
-                one.text.partition(": ")[2] if one.name == "Run" else one.name.removesuffix("Open")
+    for event in events:
+        if event.kind == "request" and event.name in ("Run", "ServoOpen", "FriOpen"):
+            texts[event.id] = (
+                event.text.partition(": ")[2] if event.name == "Run" else event.name.removesuffix("Open")
             )
-        elif one.name == "MotionStarted":
-            begins.setdefault(int(one.content["id"]), one.t)
-        elif one.name == "MotionFinished":
-            ends[int(one.content["id"])] = one
+        elif event.name == "MotionStarted":
+            begins.setdefault(int(event.content["id"]), event.t)
+        elif event.name == "MotionFinished":
+            ends[int(event.content["id"])] = event
     ids, t = signals.get("motion", np.zeros(0, int)), signals["t"]
     for number in np.unique(ids[ids > 0]).tolist():
         seen = t[ids == number]

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.record.layout import STATE, Rows, column
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import STATE_LAYOUT
 
@@ -77,7 +77,7 @@ class SampleQueue:
         with self._lock:
             there = list(self._samples)
             first = there[0].number if there else float("inf")
-            older = [one for one in samples if after < one.number < first]
+            older = [sample for sample in samples if after < sample.number < first]
             whole = [*older, *there]
             if whole:
                 self.lost += max(0, whole[0].number - after - 1)
@@ -247,7 +247,7 @@ _WHOLES = {"pose": ("xyz", "quat"), "pose_cmd": ("xyz_cmd", "quat_cmd"), "wrench
 
 def states_to_numpy(samples: Sequence[StateSample]) -> dict[str, npt.NDArray[Any]]:
     """Arrays by signal name of pushed states; `t` is the cabinet's time since the first one [s]."""
-    signals = signals_of(state_rows([one.body for one in samples]))
+    signals = signals_of(state_rows([sample.body for sample in samples]))
     stamp = signals["stamp"]
     t: Array = (stamp - stamp[0]) * 1e-9 if len(stamp) else np.zeros(0)
     return {"t": t, **signals}

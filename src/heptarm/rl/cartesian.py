@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.model.batch import forward_batch, jacobian_batch
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Damping of the inverse [m, rad]; libiiwa's value.

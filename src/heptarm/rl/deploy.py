@@ -18,7 +18,7 @@ from heptarm.errors import LimitError, StaleState, StreamError
 from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array, array, instance, within
+from heptarm.values.checks import Array, array, instance, within
 from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.ptp import ptp
 

@@ -12,7 +12,7 @@ from heptarm.rl.sim.batch import BatchReach, Engine
 from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import COARSE, ReachTask
-from heptarm.values.arrays import array, instance, word
+from heptarm.values.checks import array, instance, word
 
 require("gymnasium", extra="rl")
 

@@ -14,7 +14,7 @@ from heptarm.rl.report import EpisodeReport
 from heptarm.rl.sim.batch import BatchReach, Engine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Keeps held-back targets apart from those of training, whatever the seeds.
 _HELD_BACK = 0x4E1D

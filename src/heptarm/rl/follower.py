@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from heptarm.errors import ShapeError
 from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 
 
 class Follower:

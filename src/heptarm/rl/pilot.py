@@ -12,7 +12,7 @@ import numpy.typing as npt
 from heptarm.errors import LimitError
 from heptarm.model.kinematics import forward
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array, array, within
+from heptarm.values.checks import Array, array, within
 from heptarm.values.robot import RobotModel
 
 

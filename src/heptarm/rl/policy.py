@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import flag
+from heptarm.values.checks import flag
 from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
 Weights = npt.NDArray[np.float32]

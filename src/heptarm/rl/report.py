@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, require
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array, flag, frozen
+from heptarm.values.checks import Array, flag, frozen
 from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
 

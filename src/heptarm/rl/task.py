@@ -16,7 +16,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.model.batch import forward_batch
 from heptarm.rl.cartesian import step_towards
-from heptarm.values.arrays import Array, array, integer, within, word
+from heptarm.values.checks import Array, array, integer, within, word
 from heptarm.values.robot import RobotModel, robot
 
 ACTIONS = ("joint", "cartesian")

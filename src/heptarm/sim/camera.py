@@ -26,8 +26,8 @@ from heptarm.sim.plant.carried import COLOUR, GEOMS, mujoco_size
 from heptarm.sim.plant.scene import Scene, is_mounted
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import CAMERA, compiled
-from heptarm.values.arrays import Array
 from heptarm.values.camera import Camera
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape
 

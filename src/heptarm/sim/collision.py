@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, require
-from heptarm.values.arrays import Array, array, finite_entries, instance, numbers, shown, within
+from heptarm.values.checks import Array, array, finite_entries, instance, numbers, shown, within
 from heptarm.values.clearance import Clearance, TouchOnPath
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose

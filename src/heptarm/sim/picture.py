@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import require
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Fraction of the light from everywhere, from the lamp, and its highlight.
 _AMBIENT, _DIFFUSE, _GLOSS = 0.50, 0.55, 0.25

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from heptarm.arm.verbs import ArmVerbs, guards_in_force
 from heptarm.errors import CollisionDetected, HeptarmError, ModeConflict, NotReady, StaleState, Timeout
-from heptarm.values.arrays import Array, callback, instance, within
+from heptarm.values.checks import Array, callback, instance, within
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.result import Result

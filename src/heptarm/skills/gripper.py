@@ -8,7 +8,7 @@ from typing import Protocol
 
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, Timeout
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.io import SignalValues, find_signal
 from heptarm.values.sealed import Sealed
 

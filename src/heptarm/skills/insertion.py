@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import InsertionFailed, MotionAborted, Timeout
-from heptarm.values.arrays import Array, Value, instance, within
+from heptarm.values.checks import Array, Value, instance, within
 from heptarm.values.condition.contact import axis_of
 from heptarm.values.condition.force import force as force_signal
 from heptarm.values.frames import TOOL, check_name

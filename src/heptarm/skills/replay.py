@@ -12,7 +12,7 @@ import numpy as np
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.arm.watchdog import REPLAY
 from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
-from heptarm.values.arrays import Array, Value, callback, instance, within, word
+from heptarm.values.checks import Array, Value, callback, instance, within, word
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.ptp import ptp

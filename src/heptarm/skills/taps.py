@@ -6,7 +6,7 @@ from math import nan
 
 import numpy as np
 
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 
 
 class TapCounter:

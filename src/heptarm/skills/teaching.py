@@ -9,7 +9,7 @@ import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, StaleState
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.compliance import compliance

@@ -10,13 +10,16 @@ from heptarm.arm.verbs import ArmVerbs
 from heptarm.devices.device import DeviceInput, InputDevice
 from heptarm.errors import OutsideWorkspace, ShapeError
 from heptarm.skills.gripper import Gripper
-from heptarm.values.arrays import shown, within
+from heptarm.values.checks import shown, within
 from heptarm.values.frames import BASE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy.typing as npt
+
     from heptarm.arm.motion.servo import ServoStats
+    from heptarm.model.velocity import Elbow
     from heptarm.values.clearance import ClearanceModel
     from heptarm.values.pose import Pose
 
@@ -42,6 +45,8 @@ def teleoperate(
     rate: float = RATE,
     watchdog: float | None = None,
     keep_clear_of: ClearanceModel | None = None,
+    elbow: Elbow | None = None,
+    posture: npt.ArrayLike | None = None,
 ) -> ServoStats:
     """Let an input device move the arm until its quit button is pressed.
 
@@ -61,6 +66,8 @@ def teleoperate(
         rate: readings per second [Hz].
         watchdog: silence of this program after which the cabinet stops the arm [s]; None: that of `Arm.servo`.
         keep_clear_of: model of bodies to brake before; see `Arm.servo`.
+        elbow: what the redundant joint does, "keep" or "center"; see `Arm.servo`. None: "keep".
+        posture: joint positions that it follows instead, shape (7,) [rad].
 
     Returns:
         Statistics of the stream of velocities.
@@ -95,6 +102,8 @@ def teleoperate(
         speed_mps=_DIAGONAL * speed,
         speed_radps=_DIAGONAL * turn,
         keep_clear_of=keep_clear_of,
+        elbow=elbow,
+        posture=posture,
     ) as sv:
         while sv.tick() is not None and (limit is None or sv.t < limit):
             seen = device.read()

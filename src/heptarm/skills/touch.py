@@ -14,8 +14,8 @@ import numpy.typing as npt
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import HeptarmError, LimitError, MotionAborted, NoContact, Timeout
 from heptarm.skills.taps import TapWatch
-from heptarm.values.arrays import Array, integer, optional, within, word
-from heptarm.values.arrays import callback as check_callback
+from heptarm.values.checks import Array, integer, optional, within, word
+from heptarm.values.checks import callback as check_callback
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.contact import Contact, direction_of
 from heptarm.values.condition.force import force as force_signal

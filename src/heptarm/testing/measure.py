@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import HeptarmError
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion

@@ -71,7 +71,7 @@ class Report:
         return self._count(Verdict.FAILED) == 0 and self._count(Verdict.SHOWN) > 0
 
     def _count(self, verdict: Verdict) -> int:
-        return sum(one.verdict is verdict for one in self.outcomes)
+        return sum(outcome.verdict is verdict for outcome in self.outcomes)
 
     @property
     def summary(self) -> str:
@@ -84,12 +84,13 @@ class Report:
         return "\n".join([*self._lines(), self.summary])
 
     def _lines(self) -> Iterator[str]:
-        for one in self.outcomes:
-            yield f"{one.verdict.value:8}  {one.scenario.name:32} {one.seconds:6.2f} s  {one.scenario.title}"
-            if one.text:
-                yield f"{'':10}{one.text}"
-            if one.verdict is Verdict.FAILED:
-                yield from (f"{'':12}{measured}" for measured in one.measured)
+        for outcome in self.outcomes:
+            scenario = outcome.scenario
+            yield f"{outcome.verdict.value:8}  {scenario.name:32} {outcome.seconds:6.2f} s  {scenario.title}"
+            if outcome.text:
+                yield f"{'':10}{outcome.text}"
+            if outcome.verdict is Verdict.FAILED:
+                yield from (f"{'':12}{measured}" for measured in outcome.measured)
 
     def junit(self) -> str:
         """As JUnit XML, for CI systems."""
@@ -99,20 +100,20 @@ class Report:
             tests=str(len(self.outcomes)),
             failures=str(self._count(Verdict.FAILED)),
             skipped=str(self._count(Verdict.LEFT_OUT)),
-            time=f"{sum(one.seconds for one in self.outcomes):.3f}",
+            time=f"{sum(outcome.seconds for outcome in self.outcomes):.3f}",
         )
-        for one in self.outcomes:
+        for outcome in self.outcomes:
             case = ElementTree.SubElement(
                 suite,
                 "testcase",
-                classname=one.scenario.group,
-                name=one.scenario.name,
-                time=f"{one.seconds:.3f}",
+                classname=outcome.scenario.group,
+                name=outcome.scenario.name,
+                time=f"{outcome.seconds:.3f}",
             )
-            if one.verdict is Verdict.FAILED:
-                ElementTree.SubElement(case, "failure", message=one.text)
-            elif one.verdict is Verdict.LEFT_OUT:
-                ElementTree.SubElement(case, "skipped", message=one.text)
-            if one.measured:
-                ElementTree.SubElement(case, "system-out").text = "\n".join(one.measured)
+            if outcome.verdict is Verdict.FAILED:
+                ElementTree.SubElement(case, "failure", message=outcome.text)
+            elif outcome.verdict is Verdict.LEFT_OUT:
+                ElementTree.SubElement(case, "skipped", message=outcome.text)
+            if outcome.measured:
+                ElementTree.SubElement(case, "system-out").text = "\n".join(outcome.measured)
         return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True)

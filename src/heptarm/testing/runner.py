@@ -15,7 +15,7 @@ from heptarm.testing.measure import NotShown, Unfit, collect
 from heptarm.testing.report import Outcome, Report, Verdict
 from heptarm.testing.scenario import REGISTRY, Risk, Scenario
 from heptarm.testing.stage import HOME, REAL_SPEED, VIRTUAL_SPEED, has_operator
-from heptarm.values.arrays import instance
+from heptarm.values.checks import instance
 from heptarm.values.motion.ptp import ptp
 
 #: Modules of this package that define scenarios, in the order in which they run.

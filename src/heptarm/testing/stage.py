@@ -7,7 +7,7 @@ from urllib.parse import urlencode
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import Array, instance, within
+from heptarm.values.checks import Array, instance, within
 from heptarm.values.pose import deg
 from heptarm.values.robot import robot
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, array, instance, integer, shown, within, word
+from heptarm.values.checks import Array, array, instance, integer, shown, within, word
 from heptarm.values.pose import Pose
 
 #: Farthest place of a camera from its frame's origin along each axis, shortest distance to what it looks at [m].

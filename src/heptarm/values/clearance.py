@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, runtime_checkable
 
-from heptarm.values.arrays import Array, Value
+from heptarm.values.checks import Array, Value
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.values.tool import KnownTool, Workpiece

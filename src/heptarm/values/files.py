@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import instance, shown
+from heptarm.values.checks import instance, shown
 
 #: Largest text that is read [bytes].
 LARGEST_TEXT = 64 * 2**20

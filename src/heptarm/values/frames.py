@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 
 #: The tool frame: the attached tool's default frame (its TCP); without a tool the flange.
 TOOL = "tool"

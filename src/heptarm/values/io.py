@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Value, shown
+from heptarm.values.checks import Value, shown
 from heptarm.values.text import lines
 
 #: Value of a signal: boolean or number.
@@ -75,7 +75,7 @@ def find_signal(name: str, signals: Sequence[Signal]) -> Signal:
     Raises:
         CommandRejected: there is none of that name, or more than one.
     """
-    return signals[find_name(name, tuple(one.name for one in signals))]
+    return signals[find_name(name, tuple(signal.name for signal in signals))]
 
 
 def _plain(name: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, finite_entries, frozen, numbers, within
+from heptarm.values.checks import Array, Value, finite_entries, frozen, numbers, within
 from heptarm.values.files import path_of, read_bytes, unreadable
 from heptarm.values.pose import Pose
 from heptarm.values.shape import LARGEST, ORIGIN, Shape, box, check_near

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import (
+from heptarm.values.checks import (
     Array,
     Value,
     array,
@@ -344,6 +344,8 @@ class Pose(Value):
     def interpolate(self, other: Pose, fraction: float) -> Pose:
         """A pose between two: on the straight line, and on the shortest rotation at constant speed (slerp).
 
+        Half a turn goes as in a LIN: about the axis whose first component that is not 0 is positive in base axes.
+
         Args:
             other: the pose at 1.
             fraction: 0 is this pose; [0, 1].
@@ -353,9 +355,8 @@ class Pose(Value):
         """
         check_pose(other, "other")
         s = within(fraction, "fraction", 0.0, 1.0)
-        between = Pose((0.0, 0.0, 0.0), multiply(self.quat * np.array([-1.0, -1.0, -1.0, 1.0]), other.quat))  # type: ignore[arg-type]
-        part = Pose.from_rotvec((0.0, 0.0, 0.0), s * between.rotvec)
-        return Pose(self.xyz + s * (other.xyz - self.xyz), multiply(self.quat, part.quat))
+        part = Pose.from_rotvec((0.0, 0.0, 0.0), s * turn_between(self.quat, other.quat))
+        return Pose(self.xyz + s * (other.xyz - self.xyz), multiply(part.quat, self.quat))
 
     def __str__(self) -> str:
         """One line: millimetres and degrees, and the same in SI units."""
@@ -416,6 +417,46 @@ def multiply(p: Any, q: Any) -> Array:
             pw * qw - px * qx - py * qy - pz * qz,
         ]
     )
+
+
+#: Half a turn, whose direction is free: cosine of half the angle between two orientations, which are known to 1e-6 rad.
+_HALF_TURN = 1e-6
+
+
+def is_half_turn(start: Array, end: Array) -> bool:
+    """Whether one orientation is half a turn from another, so that two directions lead to it; quaternions."""
+    return abs(float(start @ end)) < _HALF_TURN
+
+
+def towards(start: Array, end: Array, *, is_other: bool = False) -> Array:
+    """The quaternion of an orientation, `end` or `-end`, to which a rotation from another goes by the smaller angle.
+
+    Half a turn goes about the axis whose first component that is not 0 is positive, in base axes: so its direction does
+    not depend on rounding.
+
+    Args:
+        start: quaternion x y z w.
+        end: quaternion x y z w.
+        is_other: half a turn goes in the other direction.
+    """
+    is_ahead = float(start @ end) >= 0.0
+    if is_half_turn(start, end):
+        axis = multiply(end, _conjugate(start))[:3]
+        is_ahead = (axis[int(np.argmax(np.abs(axis) > 1e-3))] >= 0.0) != is_other
+    return end if is_ahead else -end
+
+
+def turn_between(start: Array, end: Array, *, is_other: bool = False) -> Array:
+    """Rotation vector from one orientation to another in base axes, shape (3,) [rad]; see `towards`."""
+    difference = multiply(towards(start, end, is_other=is_other), _conjugate(start))
+    length = float(np.linalg.norm(difference[:3]))
+    if length < 1e-12:
+        return np.zeros(3)
+    return np.asarray(2.0 * math.atan2(length, float(difference[3])) / length * difference[:3])
+
+
+def _conjugate(quat: Array) -> Array:
+    return np.asarray(quat * (-1.0, -1.0, -1.0, 1.0))
 
 
 def rotation(quat: Any) -> Array:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import isnan, nan
 
-from heptarm.values.arrays import Value
+from heptarm.values.checks import Value
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.trigger import Notify, Trigger
 from heptarm.values.state import State

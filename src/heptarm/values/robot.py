@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, scalar, shown, within
+from heptarm.values.checks import Array, Value, array, frozen, one_or_each, scalar, shown, within
 from heptarm.values.pose import Pose, deg
 from heptarm.values.text import columns, fixed, lines
 
@@ -207,7 +207,7 @@ JERK = 100.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RobotModel:
+class RobotModel(Value):
     """A robot of the LBR family. Chain: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7).
 
     Attributes:
@@ -241,6 +241,10 @@ class RobotModel:
     dddq_max: Array
     tau_max: Array
     flange: Flange = _PLAIN
+
+    def __hash__(self) -> int:
+        """Of its name: results are cached by the model, and a name stands for its numbers."""
+        return hash(self.name)
 
     @property
     def base_name(self) -> str:

@@ -18,7 +18,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, instance, shown, within, word
+from heptarm.values.checks import Array, Value, array, frozen, instance, shown, within, word
 from heptarm.values.pose import Pose, check_pose
 
 ShapeKind: TypeAlias = Literal["box", "cylinder", "sphere", "capsule"]

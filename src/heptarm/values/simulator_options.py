@@ -10,6 +10,7 @@ from heptarm.values.robot import flange
 
 #: When a virtual cabinet asks for real-time priority: while an FRI client has to answer each tick, always, never.
 RealTime: TypeAlias = Literal["fri", "on", "off"]
+REAL_TIME: RealTime = "fri"
 
 
 def _about(
@@ -153,7 +154,7 @@ class SimulatorOptions:
         ),
     )
     real_time: str = field(
-        default="fri",
+        default=REAL_TIME,
         metadata=_about(
             'real-time priority: "fri": while an FRI session is open; "on": always, and Java compiled for the lowest '
             'latency; "off": never',

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 
 from heptarm.errors import StaleState
-from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.checks import Array, Value, frozen
 from heptarm.values.io import SignalValues
 from heptarm.values.mode.mode import HandGuiding, Mode
 from heptarm.values.pose import Pose, Redundancy

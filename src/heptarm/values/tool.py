@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, shown, within
+from heptarm.values.checks import Array, Value, array, frozen, shown, within
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, finite_entries, numbers, shown, word
+from heptarm.values.checks import Array, Value, finite_entries, numbers, shown, word
 from heptarm.values.frames import BASE, check_name
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.several import Arms
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recorder import Recorder, RecordSource, epoch_of
-from heptarm.values.arrays import flag, instance, within
+from heptarm.values.checks import flag, instance, within
 from heptarm.values.sealed import Sealed
 
 if TYPE_CHECKING:

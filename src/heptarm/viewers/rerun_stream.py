@@ -25,7 +25,7 @@ from heptarm.record.samples import StateSample, labels, signals_of, state_rows
 from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.shapes import drawn_shapes
 from heptarm.sim.plant.world import compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 TIMELINE = "time"
 #: Signals of states and of FRI cycles that are drawn over time.
@@ -78,17 +78,17 @@ class JointChain:
                 x, y, z, w = _xyzw(model.body_quat[body])
                 still = rerun.Transform3D(translation=model.body_pos[body], quaternion=(x, y, z, w))
                 recording.log(path, still, static=True)
-        for one in drawn_shapes(model):
+        for shape in drawn_shapes(model):
             turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, model.geom_quat[one.index])
-            vertices = one.vertices @ turn.reshape(3, 3).T + model.geom_pos[one.index]
+            mujoco.mju_quat2Mat(turn, model.geom_quat[shape.index])
+            vertices = shape.vertices @ turn.reshape(3, 3).T + model.geom_pos[shape.index]
             mesh = rerun.Mesh3D(
                 vertex_positions=vertices,
-                triangle_indices=one.faces,
-                vertex_normals=_normals(vertices, one.faces),
-                albedo_factor=(*one.colour, 255),
+                triangle_indices=shape.faces,
+                vertex_normals=_normals(vertices, shape.faces),
+                albedo_factor=(*shape.colour, 255),
             )
-            recording.log(f"{self._paths[one.body]}/shape_{one.index}", mesh, static=True)
+            recording.log(f"{self._paths[shape.body]}/shape_{shape.index}", mesh, static=True)
 
     def transforms(self, q: Array) -> list[tuple[str, Array, Array]]:
         """Path, translation [m] and quaternion x y z w of each joint's link in the one before.
@@ -159,7 +159,7 @@ class RerunStream:
         self, samples: Sequence[StateSample], *, to_ours: Callable[[int], int], signals: Sequence[str] = ()
     ) -> None:
         """Send pushed states: transforms, scalars, contact and trail."""
-        rows = state_rows([one.body for one in samples])
+        rows = state_rows([sample.body for sample in samples])
         times = sampling_times(rows["stamp"], to_ours) + self._epoch
         found = signals_of(rows)
         self._send_chain(times, found["q"])

@@ -129,7 +129,7 @@ def put_count(size: int) -> bytes:
 
 def setters(kind: type) -> tuple[Callable[[Any, Any], None], ...]:
     """What writes the slots of a frozen dataclass, in the order of its fields; for its constructor."""
-    return tuple(getattr(kind, one.name).__set__ for one in fields(kind))
+    return tuple(getattr(kind, field.name).__set__ for field in fields(kind))
 
 
 def end(data: bytes, pos: int, name: str) -> None:

@@ -638,7 +638,7 @@ class Cycle:
         mode = self.session.mode
         limited |= guard.was_limited
         sent_tau = self._torques(sample, tau or _ZEROS7) if mode is m.CommandMode.TORQUE else None
-        sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
+        sent_wrench = self._wrench(sample, wrench or _ZEROS6) if mode is m.CommandMode.WRENCH else None
         guard.was_limited |= limited
         self.record.sent = Sent(q, sent_tau or NAN7, sent_wrench or NAN6)
         return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
@@ -655,6 +655,19 @@ class Cycle:
         )
         guard.was_limited |= by_motion.was_limited
         return tuple(tau)
+
+    def _wrench(self, sample: Sample, target: Sequence[float]) -> tuple[float, ...]:
+        """Limit a target wrench; while the arm brakes, it brings it to rest."""
+        guard, by_motion = self.guard, self.torque_guard
+        wrench = by_motion.limit_wrench(
+            guard.force(target),
+            q=sample.q or NAN7,
+            dq=self.record.dq,
+            period=guard.period,
+            is_braking=bool(self.record.flags & at.BRAKING),
+        )
+        guard.was_limited |= by_motion.was_limited
+        return tuple(wrench)
 
     def _pose_setpoint(self, sample: Sample, now: int) -> Setpoint:
         """Make the setpoint of a session that commands poses."""

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from heptarm.fri.guard.joint_guard import AXES, ON_TRACK, PLANNED, JointReport, Limited, Limits
+from heptarm.fri.guard.joint_guard import AXES, JointReport, Limited, Limits
 
+#: Fraction of acceleration and jerk with which an approach is planned; the rest corrects deviations.
+PLANNED = 0.8
+#: A target is on track as long as its velocity changes by less than the largest jerk divided by this.
+ON_TRACK = 4.0
 #: Relative tolerance of the limits, for rounding; of a distance to a position limit [rad].
 ROUNDING, SLACK = 1e-9, 1e-12
 #: For so long the cabinet goes on without an answer [s], at least so many command periods.

@@ -8,17 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from heptarm.fri.guard.joint_guard import PLANNED
-from heptarm.fri.guard.pose_guard import (
-    LARGEST_COORDINATE,
-    SMALLEST_NORM,
-    PoseLimited,
-    PoseLimits,
-    PoseReport,
-)
+from heptarm.fri.guard.pose_guard import PoseLimited, PoseLimits, PoseReport
 
-from .joint_guard import ROUNDING
+from .joint_guard import PLANNED, ROUNDING
 
+#: Smallest norm of a quaternion that defines a rotation.
+SMALLEST_NORM = 1e-3
+#: Largest coordinate of a target [m].
+LARGEST_COORDINATE = 1e3
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 _Motion = tuple[Vector, Quaternion, tuple[Vector, Quaternion], Vector, Vector, float, float, float]

@@ -47,8 +47,8 @@ Positions = tuple[tuple[float, ...], tuple[float, ...]]
 
 def widest() -> Positions:
     """Position range that contains the ranges of all known robots, 7 lowest and 7 highest positions [rad]."""
-    low = [min(float(one.q_min[axis]) for one in ROBOTS.values()) for axis in range(m.JOINTS)]
-    high = [max(float(one.q_max[axis]) for one in ROBOTS.values()) for axis in range(m.JOINTS)]
+    low = [min(float(robot.q_min[axis]) for robot in ROBOTS.values()) for axis in range(m.JOINTS)]
+    high = [max(float(robot.q_max[axis]) for robot in ROBOTS.values()) for axis in range(m.JOINTS)]
     return tuple(low), tuple(high)
 
 
@@ -89,7 +89,7 @@ class Session:
         low, high = positions or widest()
         self.low, self.high = [value - OVERRUN for value in low], [value + OVERRUN for value in high]
         self.fastest = fastest or [
-            max(float(one.dq_max[i]) for one in ROBOTS.values()) for i in range(m.JOINTS)
+            max(float(robot.dq_max[i]) for robot in ROBOTS.values()) for i in range(m.JOINTS)
         ]
         self.counters = counters or Counters()
         self.latency = latency or Histogram()

@@ -29,8 +29,8 @@ class Commands:
 
     def destroy(self) -> None:
         """Destroy subscribers and services."""
-        for one in self._subscribers:
-            one.unregister()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
         for service in self._services:
             service.shutdown("the node was cleaned up")
 

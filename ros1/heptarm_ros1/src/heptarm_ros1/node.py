@@ -91,9 +91,9 @@ class HeptarmNode:
         with self._lock:
             if self.driver is not None or self._ending.is_set():
                 return "configured already"
-            self._given, unknown = parameters.read()
-            if unknown:
-                rospy.logwarn(f"unknown parameters: {', '.join(unknown)}")
+            self._given, warning = parameters.read()
+            if warning:
+                rospy.logwarn(warning)
             self.configuration = NodeConfiguration.of(self._given)
             self._states, self._presets = (
                 StatePublisher(self.configuration),
@@ -153,7 +153,7 @@ class HeptarmNode:
         """
         with self._lock:
             self._configured()
-            given, unknown = parameters.read()
+            given, warning = parameters.read()
             before = self._given
             if given == before:
                 return "nothing has changed"
@@ -169,8 +169,8 @@ class HeptarmNode:
             self._given, self.configuration = given, configuration
             self._configured().configure(configuration)
         text = f"new parameters: {', '.join(changed)}"
-        if unknown:
-            text += f"; unknown ones: {', '.join(unknown)}"
+        if warning:
+            text += f"; {warning}"
         rospy.loginfo(text)
         return text
 

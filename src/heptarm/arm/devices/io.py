@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.triggers import output_message
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import finite, shown, within, word
+from heptarm.values.checks import finite, shown, within, word
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.sealed import Sealed
 from heptarm.values.state import State
@@ -34,11 +34,11 @@ class Io(Sealed, Mapping[str, SignalValue]):
     @property
     def signals(self) -> dict[str, Signal]:
         """All signals of the cabinet's project by name."""
-        return {one.name: one for one in self._connection.signals}
+        return {signal.name: signal for signal in self._connection.signals}
 
     def __iter__(self) -> Iterator[str]:
         """Names of all signals."""
-        return iter([one.name for one in self._connection.signals])
+        return iter([signal.name for signal in self._connection.signals])
 
     def __len__(self) -> int:
         """Number of signals."""

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import array, finite, instance, integer, within, word
+from heptarm.values.checks import array, finite, instance, integer, within, word
 from heptarm.values.frames import check_name
 from heptarm.values.pose import Pose
 from heptarm.values.sealed import Sealed

@@ -8,8 +8,8 @@ from typing import Literal
 
 from heptarm.arm.link.connection import Connection
 from heptarm.errors import CommandRejected, ShapeError, Timeout
-from heptarm.values.arrays import callback as check_callback
-from heptarm.values.arrays import finite, flag, instance, integer, shown, within, word
+from heptarm.values.checks import callback as check_callback
+from heptarm.values.checks import finite, flag, instance, integer, shown, within, word
 from heptarm.values.frames import check_name
 from heptarm.values.sealed import Sealed
 from heptarm.wire import messages as wire

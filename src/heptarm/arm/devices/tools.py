@@ -14,7 +14,7 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError, Timeout
 from heptarm.model.kinematics import forward
-from heptarm.values.arrays import instance
+from heptarm.values.checks import instance
 from heptarm.values.clearance import CarriesTools
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
@@ -131,8 +131,8 @@ class Tooling:
     def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
         """Shapes of what is attached, each with its pose in the flange frame."""
         tool, held, at = self._carried()
-        own = () if tool is None else tuple((one, one.pose) for one in tool.shapes)
-        return own if held is None else own + tuple((one, at @ one.pose) for one in held.shapes)
+        own = () if tool is None else tuple((shape, shape.pose) for shape in tool.shapes)
+        return own if held is None else own + tuple((shape, at @ shape.pose) for shape in held.shapes)
 
     # ------------------------------------------------------------------------------- attaching
 
@@ -207,24 +207,24 @@ class Tooling:
 
     def attach_workpiece(self, workpiece: Workpiece | str, *, safety: bool) -> None:
         """Attach a workpiece, or that of a template; see `Arm.attach_workpiece`."""
-        one = _named(workpiece)
+        load = _as_workpiece(workpiece)
         instance(safety, bool, "safety")
         before = self.attached
         self._connection.request(
             wire.AttachLoad(
-                load=tool_message(one), attached=True, template=isinstance(workpiece, str), safety=safety
+                load=tool_message(load), attached=True, template=isinstance(workpiece, str), safety=safety
             )
         )
         self._workpiece = None if isinstance(workpiece, str) else workpiece
-        self._commanded = None if before is None else Attachment(before.tool, one.name, before.frame)
+        self._commanded = None if before is None else Attachment(before.tool, load.name, before.frame)
         if before is not None:
-            self._wait_until_shown(before.tool, one.name)
+            self._wait_until_shown(before.tool, load.name)
         self._warn_of_load()
 
     def detach_workpiece(self, workpiece: Workpiece | str) -> None:
         """Detach a workpiece; see `Arm.detach_workpiece`."""
         before = self.attached
-        self._connection.request(wire.AttachLoad(load=tool_message(_named(workpiece)), attached=False))
+        self._connection.request(wire.AttachLoad(load=tool_message(_as_workpiece(workpiece)), attached=False))
         self._workpiece = None
         self._commanded = None if before is None else Attachment(before.tool, "", before.frame)
         if before is not None:
@@ -361,7 +361,7 @@ class Tooling:
         return state.wrench.seen(lever, self.pose(state, axes).rotation)
 
 
-def _named(workpiece: Workpiece | str) -> Workpiece:
+def _as_workpiece(workpiece: Workpiece | str) -> Workpiece:
     """The workpiece itself; of a name one of that name, of which nothing else is known."""
     instance(workpiece, (Workpiece, str), "workpiece")
     return Workpiece(workpiece) if isinstance(workpiece, str) else workpiece

@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
 import numpy.typing as npt
 
 from heptarm.arm.fri.diagnosis import advice, early_end, end_text, no_report, summary
@@ -49,7 +50,7 @@ from heptarm.fri.protocol.messages import Quality, Safety, SessionState
 from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
 from heptarm.record.journal import FRI
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -60,6 +61,9 @@ from heptarm.wire import messages as wire
 _PATIENCE = 5.0
 #: Interval of the checks whether the session has ended, while no messages arrive [s].
 _CHECK_INTERVAL = 0.05
+#: Kinds of sessions whose commands wind the arm's spring; the longest time in which it unwinds at the end [s], what an
+#: axis moves in an interval at rest [rad], and torques and wrenches that are left then [Nm, N].
+_EFFORTS, _RELEASE, _STILL, _FADED = ("torque", "wrench"), 3.0, 1e-3, 1.0
 #: Events that are kept until `events` takes them.
 _MAX_EVENTS = 256
 
@@ -236,6 +240,9 @@ class Fri(Block):
         # taken now: the law runs once more when the overlay is off, and the guard limits that
         self._limited = client.limited
         try:
+            if self._start is not None and self._is_open and self.kind in _EFFORTS:
+                with contextlib.suppress(HeptarmError):  # the end of the session explains more
+                    self._release()
             if self._number and self._is_open:
                 with contextlib.suppress(CommandRejected):  # it has just ended by itself
                     self._connection.request(wire.FriClose(session=self._number))
@@ -246,6 +253,20 @@ class Fri(Block):
             self._take_events()
             client.close()
             self._connection.journal.end_session(client)
+
+    def _release(self) -> None:
+        """Let the guard unwind the spring that torques or a wrench have wound: at once it would throw the arm."""
+        client, clock = self.client, self._connection.clock
+        client.release()
+        deadline, before = clock.nanos() + round(_RELEASE * 1e9), client.state.q
+        while self._is_open and clock.nanos() < deadline:
+            clock.sleep(_CHECK_INTERVAL)
+            state = client.state
+            sent = state.tau_sent if self.kind == "torque" else state.wrench_sent
+            moves, acts = np.abs(state.q - before).max() > _STILL, np.abs(sent).max() > _FADED
+            if not (moves or acts):  # nor where this version of FRI sends no positions
+                return
+            before = state.q
 
     def _early_end(self, error: MotionAborted | None, hint: str) -> HeptarmError:
         """The error of a session that ended early."""

@@ -18,7 +18,7 @@ from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
 from heptarm.io.udp import UdpSocket
-from heptarm.values.arrays import instance, integer, scalar, shown, within, word
+from heptarm.values.checks import instance, integer, scalar, shown, within, word
 from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position

@@ -40,7 +40,7 @@ from heptarm.io.transport import Transport
 from heptarm.record.black_box import BlackBox, BlackBoxFile
 from heptarm.record.journal import ERROR, EVENT, Journal
 from heptarm.record.samples import SampleQueue, StateSample
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.io import Signal
 from heptarm.values.result import Result
 from heptarm.values.robot import FLANGES, Flange, RobotModel

@@ -9,15 +9,17 @@ from __future__ import annotations
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, nan
 from statistics import median
 
+from heptarm.arm.link.arrivals import Arrivals
+from heptarm.arm.link.heartbeat import Heartbeat
 from heptarm.errors import ConnectionLost, HeptarmError
 from heptarm.io.clock import Clock
 from heptarm.io.transport import DatagramSocket
-from heptarm.wire.clock_sync import ClockOffset, PingDeparture
+from heptarm.wire.clock_sync import PingDeparture
 from heptarm.wire.codec import DecodeError
 from heptarm.wire.datagrams import Datagrams
 from heptarm.wire.messages import Message, OneWay, Ping, Pong, State
@@ -32,6 +34,8 @@ _STREAMING = 500_000_000
 _REPEAT, _COPIES = 0.02, 25
 #: An older datagram of the cabinet is ignored [s of our clock].
 _OLDEST = 1.0
+#: Largest number of a target; they begin again at 0, which counts as newer than all.
+_NUMBERS = 0xFFFFFFFF
 #: Round trips that are kept.
 _ROUND_TRIPS = 256
 
@@ -73,10 +77,8 @@ class DatagramLine:
         socket: to the cabinet; closed with the line.
         codec: of the session.
         clock: this side's clock.
-        offset: estimate of the cabinet's clock.
-        on_pong: called with (sent, received by the cabinet, returned), as `ClockOffset.feed`; must not block.
-        on_state: called with (body, time of the frame, our clock at its receipt); must not block.
-        on_life: called with our clock when the cabinet was heard [ns].
+        arrivals: receives states and answers to pings.
+        heartbeat: notes when the cabinet was heard.
     """
 
     def __init__(
@@ -84,19 +86,15 @@ class DatagramLine:
         socket: DatagramSocket,
         codec: Datagrams,
         clock: Clock,
-        offset: ClockOffset,
         *,
-        on_pong: Callable[[int, int, int], None],
-        on_state: Callable[[bytes, int, int], None],
-        on_life: Callable[[int], None],
+        arrivals: Arrivals,
+        heartbeat: Heartbeat,
     ) -> None:
         self._socket = socket
         self._codec = codec
         self._clock = clock
-        self._offset = offset
-        self._on_pong = on_pong
-        self._on_state = on_state
-        self._on_life = on_life
+        self._offset = arrivals.offset
+        self._arrivals, self._heartbeat = arrivals, heartbeat
         self._answered: int | None = None
         self._last_target = clock.nanos() - _STREAMING
         self._targets = self._pings = self._answers = self._states = 0
@@ -113,18 +111,19 @@ class DatagramLine:
 
     # ------------------------------------------------------------------------------------ sending
 
-    def send_target(self, kind: type[OneWay], numbers: Iterable[float], *, number: int, now: int) -> None:
-        """Send a servo target.
+    def send_target(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> int:
+        """Send a servo target; returns its number in the session.
 
         Args:
             kind: its type.
             numbers: its fields in order.
-            number: of the target in the session.
             now: our clock [ns].
         """
         self._last_target = now
         self._targets += 1
+        number = self._targets & _NUMBERS
         self._socket.send(self.pack(kind, numbers, number=number, now=now))
+        return number
 
     def pack(self, kind: type[OneWay], numbers: Iterable[float], *, number: int, now: int) -> bytes:
         """Encode what `send_target` would send, without sending it."""
@@ -203,10 +202,10 @@ class DatagramLine:
         frame = self._codec.receive(data, now=offset.to_cabinet(now), limit=limit)
         if frame is None:
             return
-        self._on_life(now)
+        self._heartbeat.datagram = now
         if frame.type == State.TYPE:
             self._states += 1
-            self._on_state(frame.body, frame.time, now)
+            self._arrivals.state(frame.body, frame.time, now)
             return
         try:
             if frame.type == Ping.TYPE:
@@ -217,7 +216,7 @@ class DatagramLine:
                 self._answered = now
                 sent = self._departure.of(pong.sent)
                 self._round_trips.append(now - sent)
-                self._on_pong(sent, pong.received, now)
+                self._arrivals.pong(sent, pong.received, now)
         except DecodeError:
             self._codec.ignored.damaged += 1
 

@@ -1,20 +1,62 @@
 """One session with a cabinet over one transport: requests and answers, events, states, heartbeat.
 
-Whichever thread waits for an answer reads the socket itself, so that an answer wakes one thread, not two; so does a
-loop over states at a high rate. The link thread reads while nobody waits, and sends pings.
+Theory of operation
+-------------------
+
+**States.** A link is *opening* (Hello, the key's proof, Welcome, six pings that measure the cabinet's clock),
+then *open*, then *ended*. It ends once, by `_fail`: the first error is kept, the sockets close, everybody who
+waits is woken. All later calls raise that error (`_lost`: a new exception for each caller). Nothing
+reconnects here; `connection` does, with a new link.
+
+**Frames** are written and read by `heptarm.wire.session`, which counts them and knows no socket. In the usual
+case C does the same in one call (`heptarm.io.exchange`): a request, its answer and nothing in between; or one
+state. Whatever else comes, C leaves the bytes in `_left`, and the session reads them as if they had just
+arrived.
+
+**Who reads** (`read_turns`). There is one socket and there are many threads. The one that waits for an answer
+reads the socket itself, so that an answer wakes one thread, not two; so does a loop over fast states. The
+*link thread* reads while nobody waits. The thread that reads handles everything that has come, in order, so
+callbacks (`on_event`, `on_state`, `on_answer`) run in any of these threads; they must not block. `on_event`
+and `on_answer` may send requests: the thread that reads then reads on for its own answer (`is_read_here`).
+`on_state` may not, since it runs under the lock of `Arrivals`. Two threads may wait at once: one reads, and
+`PendingRequest.resolve` wakes the other.
+
+**Who sends.** Any thread, under `_sending`: numbers and tags of frames have to leave in order. A frame of
+which only a part has left ends the link, since nothing can follow it.
+
+**Locks.** A thread takes its turn to read first, and then `_sending` or the lock of `Arrivals`, never both. C
+tries the turn and `_sending`, and leaves the request to Python instead of waiting for one.
+
+**Heartbeat.** Pings leave four times per timeout, from the link thread, or from a loop over states between
+two of them. Their answers also measure the clock. The cabinet is lost after two timeouts of silence; time in
+which this process stood still does not count, since nobody could have listened (`heartbeat`).
+
+**Datagrams** (`datagrams`) carry targets, states and copies of stops beside TCP, with a thread of their own.
+States may come by both and overtake each other; `arrivals` drops the older one. TCP remains the proof of
+life, and carries a target as well whenever datagrams go unanswered.
+
+**Ctrl-C** may raise KeyboardInterrupt between any two instructions of the main thread. A request is shielded
+from it until its answer is there (`pending.InterruptShield`), or runs within one call of C; otherwise half a
+frame could be lost. Where an interrupt does cut a read or a write, the link ends instead of going on out of
+step.
+
+**Fork.** A forked process must not speak on the parent's socket: `abandon` gives its copy up without a
+message.
 """
 
 from __future__ import annotations
 
 import logging
-import signal
 import threading
-from _thread import allocate_lock, get_ident
+from _thread import get_ident
 from collections.abc import Callable, Iterable, Sequence
-from types import FrameType
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from heptarm.arm.link.arrivals import Arrivals
 from heptarm.arm.link.datagrams import DatagramLine, DatagramReport
+from heptarm.arm.link.heartbeat import Heartbeat
+from heptarm.arm.link.pending import InterruptShield, PendingRequest, PendingRequests
+from heptarm.arm.link.read_turns import ReadTurns, Turn
 from heptarm.arm.translate.errors import farewell, refusal, rejection
 from heptarm.arm.translate.text import printable_message
 from heptarm.errors import (
@@ -56,162 +98,15 @@ from heptarm.wire.messages import (
 from heptarm.wire.session import Received, Session, Side, StateReceived
 from heptarm.wire.states import SessionState
 
-try:  # the public functions wrap every number in an enumeration, which costs ten times as much
-    from _signal import getsignal  # type: ignore[import-not-found]
-    from _signal import signal as set_signal
-except ImportError:  # another Python than CPython
-    from signal import getsignal
-    from signal import signal as set_signal
-
-_SIGINT = int(signal.SIGINT)
-
-
 A = TypeVar("A", bound=Message)
-
-
-class InterruptShield:
-    """Defers Ctrl-C from its construction until `release`, which calls the program's own handler.
-
-    Python runs signal handlers in the main thread only, so in other threads it has no effect. Call `release` in a
-    `finally`.
-    """
-
-    __slots__ = ("_previous", "pending")
-
-    def __init__(self) -> None:
-        self.pending = False
-        self._previous: Callable[[int, FrameType | None], Any] | None = None
-        if get_ident() == threading.main_thread().ident:
-            previous = getsignal(_SIGINT)
-            if callable(previous):  # otherwise Ctrl-C raises no exception
-                self._previous = previous
-                set_signal(_SIGINT, self)
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Record the signal."""
-        self.pending = True
-
-    def release(self) -> None:
-        """Restore the program's own handler and call it if Ctrl-C came; raises what it raises."""
-        previous = self._previous
-        if previous is not None:
-            self._previous = None
-            set_signal(_SIGINT, previous)
-            if self.pending:
-                previous(_SIGINT, None)
-
-
-class PendingRequest:
-    """A request that waits for its answer; used once.
-
-    Args:
-        on_answer: called with the answer, by the thread that reads it.
-
-    Attributes:
-        answer: None until it arrives.
-    """
-
-    __slots__ = ("_lock", "_on_answer", "answer")
-
-    def __init__(self, on_answer: Callable[[Message], None] | None = None) -> None:
-        self.answer: Message | None = None
-        self._on_answer = on_answer
-        self._lock = allocate_lock()
-        self._lock.acquire()
-
-    def resolve(self, answer: Message) -> None:
-        """Deliver the answer."""
-        if self._on_answer is not None:
-            self._on_answer(answer)
-        self.answer = answer
-        self._lock.release()
-
-    def abandon(self) -> None:
-        """Wake the waiting thread without an answer."""
-        self._lock.release()
-
-    def wait(self, seconds: float) -> None:
-        """Wait for `resolve` or `abandon`."""
-        self._lock.acquire(timeout=max(0.0, seconds))
-
-
-#: Shortest silence after which a link counts as lost [s].
-_MIN_SILENCE = 1.0
-#: Longest silence of TCP while datagrams arrive [s]: it is slow on a bad network, but answers and events need it.
-_MAX_TCP_SILENCE = 10.0
-
-
-class Heartbeat:
-    """Ping interval towards the cabinet, and the check that the cabinet is still alive.
-
-    Attributes:
-        timeout: silence after which the cabinet ends the session [s].
-        watchdog: silence after which the cabinet counts a controller as lost [s]; infinite: not in control.
-        received: our clock when a frame last arrived over TCP [ns].
-        datagram: our clock when a datagram last arrived [ns].
-    """
-
-    __slots__ = ("_looked", "datagram", "received", "timeout", "watchdog")
-
-    def __init__(self, now: int) -> None:
-        self.timeout = 1.0
-        self.watchdog = float("inf")
-        self.received = self.datagram = self._looked = now
-
-    @property
-    def interval(self) -> int:
-        """Time between pings [ns]: a quarter of the shorter timeout, so that one late ping costs nothing."""
-        return round(min(self.timeout, self.watchdog) / 4 * 1e9)
-
-    def look(self, now: int) -> None:
-        """Note that the link is looked after now, as it is at least once per interval while this process runs.
-
-        If it was not for longer, this process or its machine stood still: then nobody could have heard anything, and
-        that time is no silence.
-        """
-        still = now - self._looked - self.interval
-        if still > 0:
-            self.received = min(now, self.received + still)
-            self.datagram = min(now, self.datagram + still)
-        self._looked = now
-
-    def check(self, now: int, peer: str) -> None:
-        """Check the silence so far.
-
-        Raises:
-            ConnectionLost: the cabinet has been silent for two timeouts, and for at least a second; or TCP has been
-                silent for much longer while datagrams arrive.
-        """
-        self.look(now)
-        allowed = max(2 * self.timeout, _MIN_SILENCE)
-        silence = (now - max(self.received, self.datagram)) * 1e-9
-        over_tcp = (now - self.received) * 1e-9
-        if silence <= allowed < over_tcp:
-            silence, allowed = over_tcp, max(allowed, _MAX_TCP_SILENCE)
-        if silence > allowed:
-            raise ConnectionLost(
-                f"nothing received from {peer} for {silence:.1f} s, allowed are {allowed:g} s",
-                code=int(Code.SILENT),
-                hint="check the network and the load of both machines",
-            )
-
 
 _log = logging.getLogger("heptarm.link")
 
 _BUFFER = 65536
 #: Marks an untouched receive buffer: random, so that no frame begins with it.
 _UNTOUCHED = bytes.fromhex("5a0f93c1d2e8471b")
-#: How long a caller waits for the link thread to finish the read that it is in [s].
-_TURN = 0.0002
-#: For this long after a request [ns] the link thread polls once per step [s] instead of waiting for bytes.
-_POLLING, _STEP = 30_000_000, 0.0005
-#: From this state rate on the link thread never polls, since states must be taken at once [Hz].
-_FAST_STATES = 250.0
-#: From this state rate on a loop over states reads the socket itself [Hz].
-_LOOPED_STATES = 100.0
-#: The link thread leaves the socket to such a loop while it reads and for at least this long after that [ns]. It looks
-#: after the loop a quarter of a period after a state: that has been taken then, and the next one is not due.
-_LOOPING = 5_000_000
+#: How long the link thread sleeps between two looks at a socket that it leaves to callers [s].
+_STEP = 0.0005
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
 #: The usual answer, and its type and body.
@@ -219,8 +114,6 @@ _ACCEPTED = Accepted(id=0)
 _PLAIN_ANSWER = (Accepted.TYPE, _ACCEPTED.encode())
 #: Requests that also go by datagram.
 _URGENT = (Stop, Cancel)
-#: Largest number of a target; they begin again at 0, which counts as newer than all.
-_NUMBERS = 0xFFFFFFFF
 
 
 class Link:
@@ -236,7 +129,6 @@ class Link:
         journal: where each request and its answer are noted.
 
     Attributes:
-        offset: estimate of the cabinet's clock.
         peer: address of the cabinet.
     """
 
@@ -251,30 +143,28 @@ class Link:
         on_lost: Callable[[HeptarmError], None],
         journal: Journal,
     ) -> None:
-        self.offset = ClockOffset()
         self.peer = transport.peer
         self._transport = transport
         self._clock = clock
         self._session = Session(Side.CLIENT, key=key)
         self._on_event = on_event
-        self._on_state = on_state
         self._on_lost = on_lost
         self._journal = journal
         self._view = memoryview(bytearray(_BUFFER))
-        self._sending = threading.Lock()
-        self._reading = threading.Lock()  # held by the one thread that reads the socket
-        self._caller_reads = False
-        self._reader = 0  # its thread identifier
-        self._pending: dict[int, PendingRequest] = {}
-        self._spare = [PendingRequest()]
         self._left: list[bytes] = []  # received, but not read yet
+        now = clock.nanos()
+        self._turns = ReadTurns(now)
+        self._heartbeat = Heartbeat(now)
+        self._arrivals = Arrivals(on_state)
+        self._requests = PendingRequests()
+        self._sending = threading.Lock()
         compiled = compiled_link(
             self._session,
             transport.fileno,
             left=self._left,
-            pending=self._pending,
-            spare=self._spare,
-            reading=self._reading,
+            pending=self._requests.by_id,
+            spare=self._requests.spare,
+            reading=self._turns.lock,
             sending=self._sending,
         )
         self._exchange = None if compiled is None else compiled[0]
@@ -282,18 +172,7 @@ class Link:
         self._welcome: Welcome | None = None
         self._error: HeptarmError | None = None
         self._closing = False
-        self._requested = clock.nanos()
-        self._heartbeat = Heartbeat(self._requested)
-        self._ping_due = self._requested
-        self._polling = _POLLING
-        self._may_loop = self._loop_reads = False
-        self._looping = _LOOPING
-        self._looped = self._requested - _LOOPING
         self._datagrams: DatagramLine | None = None
-        self._targets = 0
-        self._pushing = threading.Lock()  # states and pings arrive over TCP and by datagram
-        self._newest_state = -(1 << 63)
-        self._departure = PingDeparture()
         self._thread = threading.Thread(target=self._run, name="heptarm-link", daemon=True)
 
     # ------------------------------------------------------------------------------------ opening
@@ -354,10 +233,8 @@ class Link:
             socket,
             self._session.datagrams(self._welcome.session, answer.token),
             self._clock,
-            self.offset,
-            on_pong=self._on_pong,
-            on_state=self._take_state,
-            on_life=self._on_datagram,
+            arrivals=self._arrivals,
+            heartbeat=self._heartbeat,
         )
         self._datagrams.start()
         return ""
@@ -372,7 +249,7 @@ class Link:
         return self.request(GetDatagramStatistics(), DatagramStatistics, timeout=timeout)
 
     def _step(self, deadline: int, late: str) -> None:
-        with self._reading:
+        with self._turns.lock:
             self._read(wait=True)
         if self._error is not None:
             raise self._error
@@ -405,10 +282,14 @@ class Link:
         return self._error
 
     @property
+    def offset(self) -> ClockOffset:
+        """Estimate of the cabinet's clock."""
+        return self._arrivals.offset
+
+    @property
     def is_read_here(self) -> bool:
         """Whether the calling thread reads this link, so that it runs callbacks; nothing arrives while it waits."""
-        ident = get_ident()
-        return self._reader == ident or self._thread.ident == ident
+        return self._turns.is_here or self._thread.ident == get_ident()
 
     def expect_watchdog(self, seconds: float) -> None:
         """Ping often enough for a watchdog of this length at the cabinet [s]."""
@@ -416,11 +297,7 @@ class Link:
 
     def expect_states(self, rate: float) -> None:
         """Prepare for this many pushed states per second of our clock [Hz]."""
-        self._polling = _POLLING if rate <= _FAST_STATES else 0
-        self._may_loop = rate >= _LOOPED_STATES
-        if self._may_loop:
-            period = max(1, round(1e9 / rate))
-            self._looping = (_LOOPING + period - 1) // period * period + period // 4
+        self._turns.expect_states(rate)
 
     def request(
         self,
@@ -467,7 +344,7 @@ class Link:
             return None
         if self._datagrams is not None and kind in _URGENT:
             return None
-        now = self._requested = self._clock.nanos()
+        now = self._turns.requested = self._clock.nanos()
         try:
             received = exchange(kind, kind.TYPE, now, message.encode())
         except OSError as error:
@@ -479,7 +356,7 @@ class Link:
         if received is None:
             return None
         if isinstance(received, PendingRequest):
-            self._spare.append(PendingRequest())
+            self._requests.replenish()
             return self._answer(message, received, timeout, InterruptShield())
         self._heartbeat.received = now
         try:
@@ -490,8 +367,7 @@ class Link:
 
     def _ask(self, message: Message, timeout: float, on_answer: Callable[[Message], None] | None) -> Message:
         """Send a request and wait for its answer, in the cases that `_ask_at_once` leaves."""
-        if not self._spare:  # an interrupt came in the one moment in which it was missing
-            self._spare.append(PendingRequest())
+        self._requests.replenish()
         pending = PendingRequest(on_answer)
         line = self._datagrams if type(message) in _URGENT else None
         shield = InterruptShield()
@@ -515,19 +391,16 @@ class Link:
         Releases the shield as soon as this thread reads no more.
         """
         deadline = self._clock.nanos() + round(timeout * 1e9)
+        turns = self._turns
         try:
-            if self._reader == get_ident():  # called from a callback: this thread is the one that reads
+            if turns.is_here:  # called from a callback: this thread is the one that reads
                 self._read_until(pending, deadline, shield)
-            elif self._may_read():
+            elif turns.take():
                 try:
-                    self._caller_reads = True
-                    self._reader = get_ident()
+                    turns.begin()
                     self._read_until(pending, deadline, shield)
                 finally:
-                    self._requested = self._clock.nanos()
-                    self._caller_reads = False
-                    self._reader = 0
-                    self._reading.release()
+                    turns.end(self._clock.nanos())
         finally:
             shield.release()
         if pending.answer is None and self._error is None:
@@ -550,26 +423,23 @@ class Link:
             waits: whether it still waits.
             seconds: how long at most [s].
         """
-        if not self._may_loop or self._datagrams is not None or self.is_read_here:
+        turns = self._turns
+        if not turns.serves_loops or self._datagrams is not None or self.is_read_here:
             return
-        if not self._may_read():
+        if not turns.take():
             return
         clock = self._clock
         now = clock.nanos()
         deadline = now + round(seconds * 1e9)
         shield = InterruptShield()
         try:
-            self._caller_reads = self._loop_reads = True
-            self._reader = get_ident()
-            if now >= self._ping_due:  # between two states, where it delays none
+            turns.begin(is_loop=True)
+            if now >= self._heartbeat.due:  # between two states, where it delays none
                 self._ping(now)
             while waits() and self._error is None and not shield.pending and clock.nanos() < deadline:
                 self._read(wait=True)
         finally:
-            self._looped = clock.nanos()
-            self._caller_reads = self._loop_reads = False
-            self._reader = 0
-            self._reading.release()
+            turns.end(clock.nanos())
             shield.release()
 
     def send_target(self, kind: type[OneWay], numbers: Sequence[float], *, now: int, watchdog: float) -> None:
@@ -592,9 +462,7 @@ class Link:
             return
         if self._error is not None:
             raise self._lost()
-        self._targets += 1
-        number = self._targets & _NUMBERS
-        line.send_target(kind, numbers, number=number, now=now)
+        number = line.send_target(kind, numbers, now=now)
         if line.needs_copy(now, 0.5 * watchdog):
             with self._sending:
                 if self._error is not None:
@@ -613,7 +481,7 @@ class Link:
 
     def _ping(self, now: int) -> None:
         """The ping that is due."""
-        self._ping_due = now + self._heartbeat.interval
+        self._heartbeat.pinged(now)
         try:
             self.ping()
         except HeptarmError as error:
@@ -626,7 +494,7 @@ class Link:
                 raise self._lost()
             sent = self._clock.nanos()
             data = self._session.send(Ping(sent=sent), time=sent)
-            self._departure = PingDeparture(sent, self._clock.nanos())
+            self._arrivals.departure = PingDeparture(sent, self._clock.nanos())
             self._transmit(data)
 
     def _send(self, message: Message, pending: PendingRequest | None = None) -> int:
@@ -637,7 +505,7 @@ class Link:
             request = 0
             if pending is not None:
                 request = self._session.next_request()
-                self._pending[request] = pending
+                self._requests.by_id[request] = pending
             data = self._session.send(message, request=request, time=self._clock.nanos())
             self._transmit(data)
         return request
@@ -656,10 +524,6 @@ class Link:
 
     # ------------------------------------------------------------------------------------ reading
 
-    def _may_read(self) -> bool:
-        """Take the lock of the reading thread; the link thread may have to finish the read that it is in."""
-        return self._reading.acquire(blocking=False) or self._reading.acquire(timeout=_TURN)
-
     def _read_until(self, pending: PendingRequest, deadline: int, shield: InterruptShield) -> None:
         while pending.answer is None and self._error is None and not shield.pending:
             if self._clock.nanos() > deadline:
@@ -668,18 +532,16 @@ class Link:
 
     def _read_now(self) -> None:
         """Read what is there, unless another thread does."""
-        if self._caller_reads or not self._reading.acquire(blocking=False):
+        if not self._turns.take_now():
             return
         try:
-            self._reader = get_ident()
             self._read(wait=False)
             self._heartbeat.check(self._clock.nanos(), self.peer)
         finally:
-            self._reader = 0
-            self._reading.release()
+            self._turns.leave()
 
     def _read(self, *, wait: bool) -> None:
-        """Read and handle what has arrived; the caller holds `_reading`."""
+        """Read and handle what has arrived; the caller has its turn."""
         view, left = self._view, self._left
         try:
             if self._receive_state is not None and self._session.takes_states:  # most of what arrives
@@ -692,7 +554,7 @@ class Link:
                 if received:
                     time, body = received
                     self._heartbeat.received = now = self._clock.nanos()
-                    self._take_state(body, time, now)
+                    self._arrivals.state(body, time, now)
                     return
             view[:8] = _UNTOUCHED
             if left:
@@ -707,7 +569,7 @@ class Link:
             for event in session.events():
                 self._heartbeat.received = now  # only a whole frame is a sign of life
                 if type(event) is StateReceived:
-                    self._take_state(event.body, event.time, now)
+                    self._arrivals.state(event.body, event.time, now)
                 elif type(event) is Received:
                     self._dispatch(event, now)
         except HeptarmError as error:
@@ -721,13 +583,11 @@ class Link:
         message = printable_message(event.message)
         kind = message.KIND
         if kind == "answer":
-            pending = self._pending.pop(event.request, None)
-            if pending is not None:
-                pending.resolve(message)
+            self._requests.resolve(event.request, message)
         elif isinstance(message, Ping):
             self._send(Pong(sent=message.sent, received=now))
         elif isinstance(message, Pong):
-            self._on_pong(message.sent, message.received, now)
+            self._arrivals.pong(message.sent, message.received, now)
         elif isinstance(message, Goodbye):
             self._fail(farewell(message, self.peer))
         elif kind == "handshake":
@@ -735,51 +595,31 @@ class Link:
         else:
             self._on_event(message)
 
-    def _take_state(self, body: bytes, time: int, now: int) -> None:
-        """Pass a state on, unless a newer one came by another path: over TCP or by datagram."""
-        with self._pushing:
-            if time < self._newest_state:
-                return
-            self._newest_state = time
-            self._on_state(body, now)
-
-    def _on_pong(self, sent: int, received: int, now: int) -> None:
-        with self._pushing:
-            self.offset.feed(self._departure.of(sent), received, now)
-
-    def _on_datagram(self, now: int) -> None:
-        self._heartbeat.datagram = now
-
     def _run(self) -> None:
-        clock, transport = self._clock, self._transport
+        clock, transport, turns, heartbeat = self._clock, self._transport, self._turns, self._heartbeat
         while self._error is None:
             try:
                 now = clock.nanos()
-                self._heartbeat.look(now)
-                is_looped = self._loop_reads or now - self._looped < self._looping
-                if now >= self._ping_due + (self._looping if is_looped else 0):
+                heartbeat.look(now)
+                if now >= heartbeat.due + (turns.patience if turns.is_looped(now) else 0):
                     self._ping(now)
-                rest = max(0.0, (self._ping_due - now) * 1e-9)
-                if is_looped:
-                    # a loop over states reads, or is back within a moment
-                    left = self._looped + self._looping - now
-                    clock.sleep((left if left > 0 else self._looping) * 1e-9)
+                rest = max(0.0, (heartbeat.due - now) * 1e-9)
+                turn = turns.of(now)
+                if turn is Turn.LOOP:
+                    clock.sleep(turns.until_look(now))
                     # after a standstill of this process bytes wait to be read
                     if not transport.wait_readable(0.0):
-                        self._heartbeat.check(clock.nanos(), self.peer)
-                elif self._caller_reads:
-                    # a caller reads; most are done within a fraction of a millisecond
+                        heartbeat.check(clock.nanos(), self.peer)
+                elif turn is Turn.CALLER:
                     clock.sleep(_STEP)
-                    if self._caller_reads and self._reading.acquire(timeout=rest):
-                        self._reading.release()
-                elif now - self._requested < self._polling:
-                    # more requests may follow: an answer should wake only its caller
+                    turns.wait(rest)
+                elif turn is Turn.NOBODY:
                     clock.sleep(_STEP)
                     self._read_now()
                 elif self._left or transport.wait_readable(rest):
                     self._read_now()
                 else:
-                    self._heartbeat.check(now, self.peer)
+                    heartbeat.check(now, self.peer)
             except HeptarmError as error:
                 self._fail(error)
             except Exception as error:
@@ -817,9 +657,9 @@ class Link:
         The locks are made again, since a thread that exists only in the original process may hold them.
         """
         self._error, self._closing = error, True
-        self._sending, self._reading = threading.Lock(), threading.Lock()
-        self._caller_reads, self._loop_reads, self._reader = False, False, 0
-        self._pending.clear()
+        self._sending = threading.Lock()
+        self._turns.abandon()
+        self._requests.by_id.clear()
         if self._datagrams is not None:
             self._datagrams.abandon()
         self._transport.abandon()
@@ -831,10 +671,7 @@ class Link:
         self._transport.close()
         if self._datagrams is not None:
             self._datagrams.close()
-        for request in list(self._pending):
-            pending = self._pending.pop(request, None)
-            if pending is not None:
-                pending.abandon()
+        self._requests.abandon()
 
     def _lost(self) -> HeptarmError:
         """Make a new error for each caller: one exception raised in two threads mixes up their tracebacks."""

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, require
 from heptarm.io.clock import Clock
 from heptarm.record.samples import SampleQueue, StateSample, states_to_numpy, to_frame
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.sealed import Sealed
 from heptarm.values.state import GROUP_NAMES, State
 from heptarm.wire import messages as wire

@@ -8,7 +8,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from heptarm.errors import CommandRejected, ConnectFailed
 from heptarm.io.targets import SavedTarget, saved_target
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.robot import ROBOTS, Flange, flange
 from heptarm.values.simulator_options import check_target_option
 from heptarm.wire.messages import PORT

@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.errors import CollisionForeseen
 from heptarm.model.velocity import FREE, Slowdown
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.clearance import Clearance, ClearanceModel, TouchOnPath
 
 #: Largest movement of a joint between two checks on the way from one target to the next [rad].
@@ -81,9 +81,9 @@ class ClearTargets:
         """Distances of the pairs that are nearer than the margin and not allowed to touch [m]."""
         model = self._model
         return {
-            (one.first, one.second): one.distance
-            for one in model.clearances(q, below=model.margin)
-            if frozenset((one.first, one.second)) not in model.allowed
+            (clearance.first, clearance.second): clearance.distance
+            for clearance in model.clearances(q, below=model.margin)
+            if frozenset((clearance.first, clearance.second)) not in model.allowed
         }
 
     def _refusal(self, clearance: Clearance, at: float, q: Array, parameter: str) -> CollisionForeseen:

@@ -15,13 +15,13 @@ import numpy as np
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
-from heptarm.arm.motion.program import CheckedProgram, ProgramTerms, checked
+from heptarm.arm.motion.program_request import CheckedProgram, ProgramTerms, checked
 from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, ShapeError, Timeout, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
 from heptarm.planning.search import Goal, find_path
-from heptarm.values.arrays import Array, frozen, shown
+from heptarm.values.checks import Array, frozen, shown
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, PlanningWorld, TouchOnPath
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.motion import Motion

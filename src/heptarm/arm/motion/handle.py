@@ -35,8 +35,8 @@ from heptarm.errors import (
     Timeout,
     without_java,
 )
-from heptarm.values.arrays import callback as check_callback
-from heptarm.values.arrays import integer, scalar, within
+from heptarm.values.checks import callback as check_callback
+from heptarm.values.checks import integer, scalar, within
 from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
 from heptarm.values.condition.trigger import Trigger

@@ -33,7 +33,7 @@ from heptarm.model.velocity import (
     resolved_twist,
     wall_velocity,
 )
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
@@ -266,18 +266,18 @@ class JogServo(Servo):
             1.0, float(np.max(np.abs(dq)))
         )  # no joint looks farther ahead than so many radians
         then = {
-            (one.first, one.second): one.distance
-            for one in model.clearances(path.q + scale * dq, below=_NEAR)
+            (clearance.first, clearance.second): clearance.distance
+            for clearance in model.clearances(path.q + scale * dq, below=_NEAR)
         }
         least = None
-        for one in model.clearances(path.q, below=_NEAR):
-            if frozenset((one.first, one.second)) in model.allowed:
+        for clearance in model.clearances(path.q, below=_NEAR):
+            if frozenset((clearance.first, clearance.second)) in model.allowed:
                 continue
-            nearing = (one.distance - then.get((one.first, one.second), _NEAR)) / scale
-            left = np.array([one.distance - model.margin])
+            nearing = (clearance.distance - then.get((clearance.first, clearance.second), _NEAR)) / scale
+            left = np.array([clearance.distance - model.margin])
             factor = float(path.stopping_factor(dq, left, np.array([nearing]))[0])
             if factor < 1.0 and (least is None or factor < least.factor):
-                least = Slowdown(f"{one.first} near {one.second}", factor)
+                least = Slowdown(f"{clearance.first} near {clearance.second}", factor)
         return least
 
     def _wall(self, path: VelocityPath, dq: Array) -> Slowdown | None:

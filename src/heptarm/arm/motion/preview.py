@@ -13,7 +13,7 @@ import numpy as np
 from heptarm.errors import require
 from heptarm.io.plan_box import PlanOutline, hand_over
 from heptarm.record import plot as plots
-from heptarm.values.arrays import Array, Value, word
+from heptarm.values.checks import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision
 from heptarm.values.condition.condition import Condition
 from heptarm.values.pose import Pose
@@ -179,8 +179,9 @@ class ProgramPreview(Value):
 
     def _listed(self) -> list[str]:
         rows = [
-            f"{one.begin:7.2f} s  {one.name:<11} {one.duration:7.2f} s{'  blended' if one.is_blended else ''}"
-            for one in self.motions[:_LISTED]
+            f"{motion.begin:7.2f} s  {motion.name:<11} {motion.duration:7.2f} s"
+            + ("  blended" if motion.is_blended else "")
+            for motion in self.motions[:_LISTED]
         ]
         more = len(self.motions) - _LISTED
         return [*rows, f"... {more} more"] if more > 0 else rows
@@ -236,7 +237,7 @@ class ProgramPreview(Value):
 
     def outline(self) -> PlanOutline:
         """What a panel shows of it."""
-        touches = np.array([one.t for one in self.collisions], float)
+        touches = np.array([collision.t for collision in self.collisions], float)
         return PlanOutline(self.robot.name, self.t, self.q, self.tcp[:, :3], touches)
 
     def show(self) -> Path | None:

@@ -41,7 +41,7 @@ from heptarm.model.velocity import (
     blockage,
     resolved_pose,
 )
-from heptarm.values.arrays import Array, array, instance, shown, within, word
+from heptarm.values.checks import Array, array, instance, shown, within, word
 from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import TOOL, check_name

@@ -55,7 +55,7 @@ def frame_message(name: str) -> str:
 
 @cache
 def _names(kind: type) -> tuple[str, ...]:
-    return tuple(one.name for one in fields(kind))
+    return tuple(field.name for field in fields(kind))
 
 
 @cache
@@ -63,7 +63,9 @@ def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
     """All fields of a value at once, in order; None: not all of them may be given in order."""
     names = _names(kind)
     in_order = tuple(
-        one.name for one in signature(kind).parameters.values() if one.kind is one.POSITIONAL_OR_KEYWORD
+        parameter.name
+        for parameter in signature(kind).parameters.values()
+        if parameter.kind is parameter.POSITIONAL_OR_KEYWORD
     )
     is_in_order = in_order == names and len(names) > 1
     return attrgetter(*names) if is_in_order else None  # one of a single name returns no tuple
@@ -72,7 +74,7 @@ def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
 @cache
 def hints(kind: type) -> dict[str, str]:
     """The fields of a message and their types, as text."""
-    return {one.name: str(one.type) for one in fields(kind)}
+    return {field.name: str(field.type) for field in fields(kind)}
 
 
 @cache

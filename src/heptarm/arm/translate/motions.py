@@ -17,7 +17,7 @@ import numpy as np
 from heptarm.arm.translate.fields import NAMES, frame_message, hints, message_of
 from heptarm.errors import CommandRejected, inside
 from heptarm.model.inverse_kinematics import redundancy
-from heptarm.values.arrays import Array, shown, within
+from heptarm.values.checks import Array, shown, within
 from heptarm.values.frames import BASE
 from heptarm.values.motion.circle import Circ
 from heptarm.values.motion.dynamics import DynamicMotion, Dynamics

@@ -17,7 +17,7 @@ from heptarm.arm.translate.fields import value_of
 from heptarm.arm.translate.modes import read_mode
 from heptarm.errors import ConnectFailed, RemoteProtocolError
 from heptarm.values import state as values
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.io import Signal, SignalValues
 from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
 from heptarm.values.result import Cause, Result
@@ -27,7 +27,7 @@ from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.state_groups import StateGroups
 
 #: The bits of the safety state in the order of the fields of `values.Safety` behind its stamp and mode.
-_SAFETY = tuple(int(wire.SafetyBits[one.name.upper()]) for one in fields(values.Safety)[2:])
+_SAFETY = tuple(int(wire.SafetyBits[field.name.upper()]) for field in fields(values.Safety)[2:])
 _MODES = {one: values.OperationMode(one.name.lower()) for one in wire.OperationMode}
 
 
@@ -127,13 +127,15 @@ def read_state(
 def read_signals(infos: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
     """The cabinet's signals."""
     return tuple(
-        Signal(one.name, one.direction is wire.IoDirection.OUTPUT, one.type.name.lower(), one.low, one.high)
-        for one in infos
+        Signal(
+            info.name, info.direction is wire.IoDirection.OUTPUT, info.type.name.lower(), info.low, info.high
+        )
+        for info in infos
     )
 
 
 def _signals(message: wire.IoState, signals: Sequence[Signal]) -> SignalValues:
-    known = {one.index: one.value for one in message.values}
+    known = {value.index: value.value for value in message.values}
     named = {one.name: one.value(known[place]) for place, one in enumerate(signals) if place in known}
     return SignalValues(message.stamp, named)
 

@@ -64,8 +64,8 @@ def _has_text(kind: Any) -> bool:
     if kind not in _TEXTS:
         numbers = ("int", "float", "bool", "bytes", "int | None", "float | None")
         _TEXTS[kind] = tuple(
-            one.name
-            for one in fields(kind)
-            if str(one.type) not in numbers and not str(one.type).startswith(("tuple[float", "tuple[int"))
+            field.name
+            for field in fields(kind)
+            if str(field.type) not in numbers and not str(field.type).startswith(("tuple[float", "tuple[int"))
         )
     return bool(_TEXTS[kind])

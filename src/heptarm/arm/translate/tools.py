@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from heptarm.arm.translate.fields import message_of, value_of
-from heptarm.values.arrays import frozen
+from heptarm.values.checks import frozen
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape, ShapeKind
 from heptarm.values.tool import KnownTool, Tool, Workpiece
@@ -15,20 +15,20 @@ from heptarm.wire import messages as wire
 def tool_message(tool: Tool | Workpiece) -> wire.ToolInfo:
     """The message of a tool or a workpiece."""
     frames = tuple(wire.FrameInfo(name=name, pose=message_of(wire.Pose, pose)) for name, pose in tool.frames)
-    shapes = tuple(message_of(wire.Shape, one) for one in tool.shapes)
+    shapes = tuple(message_of(wire.Shape, shape) for shape in tool.shapes)
     return message_of(wire.ToolInfo, tool, frames=frames, shapes=shapes)
 
 
 def known_tool(message: wire.ToolInfo) -> KnownTool:
     """A tool or workpiece that the cabinet knows."""
-    frames = tuple((one.name, read_pose(one.pose)) for one in message.frames)
+    frames = tuple((frame.name, read_pose(frame.pose)) for frame in message.frames)
     return value_of(
         KnownTool,
         message,
         frames=frames,
         com=frozen(message.com),
         inertia=frozen(message.inertia),
-        shapes=tuple(_shape(one) for one in message.shapes),
+        shapes=tuple(_shape(shape) for shape in message.shapes),
     )
 
 

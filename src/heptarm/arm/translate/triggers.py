@@ -7,7 +7,7 @@ from math import isfinite
 
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, LimitError, inside
-from heptarm.values.arrays import scalar, shown, within
+from heptarm.values.checks import scalar, shown, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.signals import PathReached, SignalOutside
 from heptarm.values.condition.trigger import Action, SetOutput

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from heptarm.values.arrays import instance, within
+from heptarm.values.checks import instance, within
 
 #: Longest duration of a policy [s].
 LONGEST = 1e9

@@ -7,16 +7,10 @@ import math
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
-from heptarm.values.arrays import array, finite, instance, scalar, within
+from heptarm.values.checks import array, finite, instance, scalar, within
 from heptarm.values.robot import RobotModel
 
 AXES = 7
-#: Fraction of acceleration and jerk with which an approach is planned; the rest corrects deviations.
-PLANNED = 0.8
-#: A target is on track as long as its velocity changes by less than the largest jerk divided by this.
-ON_TRACK = 4.0
-#: Relative tolerance of the limits, for rounding.
-ROUNDING = 1e-9
 #: Unit of each limit, for errors.
 _LIMIT_UNITS = {
     "dq_max": "rad/s",

@@ -10,10 +10,6 @@ from heptarm.fri.guard.joint_guard import positive
 
 #: Parts of a pose that are limited separately, as the report names them.
 PARTS = ("flange", "rotation", "elbow")
-#: Smallest norm of a quaternion that defines a rotation.
-SMALLEST_NORM = 1e-3
-#: Largest coordinate of a target [m].
-LARGEST_COORDINATE = 1e3
 
 
 class PoseLimited(enum.IntEnum):

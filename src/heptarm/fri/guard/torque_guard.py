@@ -1,4 +1,4 @@
-"""Guard of superposed torques: no axis passes its speed or a position limit, whatever a law computes.
+"""Guard of superposed torques and wrenches: no axis passes its speed or a position limit, whatever a law computes.
 
 The algorithm is in native/torque_guard.h; this is its memory and its call.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm._library import library
 from heptarm.fri.guard.joint_guard import AXES, JointReport, Limited, Limits
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Members of `struct torque_guard` and their sizes, all doubles.
 MEMBERS: tuple[tuple[str, int], ...] = (
@@ -43,11 +43,20 @@ def _functions() -> ctypes.CDLL:
     pointer = ctypes.c_void_p
     made.fri_start_torque_guard.argtypes = (pointer,)
     made.fri_guard_torques.argtypes = (pointer, pointer, pointer, ctypes.c_double, ctypes.c_int, pointer)
+    made.fri_guard_wrench.argtypes = (
+        pointer,
+        pointer,
+        pointer,
+        ctypes.c_double,
+        ctypes.c_int,
+        pointer,
+        pointer,
+    )
     return made
 
 
 class TorqueGuard:
-    """Guard of the torques of one client.
+    """Guard of the torques, or of the wrench, of one client.
 
     Args:
         limits: the limits; positions, speeds and torques hold for the measured motion, and `ddq_max` is the planned
@@ -79,6 +88,7 @@ class TorqueGuard:
         for name in ("dq_max", "ddq_max", "tau_max"):
             parts[name][:] = getattr(limits, name)
         self._asked, self._allowed = parts["asked"], parts["allowed"]
+        self._most, self._wrench = np.array(limits.wrench_max, dtype=np.float64), np.zeros(6)
         # of a call: positions, velocities, torques
         self._call = np.zeros((3, AXES))
         self._at = [self._call[i].ctypes.data for i in range(3)]
@@ -115,10 +125,46 @@ class TorqueGuard:
         found = self._functions.fri_guard_torques(
             self.words.ctypes.data, q_at, dq_at, period, is_braking, tau_at
         )
+        self._note(found)
+        result: list[float] = call[2].tolist()
+        return result
+
+    def limit_wrench(
+        self,
+        wrench: Sequence[float],
+        *,
+        q: Sequence[float] | Array,
+        dq: Sequence[float] | Array,
+        period: float,
+        is_braking: bool = False,
+    ) -> list[float]:
+        """Limit a wrench on the flange by the motion to which it leads.
+
+        Args:
+            wrench: target wrench, base axes, finite, shape (6,) [N, Nm].
+            q: as of `limit`, as the other arguments.
+            dq: likewise.
+            period: likewise.
+            is_braking: likewise.
+
+        Returns:
+            Wrench to send [N, Nm]; zero if q or dq are not finite.
+        """
+        call = self._call
+        call[0], call[1], self._wrench[:] = q, dq, wrench
+        q_at, dq_at, _ = self._at
+        most, at = self._most.ctypes.data, self._wrench.ctypes.data
+        self._note(
+            self._functions.fri_guard_wrench(
+                self.words.ctypes.data, q_at, dq_at, period, is_braking, most, at
+            )
+        )
+        result: list[float] = self._wrench.tolist()
+        return result
+
+    def _note(self, found: int) -> None:
         self.was_limited = found != 0
         for kind, first in BITS.items() if found else ():
             for axis in range(AXES):
                 if found >> (first + axis) & 1:
                     self.report.add(kind, axis, float(self._asked[axis]), float(self._allowed[axis]))
-        result: list[float] = call[2].tolist()
-        return result

@@ -24,7 +24,7 @@ from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
-from heptarm.values.arrays import array, finite, instance, integer, within
+from heptarm.values.checks import array, finite, instance, integer, within
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -282,6 +282,10 @@ class Client(Sealed, Reader):
         super()._check()
         if not self._worker.is_alive():
             raise ConnectionLost(f"the FRI loop has ended: {self.trouble}")
+
+    def release(self) -> None:
+        """End all commands: the arm brakes, and torques and wrenches fade; the loop goes on answering."""
+        self._header[at.RELEASE] = 1
 
     def close(self, *, timeout: float = 5.0) -> None:
         """Brake the arm to a stop and end the loop. Closing twice is allowed."""

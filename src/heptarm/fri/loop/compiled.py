@@ -21,7 +21,7 @@ from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop import parameters
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.loop.wrench import external_wrench
-from heptarm.values.arrays import callback, instance, within
+from heptarm.values.checks import callback, instance, within
 from heptarm.values.robot import RobotModel, robot
 from heptarm.values.sealed import Sealed
 

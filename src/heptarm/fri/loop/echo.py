@@ -20,7 +20,7 @@ from heptarm.errors import ConnectFailed
 from heptarm.fri.loop.native import library
 from heptarm.fri.loop.process import request_realtime
 from heptarm.io.udp import UdpSocket
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 _HERE = "127.0.0.1"
 #: Longest wait for the next datagram, after which the echo ends [s].

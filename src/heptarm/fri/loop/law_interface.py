@@ -16,7 +16,7 @@ import numpy.typing as npt
 from heptarm.errors import ShapeError, UnknownSetting
 from heptarm.fri.loop.parameters import Param
 from heptarm.fri.protocol.messages import JOINTS
-from heptarm.values.arrays import finite_entries, numbers, shown
+from heptarm.values.checks import finite_entries, numbers, shown
 from heptarm.values.pose import Pose
 from heptarm.values.sealed import meant
 

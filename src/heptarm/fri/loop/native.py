@@ -111,9 +111,9 @@ _TYPES: dict[str, Any] = {"pointer": _POINTER, "word": _WORD, "real": ctypes.c_d
 
 def _structure(name: str, rows: Rows) -> type[ctypes.Structure]:
     members = [
-        (one, _TYPES[kind] if size == 1 else _TYPES[kind] * size)
+        (part, _TYPES[kind] if size == 1 else _TYPES[kind] * size)
         for kind, size, names in rows
-        for one in names.split()
+        for part in names.split()
     ]
     made = type(name, (ctypes.Structure,), {"_fields_": members})
     _TYPES[f"struct {name}"] = made

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from heptarm._library import library
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, flag, instance, numbers, other_unit, shown
+from heptarm.values.checks import Array, Value, flag, instance, numbers, other_unit, shown
 from heptarm.values.pose import Pose
 
 #: Whether a value of a parameter is allowed: why not, as text; empty: it is.

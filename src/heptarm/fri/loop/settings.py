@@ -18,7 +18,7 @@ from heptarm.fri.loop.law_interface import Floats, Given, Initial, flat
 from heptarm.fri.loop.parameters import Param, merged, rates
 from heptarm.fri.protocol.version import Version
 from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.values.arrays import callback, flag, instance, integer, within
+from heptarm.values.checks import callback, flag, instance, integer, within
 from heptarm.values.condition.collision import CollisionGuard
 from heptarm.values.robot import Body, RobotModel, robot
 

@@ -20,7 +20,7 @@ from heptarm.io.shared import MemoryBlock, Note, Ring
 from heptarm.values.condition.collision import Collision
 
 # words of the header
-STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, _, HISTORY, SIZE = range(12)
+STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, RELEASE, HISTORY, SIZE = range(12)
 # of the law: number of words of its memory, heads of the rings of its memory, calls that took longer than their budget
 MEMORY_SIZE, MEMORY, MEMORY_SET, OVERRUNS = range(12, 16)
 COUNTS = 16
@@ -167,9 +167,9 @@ class Writes:
         for name, (count, value) in list(outputs.items())[:MAX_IO]:
             is_analog = isinstance(value, float)
             bits = np.array([value], dtype=np.float64 if is_analog else np.uint64).view(np.int64)
-            rows += [np.array([count, is_analog]), bits, _named(name)]
+            rows += [np.array([count, is_analog]), bits, _name_words(name)]
         for name, pose in list(frames.items())[:MAX_TRANSFORMATIONS]:
-            rows += [_named(name), np.array(pose, dtype=np.float64).view(np.int64)]
+            rows += [_name_words(name), np.array(pose, dtype=np.float64).view(np.int64)]
         words = np.concatenate(rows).astype(np.int64)
         self._words[0] |= 1
         self._words[1 : 1 + len(words)] = words
@@ -180,7 +180,7 @@ def _name(words: npt.NDArray[np.int64]) -> str:
     return words[1:NAME_WORDS].tobytes()[: int(words[0])].decode()
 
 
-def _named(name: str) -> npt.NDArray[np.int64]:
+def _name_words(name: str) -> npt.NDArray[np.int64]:
     encoded = name.encode()
     return np.frombuffer(struct.pack("<q", len(encoded)) + encoded.ljust(NAME_BYTES, b"\0"), dtype=np.int64)
 

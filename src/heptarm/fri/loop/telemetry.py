@@ -12,8 +12,8 @@ from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.user_api import Signals, State, Stats
 from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.events import Event, Kind
-from heptarm.io.shared import Floats as Words
-from heptarm.values.arrays import instance, integer, within, word
+from heptarm.io.shared import Floats
+from heptarm.values.checks import instance, integer, within, word
 from heptarm.values.condition.collision import Collision
 from heptarm.values.io import SignalValue
 
@@ -49,7 +49,7 @@ class Reader:
         """Make another reader of the same loop, which counts the events and states that it has read by itself."""
         return Reader(self._layout)
 
-    def _newest(self) -> Words | None:
+    def _newest(self) -> Floats | None:
         """Words of the newest state, of whose session commands are from now on; None: there is none."""
         epoch = self._header[at.EPOCH]  # the loop writes it after a state of that session
         words = self._layout.states.newest()
@@ -96,7 +96,7 @@ class Reader:
         """Number of states so far."""
         return self._layout.states.count
 
-    def since(self, count: int) -> tuple[Words, int, int]:
+    def since(self, count: int) -> tuple[Floats, int, int]:
         """Get the words of all states from a count on, for those who process many at once; see shared_memory.
 
         Returns:

@@ -28,7 +28,7 @@ from heptarm.fri.protocol.messages import (
     SessionState,
 )
 from heptarm.fri.session.statistics import Counters, Histogram
-from heptarm.values.arrays import instance, numbers, scalar, shown
+from heptarm.values.checks import instance, numbers, scalar, shown
 from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.notebook import as_html
@@ -60,7 +60,7 @@ class Signals:
 
     def __init__(self, signals: Iterable[Signal] = ()) -> None:
         self._signals = tuple(signals)
-        self.names = tuple(one.name for one in self._signals)
+        self.names = tuple(signal.name for signal in self._signals)
 
     @classmethod
     def of(cls, offer: Iterable[tuple[str, int, int]]) -> Signals:

@@ -14,7 +14,7 @@ from heptarm.errors import CommandRejected, LimitError, MissingExtra, ShapeError
 from heptarm.rl.sim import simulation
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Numbers of arms.
 Index: TypeAlias = npt.NDArray[np.integer[Any]]

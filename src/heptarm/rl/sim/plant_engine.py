@@ -15,7 +15,7 @@ from heptarm.rl.sim.simulation import GRAVITY, IMPEDANCE_DAMPING
 from heptarm.rl.task import ReachTask
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 
 _SERVO = 1

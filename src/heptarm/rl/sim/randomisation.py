@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, integer, numbers, shown, within
+from heptarm.values.checks import Array, integer, numbers, shown, within
 
 #: Largest relative error of a velocity.
 _NOISIEST = 0.99

@@ -16,7 +16,7 @@ import numpy as np
 
 from heptarm.rl.task import ReachTask
 from heptarm.sim.plant.world import specification
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Steps of the engine in a decision. Of position-controlled arms under random actions, four deviate by 0.2 mm (root
 #: mean square) from 64, eight by 0.1 mm; both are equally near to the plant.

@@ -15,7 +15,7 @@ from heptarm.errors import require
 from heptarm.rl.sim import simulation
 from heptarm.rl.sim.batch import Index
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: Capacity for contacts and constraint rows of each arm: seven joint limits, and contacts.
 CONTACTS = 8

@@ -30,19 +30,19 @@ class PpoSettings:
         horizon: decisions of each between two updates.
         epochs: passes over the samples of an update.
         minibatches: parts that a pass is cut into.
-        rate: ceiling of the learning rate at the beginning.
-        rate_end: fraction of that ceiling at the end.
-        discount: of a reward one decision later.
-        trace: lambda of the advantage estimate.
-        clip: largest change of an action's likelihood that is rewarded.
+        learning_rate: ceiling of the learning rate at the beginning.
+        learning_rate_end: fraction of that ceiling at the end.
+        gamma: discount of a reward one decision later.
+        gae_lambda: lambda of the generalised advantage estimate (Schulman et al. 2016).
+        clip_range: largest change of an action's likelihood that is rewarded.
         kl: the learning rate falls above the second, rises below the first.
         spread: logarithm of the action's deviation at the beginning.
         spread_end: its ceiling at the end, to which it falls during the second half: a policy is no more precise
             than the noise it learned in, but without noise it finds nothing.
         hidden: widths of the hidden layers of both networks.
-        value: weight of the value's loss.
-        gradient: largest norm of the gradient.
-        entropy: weight of the entropy bonus.
+        value_coef: weight of the value's loss.
+        max_grad_norm: largest norm of the gradient.
+        entropy_coef: weight of the entropy bonus.
         action_cost: costs of an action's square, per decision; part of training, not of the task.
         reward_scale: factor on the rewards, for the value network's sake.
 
@@ -55,28 +55,37 @@ class PpoSettings:
     horizon: int = 16
     epochs: int = 5
     minibatches: int = 4
-    rate: float = 1e-3
-    rate_end: float = 0.1
-    discount: float = 0.95
-    trace: float = 0.95
-    clip: float = 0.2
+    learning_rate: float = 1e-3
+    learning_rate_end: float = 0.1
+    gamma: float = 0.95
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
     kl: tuple[float, float] = (0.004, 0.016)
     spread: float = -0.5
     spread_end: float = -2.3
     hidden: tuple[int, ...] = (64, 64)
-    value: float = 1.0
-    gradient: float = 1.0
-    entropy: float = 0.0
+    value_coef: float = 1.0
+    max_grad_norm: float = 1.0
+    entropy_coef: float = 0.0
     action_cost: float = 4e-3
     reward_scale: float = 5.0
 
     def __post_init__(self) -> None:
-        positive = ("envs", "horizon", "epochs", "minibatches", "rate", "clip", "value", "gradient")
+        positive = (
+            "envs",
+            "horizon",
+            "epochs",
+            "minibatches",
+            "learning_rate",
+            "clip_range",
+            "value_coef",
+            "max_grad_norm",
+        )
         for name in (*positive, "reward_scale"):
             self._want(name, getattr(self, name) > 0, "a positive number")
-        for name in ("discount", "trace", "rate_end"):
+        for name in ("gamma", "gae_lambda", "learning_rate_end"):
             self._want(name, 0 <= getattr(self, name) <= 1, "0 to 1")
-        for name in ("entropy", "action_cost"):
+        for name in ("entropy_coef", "action_cost"):
             self._want(name, getattr(self, name) >= 0, "no negative number")
         object.__setattr__(self, "hidden", tuple(self.hidden))
         object.__setattr__(self, "kl", tuple(self.kl))
@@ -207,10 +216,10 @@ def advantages(reward: Tensor, value: Tensor, after: Tensor, done: Tensor, setti
     Episodes end by their length only, so the value of the last observation continues: `after` holds it where an
     episode ended, and the value of the next decision elsewhere.
     """
-    surprise = reward + settings.discount * after - value
+    surprise = reward + settings.gamma * after - value
     result = torch.empty_like(surprise)
     running = torch.zeros_like(surprise[0])
-    fade = settings.discount * settings.trace * (1.0 - done)
+    fade = settings.gamma * settings.gae_lambda * (1.0 - done)
     for index in range(len(surprise) - 1, -1, -1):
         running = surprise[index] + fade[index] * running
         result[index] = running
@@ -242,9 +251,9 @@ class Learner:
         self._mean, self._threads = mean, threads
         self._acts = [*agent.policy.parameters(), agent.spread]
         self._values = list(agent.value.parameters())
-        self.rate = settings.rate
+        self.rate = settings.learning_rate
         self._trained = [*agent.policy.parameters(), *agent.value.parameters(), agent.spread]
-        self.optimiser = torch.optim.Adam(self._trained, lr=settings.rate, eps=1e-5, fused=True)
+        self.optimiser = torch.optim.Adam(self._trained, lr=settings.learning_rate, eps=1e-5, fused=True)
 
     def update(self, samples: Samples, shuffle: torch.Generator, progress: float) -> dict[str, float]:
         """One update.
@@ -258,7 +267,7 @@ class Learner:
             Mean "kl" and "loss" of the value, the learning "rate", the mean "spread" of the actions.
         """
         s, agent = self.settings, self.agent
-        ceiling = s.rate * (1.0 - (1.0 - s.rate_end) * min(1.0, progress))
+        ceiling = s.learning_rate * (1.0 - (1.0 - s.learning_rate_end) * min(1.0, progress))
         seen, action = samples.seen.flatten(0, 1), samples.action.flatten(0, 1)
         before, mean = samples.likelihood.flatten(), samples.mean.flatten(0, 1)
         gain = samples.advantage.flatten()
@@ -278,7 +287,7 @@ class Learner:
                     kl = self._policy_gradients(x, a, b, g, m, spread)
                     losses.append(loss_later())
                     self._average_gradients()
-                    nn.utils.clip_grad_norm_(self._trained, s.gradient)
+                    nn.utils.clip_grad_norm_(self._trained, s.max_grad_norm)
                     kls.append(float(self._shared(kl)))
                     if kls[-1] > s.kl[1]:
                         self.rate = max(self.rate / 1.5, 1e-5)
@@ -314,15 +323,15 @@ class Learner:
         s, agent = self.settings, self.agent
         now = agent.policy(seen)
         ratio = torch.exp(agent.likelihood(now, action) - before)
-        better = torch.minimum(gain * ratio, gain * ratio.clamp(1.0 - s.clip, 1.0 + s.clip))
-        _differentiate(-better.mean() - s.entropy * agent.spread.sum(), self._acts)
+        better = torch.minimum(gain * ratio, gain * ratio.clamp(1.0 - s.clip_range, 1.0 + s.clip_range))
+        _differentiate(-better.mean() - s.entropy_coef * agent.spread.sum(), self._acts)
         with torch.no_grad():
             return divergence(mean, spread, now, agent.spread)
 
     def _value_gradients(self, seen: Tensor, goal: Tensor) -> float:
         """Set the gradients of the value network; return its loss."""
         loss = ((self.agent.value(seen).squeeze(-1) - goal) ** 2).mean()
-        _differentiate(self.settings.value * loss, self._values)
+        _differentiate(self.settings.value_coef * loss, self._values)
         return float(loss.detach())
 
     def _shared(self, value: Tensor) -> Tensor:

@@ -12,6 +12,17 @@ from heptarm.rl.train import ppo
 
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
+#: Names of settings in checkpoints that were made before the settings had the names of the literature.
+_OLDER = {
+    "rate": "learning_rate",
+    "rate_end": "learning_rate_end",
+    "discount": "gamma",
+    "trace": "gae_lambda",
+    "clip": "clip_range",
+    "value": "value_coef",
+    "gradient": "max_grad_norm",
+    "entropy": "entropy_coef",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +66,13 @@ class Recipe:
 
     @classmethod
     def from_dict(cls, entries: dict[str, Any]) -> Recipe:
-        """Of `as_dict`."""
+        """Of `as_dict`, also of an older version."""
         given = dict(entries)
         given["task"] = ReachTask.from_dict(given["task"])
         given["randomisation"] = Randomisation(**{k: _tuple(v) for k, v in given["randomisation"].items()})
-        given["settings"] = ppo.PpoSettings(**{k: _tuple(v) for k, v in given["settings"].items()})
+        given["settings"] = ppo.PpoSettings(
+            **{_OLDER.get(k, k): _tuple(v) for k, v in given["settings"].items()}
+        )
         return cls(**given)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
 from heptarm.rl.policy import Policy
 from heptarm.rl.sim.batch import BatchReach, Engine
-from heptarm.values.arrays import flag
+from heptarm.values.checks import flag
 from heptarm.values.files import refuse_existing
 
 torch = require("torch", extra="rl")

@@ -36,7 +36,7 @@ from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.skills.replay import Replay
 from heptarm.skills.taps import TapWatch
 from heptarm.skills.teaching import trajectory_of
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.condition.contact import Contact, direction_of
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.compliance import compliance
@@ -105,7 +105,7 @@ def move_spline(context: NodeContext, goal: Any) -> GoalWork:
     how: dict[str, Any] = {
         name: getattr(goal, name) for name in ("speed_mps", "acceleration_mps2") if getattr(goal, name)
     }
-    segments = [motions.segment_of(one) for one in goal.segments]
+    segments = [motions.segment_of(segment) for segment in goal.segments]
     return _move(context, goal, spline(segments, moving=goal.moving or TOOL, **how))
 
 
@@ -401,8 +401,8 @@ def _trajectory(context: NodeContext, goal: Any) -> Trajectory:
         return context.taught[name]
     names = goal.trajectory.joint_names
     return Trajectory.of(
-        [context.ros.seconds(one.time_from_start) for one in points],
-        [motions.positions(context.driver, names, one.positions) for one in points],
+        [context.ros.seconds(point.time_from_start) for point in points],
+        [motions.positions(context.driver, names, point.positions) for point in points],
     )
 
 

@@ -132,8 +132,8 @@ def _condition(node: ast.expr) -> Condition:
 
 
 def _call(node: ast.Call) -> Any:
-    given = [_value(one) for one in node.args]
-    named = {one.arg: _value(one.value) for one in node.keywords if one.arg is not None}
+    given = [_value(arg) for arg in node.args]
+    named = {keyword.arg: _value(keyword.value) for keyword in node.keywords if keyword.arg is not None}
     if len(named) != len(node.keywords):
         raise ValueError("** is not allowed in a condition")
     called = node.func

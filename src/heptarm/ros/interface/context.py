@@ -6,8 +6,8 @@ import contextlib
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import NotReady, Timeout
-from heptarm.ros.interface.iiwa_settings import IiwaStackSettings
 from heptarm.ros.interface.messages import RosAdapter
+from heptarm.ros.interface.presets.iiwa_settings import IiwaStackSettings
 from heptarm.ros.node.driver import Driver
 from heptarm.skills.gripper import TwoSignalGripper
 from heptarm.values.mode.mode import Mode

@@ -140,7 +140,10 @@ def action_goal(ros: RosAdapter, message: Any, *, now: Callable[[], float]) -> T
 
 
 def _tolerances(messages: Sequence[Any]) -> tuple[Tolerance, ...]:
-    return tuple(Tolerance(one.name, one.position, one.velocity, one.acceleration) for one in messages)
+    return tuple(
+        Tolerance(message.name, message.position, message.velocity, message.acceleration)
+        for message in messages
+    )
 
 
 def feedback(ros: RosAdapter, value: GoalFeedback, names: Sequence[str], *, now: float) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.events import with_triggers
 from heptarm.ros.node.driver import Driver
-from heptarm.values.arrays import Array, finite_entries
+from heptarm.values.checks import Array, finite_entries
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.circle import circ
 from heptarm.values.motion.hand_guiding import hand_guide
@@ -219,7 +219,7 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
         return ptp(positions(driver, message.joint_names, message.position), **plain, **blending)
     moving = message.moving or TOOL
     if kind == SPLINE:
-        segments = [segment_of(one) for one in message.segments]
+        segments = [segment_of(segment) for segment in message.segments]
         return spline(segments, moving=moving, **_given(message, _PATH), **joints)
     near: dict[str, Any] = {"near": list(message.near)} if len(message.near) else {}
     if len(message.redundancy):

@@ -15,11 +15,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from heptarm.ros.interface import iiwa_stack
 from heptarm.ros.interface.action import RosAction
 from heptarm.ros.interface.actions import ACTIONS
-from heptarm.ros.interface.libiiwa import LibiiwaServer
 from heptarm.ros.interface.names import PRESETS, NameRole, PresetName
+from heptarm.ros.interface.presets import iiwa_stack
+from heptarm.ros.interface.presets.libiiwa import LibiiwaServer
 from heptarm.ros.interface.service import Service
 from heptarm.ros.interface.services import SERVICES
 from heptarm.ros.interface.topics import Topic, topics_of

@@ -10,9 +10,9 @@ import numpy as np
 
 from heptarm.model.kinematics import forward
 from heptarm.ros.interface import messages
-from heptarm.ros.interface.iiwa_messages import iiwa_state
 from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.interface.names import NameRole, PresetName
+from heptarm.ros.interface.presets.iiwa_messages import iiwa_state
 from heptarm.ros.node.diagnostics import Diagnosis
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.execution import speed_scaling

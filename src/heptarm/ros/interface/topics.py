@@ -25,7 +25,7 @@ from heptarm.ros.interface.motions import (
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.trajectory.send_times import PublishInfo
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
 
@@ -143,7 +143,7 @@ def servo_lin(context: NodeContext, message: Any) -> None:
 def servo_twist(context: NodeContext, message: Any) -> None:
     """Move with a geometry_msgs/TwistStamped, in axes of the base, the flange or the tool."""
     name = message.header.frame_id.lstrip("/")
-    frames = {context.driver.configuration.frame(one): one for one in _FRAMES}
+    frames = {context.driver.configuration.frame(frame): frame for frame in _FRAMES}
     if name and name not in frames:
         raise CommandRejected(
             f"frame_id must be one of {', '.join(frames)}, got {name!r}", parameter="frame_id", value=name

@@ -37,7 +37,7 @@ from heptarm.ros.trajectory.runner import GoalFeedback
 from heptarm.ros.trajectory.servo_execution import ServoExecution
 from heptarm.ros.trajectory.spline_execution import SplineExecution
 from heptarm.ros.trajectory.trajectory import TrajectorySample
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.condition.collision import Collision
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.reaction import Reaction
@@ -137,6 +137,7 @@ class Driver:
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
             elbow=values["servo.elbow"],
+            posture=configuration.posture,
         )
         self._destinations = DestinationKeeper(
             self._stream,

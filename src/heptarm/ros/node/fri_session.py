@@ -9,7 +9,7 @@ from typing import Any, Literal
 from heptarm.arm.arm import Arm
 from heptarm.arm.fri.session import Fri
 from heptarm.errors import HeptarmError, ModeConflict, NotReady
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 
 _log = logging.getLogger("heptarm.ros")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from heptarm.ros.trajectory.runner import ExecutionSettings
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.ros.trajectory.tolerances import StateTolerances, TrajectoryTolerances
 from heptarm.skills.gripper import PATIENCE, SETTLE
-from heptarm.values.arrays import frozen, within
+from heptarm.values.checks import Array, frozen, within
+from heptarm.values.sealed import meant
 
 Plain = str | bool | int | float | list[str]
 
@@ -174,6 +176,12 @@ PARAMETERS = (
         "what the elbow does in servo/twist and servo/pose: keep its angle, or keep the joints away from their limits",
         choices=("keep", "center"),
     ),
+    Parameter(
+        "servo.posture",
+        "",
+        "joint positions that the elbow follows in servo/twist and servo/pose instead of servo.elbow, seven numbers "
+        'with blanks between them [rad]; "": none',
+    ),
     Parameter("servo.linger", 0.5, "how long the servo motion stays open after a goal [s]", 0.0, 60.0),
     Parameter(
         "servo.lookahead", 0.004, "delay from a target to its motion, which is compensated [s]", 0.0, 0.5
@@ -261,6 +269,14 @@ def joint_parameters(joints: Sequence[str]) -> Iterator[Parameter]:
         yield _live(f"constraints.{joint}.goal", 0.01, "goal tolerance [rad]; 0: not enforced", 0.0, 10.0)
 
 
+def unknown_text(unknown: Sequence[str], known: Iterable[str]) -> str:
+    """A warning that names parameters which no node has, with what they may have been meant to be."""
+    names = list(known)
+    return "unknown parameters: " + "; ".join(
+        f"{name}: {question}" if (question := meant(name, names)) else name for name in unknown
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class NodeConfiguration:
     """Checked values of all parameters.
@@ -291,9 +307,31 @@ class NodeConfiguration:
         table.update({parameter.name: parameter for parameter in joint_parameters(names)})
         for name in values:
             if name not in table:
-                raise CommandRejected(f"unknown parameter {name!r}", parameter=name)
+                raise CommandRejected(f"unknown parameter {name!r}", parameter=name, hint=meant(name, table))
         known = {name: one.check(values.get(name, one.default)) for name, one in table.items()}
-        return NodeConfiguration(known, tuple(f"{known['prefix']}{name}" for name in names))
+        made = NodeConfiguration(known, tuple(f"{known['prefix']}{name}" for name in names))
+        _ = made.posture  # refused here, not with the first target
+        return made
+
+    @property
+    def posture(self) -> Array | None:
+        """What the elbow follows in servo topics, shape (7,) [rad]; None: `servo.elbow` says it.
+
+        Raises:
+            ShapeError: not seven numbers.
+        """
+        text: str = self.values["servo.posture"]
+        try:
+            numbers = [float(word) for word in text.split()]
+        except ValueError:
+            numbers = [nan]
+        if numbers and (len(numbers) != 7 or not all(map(isfinite, numbers))):
+            raise ShapeError(
+                f'servo.posture must be "" or seven numbers with blanks between them [rad], got {text!r}',
+                parameter="servo.posture",
+                value=text,
+            )
+        return frozen(np.array(numbers)) if numbers else None
 
     def frame(self, which: str) -> str:
         """Look up the name of a frame with prefix: "base", "flange" or "tool"."""

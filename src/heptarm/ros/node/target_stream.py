@@ -17,7 +17,7 @@ from heptarm.io.clock import RealClock
 from heptarm.model.kinematics import forward
 from heptarm.model.velocity import MARGIN, Elbow, ElbowTask, VelocityPath, limited_twist, resolved_twist
 from heptarm.ros.trajectory.servo_execution import ServoOptions
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import TOOL
 from heptarm.values.pose import Pose
@@ -59,6 +59,10 @@ class TargetStream:
         line_speed: along each axis of the base on straight lines, and of twists [m/s].
         turn_speed: of twists [rad/s].
         elbow: of twists and poses, see `Arm.servo`.
+        posture: instead of `elbow`, shape (7,) [rad]; see `Arm.servo`.
+
+    Raises:
+        LimitError: the posture is outside the limits of the joints.
     """
 
     def __init__(
@@ -70,11 +74,15 @@ class TargetStream:
         line_speed: float = 0.25,
         turn_speed: float = 0.5,
         elbow: Elbow = "keep",
+        posture: Array | None = None,
     ) -> None:
+        if posture is not None:
+            arm.robot.check(posture, "posture")
         self._arm = arm
         self._timeout = timeout
         self._options = options
         self._line_speed, self._turn_speed, self._elbow = line_speed, turn_speed, elbow
+        self._posture = posture
         self._clock = RealClock()
         self._lock = threading.RLock()
         self._servo: JointServo | PoseServo | None = None
@@ -150,7 +158,7 @@ class TargetStream:
                 turn, point = tool[:3, :3], tool[:3, 3]
             axes = np.concatenate([turn @ wanted[:3], turn @ wanted[3:]])
             if self._task is None:
-                self._task = ElbowTask(robot, path.q, elbow=self._elbow)
+                self._task = ElbowTask(robot, path.q, elbow=self._elbow, posture=self._posture)
             return resolved_twist(robot, path, axes, point, elbow=self._task)[0]
 
         self._move(command)
@@ -267,7 +275,7 @@ class TargetStream:
             "mode": options.mode,
         }
         if kind == "pose":
-            settings["elbow"] = self._elbow
+            settings |= {"elbow": self._elbow} if self._posture is None else {"posture": self._posture}
         if kind != "lin":
             one = options if limits is None else limits
             return settings | {"engine": "smart", "speed": one.speed, "acceleration": one.acceleration}

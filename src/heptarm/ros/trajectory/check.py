@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalRefused, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Largest velocity that counts as rest [rad/s]: the last digit of a float32. Integrated ones add up rounding errors.

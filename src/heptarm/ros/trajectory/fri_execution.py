@@ -23,7 +23,7 @@ from heptarm.ros.trajectory.execution import GoalListener
 from heptarm.ros.trajectory.runner import ControlStep, ExecutionSettings
 from heptarm.ros.trajectory.streamed_execution import CommandStream, StreamedExecution
 from heptarm.ros.trajectory.trajectory import Preview
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 
 _log = logging.getLogger("heptarm.ros")
 

@@ -17,7 +17,7 @@ import numpy as np
 from heptarm.errors import LimitError
 from heptarm.ros.trajectory.check import GoalRules, check_between_points, check_goal, check_points
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalResult, TrajectoryGoal
-from heptarm.ros.trajectory.stream import PointStream, is_streamed
+from heptarm.ros.trajectory.point_stream import PointStream, is_streamed
 from heptarm.ros.trajectory.tolerances import StateTolerances, ToleranceMonitor, TrajectoryTolerances
 from heptarm.ros.trajectory.trajectory import (
     BrakingTrajectory,
@@ -27,7 +27,7 @@ from heptarm.ros.trajectory.trajectory import (
     PreviewSegment,
     TrajectorySample,
 )
-from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.checks import Array, Value, frozen
 from heptarm.values.robot import RobotModel
 
 #: Largest acceleration to join a stream and to settle after it, a fraction of each axis' maximum.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 #: How long arrivals count [s]: for the period of the stream, and for its time.
 _HISTORY, _MEMORY = 1.0, 0.5

@@ -14,7 +14,7 @@ from heptarm.io.clock import Clock
 from heptarm.ros.trajectory.execution import GoalListener
 from heptarm.ros.trajectory.runner import ControlStep, ExecutionSettings
 from heptarm.ros.trajectory.streamed_execution import CommandStream, StreamedExecution
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.mode.mode import Mode
 
 

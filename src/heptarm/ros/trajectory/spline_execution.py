@@ -25,7 +25,7 @@ from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalRefused, Goa
 from heptarm.ros.trajectory.runner import ExecutionSettings, GoalFeedback
 from heptarm.ros.trajectory.tolerances import ToleranceMonitor
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState, TrajectorySample
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.spline import JointSpline, spline_joints
 from heptarm.values.result import Cause

@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
-from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.checks import Array, Value, frozen
 
 #: In a goal's tolerance: do not enforce this one.
 ERASED = -1.0

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.checks import Array, Value, frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from heptarm.planning.table import MotionTable, SetPointRows
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 class SetPointsAhead:

@@ -15,7 +15,7 @@ from heptarm.planning.jerk_profile import TimeLaw
 from heptarm.planning.motion import ServoMotion
 from heptarm.planning.plan import Plan
 from heptarm.sim.controller.command import ConditionWatch
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
+from heptarm.sim.control_laws.hand_guiding_law import HandGuidingLaw
 from heptarm.sim.controller.servo import ServoLimits, SmartFollower
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Jerk of braking relative to that of a motion.

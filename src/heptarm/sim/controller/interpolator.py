@@ -1,11 +1,55 @@
-"""The interpolator of the simulated controller: from commands to one set-point per tick."""
+"""The interpolator of the simulated controller: from commands to one set-point per tick.
+
+Theory of operation
+-------------------
+The plant's thread calls `Interpolator.advance` once per tick of 1 ms. A tick takes requests, advances the speed
+override, evaluates conditions, begins the next command when none runs, and asks the running command for the set-point
+after this tick. Everything else happens in the phase of that command, `RunningMotion.phase`:
+
+    begin ──┬─> timed ──────────────────────────────┬─> settling ──> closed
+            ├─> holding <──> (first overlay)         │       ^
+            │      └──────> overlaid ──────┐         │       │
+            ├─> guided ────────────────────┼─> braking ──────┘
+            └─> servoing <──> stopped ─────┘
+
+timed      moves along the path of its plan. The path's own time passes as the speed override says; where axes cannot
+           follow a change of it, only a part of the change is made (`_step`).
+holding    has no path: a hold waits until its time is over, anything else without a path has nothing to do.
+overlaid   a hold whose set-points an FRI client gives. It has no way back: once the client is silent, the axes brake.
+guided     a hand moves the arm while the enabling switch is held.
+servoing   follows targets with a `Follower`, on the time of the speed override as a timed motion does.
+stopped    a safety stop brakes each axis of a servo motion by itself, since its axes have no path in common. When the
+           stop ends, the motion starts again from rest. (A straight servo motion has a path: it stays servoing, and the
+           override brings it to rest on its line.)
+braking    comes to rest at full motion time, whatever the override is: on the path by a shorter profile, along the
+           present direction off it (`RunningMotion.halt`), or by a follower. There is no way back to a motion.
+settling   the set-points have ended; it is closed when the measured joints have arrived, or rest.
+
+Why the command is over is no phase. `failure`, `cancelled` and `broken` say it from the moment when it is decided; the
+phase says where the set-points come from, until the arm is at rest. A cancelled command usually brakes in the same
+tick, but not while a safety stop brakes it already: it stays in its phase, and settles when the override rests, or
+brakes when the stop ends before that. A failure inside a tick brakes in this same tick (`_break_off`), since one tick
+of rest would be a jump.
+
+Limits. A plan keeps the axes' limits at full speed, and so does each follower in the motion's own time. What is added
+here is the change of the override, and `_step` is the one place that checks it, for paths and for followers. `_set` is
+the last line of defence: a set-point that an axis could not follow ends the motion by an error.
+
+Foreseen ticks. Where the table of a timed motion alone decides about the next set-points (`is_foreseen`), the plant
+computes them in C and does not call `advance` until something happens (`is_disturbed`); `catch_up` then takes over
+what those ticks have passed. Only phase timed is foreseen, which is why the set of conditions is short.
+
+Threads. `advance`, `trip`, `command` and `catch_up` belong to the thread of the ticks. Any thread may submit or cancel
+(`MotionQueue`), `change_mode`, `abort`, and set `is_paused`; those requests wait in queues until the next tick, so that
+a phase changes inside a tick only. Listeners are called from the thread of the ticks and must not wait.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import inf, nan
-from typing import Protocol
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
@@ -16,8 +60,8 @@ from heptarm.planning.path import JointLine, JointPath
 from heptarm.planning.plan import Plan
 from heptarm.planning.seam import HandGuide, Hold, OperationMode
 from heptarm.planning.table import MotionTable
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState, Superposition
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState, Superposition
 from heptarm.sim.controller.ahead import SetPointsAhead
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstimate, WatchedCondition
@@ -35,9 +79,14 @@ from heptarm.sim.controller.servo import (
 )
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import RobotModel
+
+#: Where the set-points of a command come from; see the theory of operation above.
+Phase: TypeAlias = Literal[
+    "timed", "holding", "overlaid", "guided", "servoing", "stopped", "braking", "settling"
+]
 
 
 class RunningMotion:
@@ -48,19 +97,30 @@ class RunningMotion:
         planned: its plan.
         serial: its number among all accepted commands.
         watches: its conditions.
+
+    Attributes:
+        phase: where its set-points come from.
+        has_braked: it has come, or comes, to rest before the end of its plan.
+        cancelled: somebody has ended it, or a condition.
+        broken: a condition has.
+        failure: text of the error that has; "" none.
+        path: phases timed and braking; None: there is none, or a follower brakes.
+        follower: phases servoing, stopped and braking.
+        stop: phase stopped.
+        guided: phase guided.
     """
 
     __slots__ = (
-        "braking",
         "broken",
         "cancelled",
         "command",
-        "ended",
         "failure",
         "follower",
         "guided",
+        "has_braked",
         "part",
         "path",
+        "phase",
         "place",
         "plan",
         "profile",
@@ -89,9 +149,9 @@ class RunningMotion:
         self.failure = ""
         self.part = 0
         self.time = 0.0
-        self.braking = False
+        self.phase: Phase = "holding" if self.path is None or self.profile is None else "timed"
+        self.has_braked = False
         self.cancelled = False
-        self.ended = False
         self.settling = 0
         self.still = 0
         self.started = False
@@ -100,6 +160,23 @@ class RunningMotion:
         self.guided: GuidedMotion | None = None
         self.broken = False
 
+    def serve(self, follower: Follower) -> None:
+        """Follow targets."""
+        self.follower, self.phase = follower, "servoing"
+
+    def guide(self, guided: GuidedMotion) -> None:
+        """Follow a hand."""
+        self.guided, self.phase = guided, "guided"
+
+    def settle(self) -> None:
+        """The set-points have ended."""
+        self.phase = "settling"
+
+    def give_up(self) -> None:
+        """The set-points have ended where the arm is, with closed brakes."""
+        self.path = self.follower = self.stop = self.guided = None
+        self.phase, self.has_braked = "settling", True
+
     def brake(self, *, scale: float, rate: float) -> None:
         """Come to rest on the path, as fast as its limits allow.
 
@@ -107,32 +184,37 @@ class RunningMotion:
             scale: speed as a fraction of full speed; the stop itself runs at full speed.
             rate: change of that fraction [1/s].
         """
+        if self.phase == "settling":
+            return
         if self.follower is not None:
             self.follower.brake(scale=scale, rate=rate)
-            self.braking = True
+        elif self.phase == "holding":
+            self.settle()
             return
-        if self.ended or self.profile is None or self.path is None:
-            self.ended = self.ended or self.path is None
-            return
-        assert self.plan.timing is not None
-        self.profile = self.plan.timing.stop(self.time, scale, rate)
-        self.time, self.braking = 0.0, True
+        else:
+            assert self.plan.timing is not None
+            self.profile = self.plan.timing.stop(self.time, scale, rate)
+            self.time = 0.0
+        self.phase, self.has_braked = "braking", True
+
+    def brake_by(self, follower: Follower) -> None:
+        """Come to rest off the path, by a follower that brakes."""
+        self.follower, self.stop, self.guided = follower, None, None
+        self.phase, self.has_braked = "braking", True
 
     def halt(self, here: Array, speed: Array, hardest: tuple[float, float]) -> None:
-        """Come to rest off the path: every axis brakes by itself, in the direction of the present velocity.
+        """Come to rest off the path: all axes together, in the direction of the present velocity.
 
         Args:
             here: present set-point, shape (7,) [rad].
             speed: its velocity, shape (7,) [rad/s].
             hardest: acceleration [rad/s²] and jerk [rad/s³] of the fastest axis.
         """
-        self.braking, self.follower, self.stop, self.guided = True, None, None, None
         full = float(np.abs(speed).max())
-        self.ended = full < 1e-9
-        if self.ended:
-            self.path = None
+        self.give_up()
+        if full < 1e-9:
             return
-        self.path = JointLine(here.copy(), here + speed)
+        self.path, self.phase = JointLine(here.copy(), here + speed), "braking"
         limits = ProfileLimits(2.0, hardest[0] / full, hardest[1] / full)
         self.profile, self.time = brake((0.0, 1.0, 0.0), limits), 0.0
 
@@ -150,6 +232,8 @@ _T1 = OperationMode.T1
 REDUCED_SPEED = 0.249
 #: A change of the override that an axis cannot follow is halved so often.
 _HALVINGS = 10
+#: The fraction of an axis' acceleration that such a change may use; the rest is for rounding.
+_GRIP = 1.0 - 1e-9
 #: Jerk of a fast stop relative to that of a motion.
 FAST_JERK = 20.0
 
@@ -214,7 +298,6 @@ class Interpolator:
         run: the command that is being executed; None: nothing runs.
         is_paused: come to rest on the path, keeping all commands.
         action: command of an FRI overlay for the next tick.
-        is_overlaid: whether the last set-point was an overlay's.
         passed: has computed the ticks since the last `advance`, which were foreseen; None: there was none.
     """
 
@@ -241,13 +324,17 @@ class Interpolator:
         self.run: RunningMotion | None = None
         self.is_paused = False
         self.action: Superposition | None = None
-        self.is_overlaid = False
         self.passed: ForeseenTicks | None = None
 
     @property
     def order(self) -> int:
         """Id of the running command, 0 if none."""
         return 0 if self.run is None else self.run.command.id
+
+    @property
+    def is_overlaid(self) -> bool:
+        """Whether the last set-point was an FRI overlay's."""
+        return self.run is not None and self.run.phase == "overlaid"
 
     @property
     def interpolated(self) -> Array:
@@ -282,12 +369,10 @@ class Interpolator:
     def trip(self, text: str) -> None:
         """The brakes close at once: the running command ends by an error where the arm is."""
         self.command.stay(self._q)
-        self.is_overlaid = False
         run = self.run
         if run is not None:
             run.failure = run.failure or text
-            run.braking = run.ended = True
-            run.path = run.follower = run.stop = run.guided = None
+            run.give_up()
 
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
@@ -298,7 +383,7 @@ class Interpolator:
             order_id, text = self._aborts.popleft()
             if self.run is not None and order_id in (0, self.order) and not self.run.failure:
                 self.run.failure = text
-                if not self.is_overlaid and not self.run.braking:
+                if self.run.phase != "overlaid" and not self.run.has_braked:
                     self._fail(self.run, text)
         while self._changes:
             order_id, mode = self._changes.popleft()
@@ -343,20 +428,16 @@ class Interpolator:
         Such ticks need no `advance`, until the table ends or the next part of the motion begins: see `passed`.
         """
         run = self.run
-        return not (
-            run is None
-            or run.table is None
-            or not run.started
-            or run.ended
-            or run.braking
-            or run.cancelled
-            or run.failure
-            or run.watches
-            or self.is_overlaid
-            or self._safety.mode is _T1
-            or self._control.violation
-            or not self._speed_override.rests_at(self._goal)
-            or self.is_disturbed
+        return (
+            run is not None
+            and run.phase == "timed"
+            and run.table is not None
+            and run.started
+            and not (run.cancelled or run.watches)
+            and self._safety.mode is not _T1
+            and not self._control.violation
+            and self._speed_override.rests_at(self._goal)
+            and not self.is_disturbed
         )
 
     @property
@@ -391,17 +472,17 @@ class Interpolator:
             watches = self.condition_monitor.begin(planned, command.watches)
             self.run = run = RunningMotion(command, planned, accepted.serial, watches)
             if isinstance(command.motion, ServoMotion):
-                run.follower = follower(self._robot, command.motion, self._command.after, tcp=command.tcp)
+                run.serve(follower(self._robot, command.motion, self._command.after, tcp=command.tcp))
             if isinstance(command.motion, HandGuide):
-                run.guided = self._guided(command.motion, command.tcp)
+                run.guide(self._guided(command.motion, command.tcp))
             return run
         return None
 
     def _check_conditions(self) -> None:
         """Evaluate the conditions; a break condition stops the running motion on its path."""
         run = self.run
-        watches: Sequence[WatchedCondition] = () if run is None or run.braking else run.watches
-        if run is not None and run.ended:  # nothing is left to break, but a trigger may be at the very end
+        watches: Sequence[WatchedCondition] = () if run is None or run.has_braked else run.watches
+        if run is not None and run.phase == "settling":  # only a trigger may be at the very end
             watches = [one for one in watches if not one.breaks]
         elapsed, part = (0.0, 0) if run is None else (run.time, run.part)
         breaks = self.condition_monitor.check(
@@ -431,82 +512,88 @@ class Interpolator:
         return 0.0 if held else safety.manual * min(1.0, max(0.0, self._inputs.override))
 
     def _follow(self, run: RunningMotion) -> tuple[float, float]:
-        planned = run.plan
-        if run.cancelled and run.stop is None and not (run.ended or run.braking or self.is_overlaid):
+        """Set the next set-point as the phase says; returns progress and remaining time."""
+        if run.cancelled and run.phase in ("timed", "holding", "servoing"):  # a safety stop brakes it
             if self._speed_override.rests:
-                run.ended = True
+                run.settle()
             elif not self._safety.latched:  # the stop ended before the motion was at rest
                 self._brake_on_path(run)
-        if run.ended:
-            return self._settle(run)
-        if run.guided is not None:
-            self._follow_hand(run, run.guided)
-            if run.guided is not None:
-                return nan, nan
-        if run.follower is not None:
-            return self._follow_targets(run, run.follower)
-        if (
-            self.action is not None
-            and isinstance(planned.motion, Hold)
-            and not (run.cancelled or run.failure)
-        ):
-            self.is_overlaid = True
-            self._command.after = self.action.q
-            return 0.0, nan
-        if self.is_overlaid:
-            self._halt(run)
-            if run.follower is not None:
-                return self._follow_targets(run, run.follower)
-        step = TICK if run.braking else self._step(run)
-        if run.table is not None and not run.braking and self._follow_ahead(run, run.table, step):
-            s = run.place
-            return (nan if run.failure else planned.progress(s, run.part)), planned.duration - run.time
+        match run.phase:
+            case "timed":
+                return self._follow_path(run)
+            case "holding" | "overlaid":
+                return self._hold(run)
+            case "guided":
+                return self._follow_hand(run)
+            case "servoing" | "stopped":
+                return self._follow_targets(run)
+            case "braking":
+                return self._come_to_rest(run)
+            case "settling":
+                return self._settle(run)
+
+    # ------------------------------------------------------------------------------------------------ along a path
+
+    def _follow_path(self, run: RunningMotion) -> tuple[float, float]:
+        """Move along the path, on the time of the speed override."""
+        assert run.path is not None and run.profile is not None
+        path, profile, here = run.path, run.profile, self._command.after
+        step = self._step(lambda step: path.at(_clipped(profile.at(run.time + step)[0]), here))
+        if run.table is not None and self._follow_ahead(run, run.table, step):
+            return run.plan.progress(run.place, run.part), run.plan.duration - run.time
+        return self._follow_profile(run, step)
+
+    def _follow_profile(self, run: RunningMotion, step: float) -> tuple[float, float]:
+        """Move along the path by so much of the profile's time [s]."""
+        path, profile, planned = run.path, run.profile, run.plan
+        assert path is not None and profile is not None
         run.time += step
-        if run.path is None or run.profile is None:
-            if run.cancelled or run.time >= planned.duration or not isinstance(planned.motion, Hold):
-                run.ended = True
-                self._reach(run, 1.0)
-            return min(1.0, run.time / planned.duration), planned.duration - run.time
-        s = run.profile.at(run.time)[0]
-        if run.time >= run.profile.duration:
-            run.ended = True
-        s = min(max(s, 0.0), 1.0)
+        s = _clipped(profile.at(run.time)[0])
+        if run.time >= profile.duration:
+            run.settle()
         self._reach(run, s)
         # at the very end take the planned joints: the path itself may end a rounding error beside them
-        if s == 1.0 and run.path is planned.path:
+        if s == 1.0 and path is planned.path:
             self._command.after = planned.end
         else:
-            self._follow_path(run, s)
-        return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
+            self._set_on(run, path, s)
+        # a set-point that no axis could follow has replaced the profile
+        left = nan if run.profile is None else run.profile.duration - run.time
+        return (nan if run.failure else planned.progress(s, run.part)), left
 
-    def _step(self, run: RunningMotion) -> float:
+    def _step(self, at: Callable[[float], Array]) -> float:
         """By how much the motion's time grows in this tick [s]: no axis leaves its acceleration limit for the override.
 
-        The override changes along the path, whose curvature adds to the acceleration: as much of the change is made as
-        the axes can follow.
-        """
-        override, path, profile = self._speed_override, run.path, run.profile
-        step, last = TICK * override.factor, TICK * override.last_factor
-        if step == last or path is None or profile is None:
-            return step
-        command = self._command
-        straight = 2.0 * command.after - command.before
-        room = self._robot.ddq_max * TICK**2
+        The change of the override adds to the acceleration of the motion: as much of it is made as the axes can follow,
+        and the rest in later ticks. Where the motion itself needs more than an axis' limit, the change adds nothing.
 
-        def is_within(step: float) -> bool:
-            s = min(max(profile.at(run.time + step)[0], 0.0), 1.0)
-            return bool((np.abs(path.at(s, command.after) - straight) <= room).all())
+        Args:
+            at: the next set-point if the motion's time grew by so much [s], shape (7,) [rad].
+        """
+        override = self._speed_override
+        whole, last = override.factor, override.last_factor
+        if whole == last:
+            return TICK * whole
+        straight = 2.0 * self._command.after - self._command.before
+        room = _GRIP * self._robot.ddq_max * TICK**2
+
+        def needed(part: float) -> float:
+            """Of the axis that needs most, relative to its acceleration, for a part of the change."""
+            there = at(TICK * (last + part * (whole - last)))
+            return float((np.abs(there - straight) / room).max())
 
         try:
-            if is_within(step) or not is_within(last):
-                return step
+            if needed(1.0) <= 1.0:
+                return TICK * whole
+            allowed = max(1.0, needed(0.0))
+            low, high = 0.0, 1.0
             for _ in range(_HALVINGS):
-                middle = 0.5 * (step + last)
-                step, last = (step, middle) if is_within(middle) else (middle, last)
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if needed(middle) <= allowed else (low, middle)
         except Unreachable:  # reported where the set-point is made
-            return step
-        override.keep(last / TICK)
-        return last
+            return TICK * whole
+        override.change_by(low)
+        return TICK * override.factor
 
     def _follow_ahead(self, run: RunningMotion, table: MotionTable, step: float) -> bool:
         """Take the next set-point from those that are computed ahead; False: there is none.
@@ -541,11 +628,10 @@ class Interpolator:
             if listener is not None:
                 listener.reached(run.part)
 
-    def _follow_path(self, run: RunningMotion, s: float) -> None:
-        """Set the next set-point from the path; one that an axis could not follow ends the motion."""
-        assert run.path is not None
+    def _set_on(self, run: RunningMotion, path: JointPath, s: float) -> None:
+        """Set the next set-point from a path; one that an axis could not follow ends the motion."""
         try:
-            there = run.path.at(s, self._command.after)
+            there = path.at(s, self._command.after)
         except Unreachable as error:
             self._break_off(run, f"the path is not reachable: {error.text}")
             return
@@ -559,7 +645,34 @@ class Interpolator:
             return
         self._command.after = there
 
+    # ------------------------------------------------------------------------------------------------ without a path
+
+    def _hold(self, run: RunningMotion) -> tuple[float, float]:
+        """Wait for the end of a hold, or take the set-points of an FRI overlay."""
+        is_hold = isinstance(run.plan.motion, Hold)
+        if self.action is not None and is_hold and not (run.cancelled or run.failure):
+            run.phase = "overlaid"
+            self._command.after = self.action.q
+            return 0.0, nan
+        if run.phase == "overlaid":
+            self._halt(run)
+            return self._follow(run)
+        run.time += self.step
+        if run.cancelled or run.time >= run.plan.duration or not is_hold:
+            run.settle()
+            self._reach(run, 1.0)
+        return min(1.0, run.time / run.plan.duration), run.plan.duration - run.time
+
+    # ------------------------------------------------------------------------------------------------ to the end
+
+    def _come_to_rest(self, run: RunningMotion) -> tuple[float, float]:
+        """Brake at full motion time."""
+        if run.follower is None:
+            return self._follow_profile(run, TICK)
+        return self._follow_further(run, run.follower, TICK)
+
     def _settle(self, run: RunningMotion) -> tuple[float, float]:
+        """Wait until the measured joints have arrived, then close the command."""
         if self._control.stays and not run.cancelled and not run.failure:
             return 1.0, 0.0
         run.settling += 1
@@ -596,13 +709,12 @@ class Interpolator:
         may, or it would get beyond its range for the sake of a faster one. Those of an overlay do so as soon as the
         guard of the client expects. A jerk as gentle as that of a motion would take several degrees more.
         """
-        if self.is_overlaid or isinstance(run.follower, SmartFollower | DirectFollower):
-            if self.is_overlaid:
-                self.is_overlaid, jerk = False, FAST_JERK
-            run.follower = braking_axes(self._robot, self._command.after, self._command.speed, jerk=jerk)
-            run.braking, run.stop = True, None
+        if run.phase == "overlaid" or isinstance(run.follower, SmartFollower | DirectFollower):
+            if run.phase == "overlaid":
+                jerk = FAST_JERK
+            run.brake_by(braking_axes(self._robot, self._command.after, self._command.speed, jerk=jerk))
             return
-        if run.guided is not None:
+        if run.phase == "guided":
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
         run.halt(self._command.after, self._command.speed, hardest)
@@ -619,24 +731,21 @@ class Interpolator:
             return
         run.cancelled = True
         # a stop in force brings a motion to rest sooner, but it does not act on hand guiding
-        if run.guided is not None or not (self._safety.latched or run.stop is not None):
+        if run.phase == "guided" or not (self._safety.latched or run.phase == "stopped"):
             self._brake_on_path(run)
 
     def _brake_on_path(self, run: RunningMotion) -> None:
         if run.guided is not None:
             self._let_go(run, run.guided)
-            return
-        if (
-            run.follower is not None or not self.is_overlaid
-        ):  # else the next tick brakes from the overlay's speed
+        elif run.phase != "overlaid":  # else the next tick brakes from the overlay's speed
             run.brake(scale=self._speed_override.scale, rate=self._speed_override.rate)
 
     def _brake_fast(self, run: RunningMotion) -> None:
-        if run.failure or run.ended or run.guided is not None:
+        if run.failure or run.phase in ("settling", "guided"):
             self._brake(run)
             return
         run.cancelled = True
-        if not self.is_overlaid:  # else the next tick brakes from the overlay's speed
+        if run.phase != "overlaid":  # else the next tick brakes from the overlay's speed
             self._halt(run, jerk=FAST_JERK)
 
     def _guided(self, guide: HandGuide, tcp: tuple[float, ...]) -> GuidedMotion:
@@ -644,47 +753,59 @@ class Interpolator:
         law = self._control.guide(guide, self._q, tcp=tcp[:3], ceiling=ceiling)
         return GuidedMotion(law, self._robot)
 
-    def _follow_hand(self, run: RunningMotion, guided: GuidedMotion) -> None:
+    def _follow_hand(self, run: RunningMotion) -> tuple[float, float]:
         """Follow the hand while the enabling switch is held and nothing stops the arm; end when it is released."""
-        safety = self._safety
+        safety, guided = self._safety, run.guided
+        assert guided is not None
         if guided.has_begun and not safety.guides:
             self._let_go(run, guided)
-        elif safety.guides and not (safety.latched or self.is_paused or guided.law.is_frozen):
+            return self._follow(run)
+        if safety.guides and not (safety.latched or self.is_paused or guided.law.is_frozen):
             guided.has_begun, guided.rest = True, None
             self._control.follow_hand(guided.law)
             self._command.after = self._q + self._dq * TICK
         elif guided.has_begun:
             self._set(run, self._stopped(guided).advance(TICK))
+        return nan, nan
 
     def _let_go(self, run: RunningMotion, guided: GuidedMotion) -> None:
         """Come to rest, then end."""
         if guided.has_begun:
-            run.follower = self._stopped(guided)
+            run.brake_by(self._stopped(guided))
         else:
-            run.ended = True
-        run.braking, run.guided = True, None
+            run.give_up()
 
     def _stopped(self, guided: GuidedMotion) -> SmartFollower:
         """The trajectory to rest after the switch was released."""
         self._control.stiffen()
         return guided.halt(self._q.copy(), self._dq)
 
-    def _follow_targets(self, run: RunningMotion, follower: Follower) -> tuple[float, float]:
-        """Move the set-point towards the newest target."""
-        target, motion = self._inputs.target(), run.command.motion
+    # ------------------------------------------------------------------------------------------------ towards targets
+
+    def _follow_targets(self, run: RunningMotion) -> tuple[float, float]:
+        """Move the set-point towards the newest target, unless a safety stop brakes the axes."""
+        target, follower = self._inputs.target(), run.follower
+        assert follower is not None
         if target is not None and target.order == run.command.id and not run.cancelled:
             follower.aim(target.q, target.dq)
         if not isinstance(follower, StraightFollower) and self._stops_axes(run, follower):
             return nan, follower.remaining
+        return self._follow_further(run, follower, self._step(follower.ahead))
+
+    def _follow_further(self, run: RunningMotion, follower: Follower, step: float) -> tuple[float, float]:
+        """Move the set-point by so much of the motion's time [s]; it ends at rest, or some time after its target."""
+        motion = run.command.motion
         try:
-            there = follower.advance(TICK if run.braking else TICK * self._speed_override.factor)
+            there = follower.advance(step)
         except Unreachable as error:
             self._break_off(run, f"the path is not reachable: {error.text}")
             return nan, nan
-        if run.braking:
-            run.ended = follower.is_still
-        elif isinstance(motion, ServoMotion):
-            run.ended = follower.resting > motion.timing.goal_timeout
+        if run.phase == "braking":
+            is_over = follower.is_still
+        else:
+            is_over = isinstance(motion, ServoMotion) and follower.resting > motion.timing.goal_timeout
+        if is_over:
+            run.settle()
         axis = None if run.failure else self._command.beyond(there)
         if axis is not None:
             self._break_off(run, f"Command Position violates limit A{axis + 1}")
@@ -695,14 +816,17 @@ class Interpolator:
     def _stops_axes(self, run: RunningMotion, follower: SmartFollower | DirectFollower) -> bool:
         """Whether a safety stop brakes the axes of a servo motion; moves the set-point if it does."""
         if run.stop is None:
-            if run.braking or not self._safety.latched:
+            if not self._safety.latched:
                 return False
             run.stop = AxisStop(self._robot, self._command.after, self._command.speed, jerk=FAST_JERK)
+            run.phase = "stopped"
             self._speed_override.rest()
         elif run.stop.is_over and (run.cancelled or not self._safety.latched):
-            run.stop, run.ended = None, run.cancelled
+            run.stop, run.phase = None, "servoing"
             follower.restart(self._command.after)
-            return run.ended
+            if run.cancelled:
+                run.settle()
+            return run.cancelled
         self._set(run, run.stop.advance())
         return True
 
@@ -712,3 +836,8 @@ class Interpolator:
         self._command.continue_from(self._q, self._dq)
         run.settling = 0
         self._fail(run, text)
+
+
+def _clipped(s: float) -> float:
+    """A path parameter between 0 and 1."""
+    return min(max(s, 0.0), 1.0)

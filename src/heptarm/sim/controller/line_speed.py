@@ -18,7 +18,7 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.velocity import NEAREST
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: How far ahead a trajectory is looked at, in its own time, and the time between two samples where it is straight [s];

@@ -13,7 +13,7 @@ from heptarm.planning.motion import PlanError
 from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.sim.controller.command import MotionCommand
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import atan2, cos, sin, sqrt
+from math import cos, sin, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +20,10 @@ from heptarm.model.kinematics import forward
 from heptarm.planning.geometry import Quat, product
 from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK, ServoMotion, fractions
 from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
+from heptarm.planning.targets import goes_on
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
-from heptarm.values.arrays import Array
-from heptarm.values.pose import Pose, multiply, rotation
+from heptarm.values.checks import Array
+from heptarm.values.pose import Pose, is_half_turn, rotation, turn_between
 from heptarm.values.robot import RobotModel
 
 #: Of a follower that only comes to rest.
@@ -222,6 +223,7 @@ class StraightFollower:
         frame = Pose.of(tcp[:3], tcp[3:])
         origin = Pose.from_matrix(forward(robot, here)) @ frame
         limits = self._limits = StraightServoLimits.of(motion)
+        self._robot = robot
         self._axes = AxisLimits(robot)
         self._turned_axes = None if (limits.axes == np.eye(3)).all() else limits.axes
         self._inverse, self._a3 = PathInverse(robot, frame), float(here[2])
@@ -247,29 +249,34 @@ class StraightFollower:
             self._goal = None if self._leads_to(goal) else goal
             self._waited = 0.0
 
+    def ahead(self, dt: float) -> Array:
+        """What `advance` would return if no further target came, shape (7,) [rad]; raises as it does."""
+        one = self._followed
+        return self._q if one is None else self._set_point(one, self._elapsed + dt)
+
     def advance(self, dt: float) -> Array:
         """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad].
 
         Raises:
             Unreachable: the line leaves the workspace.
         """
+        there = self.ahead(dt)
         self._waited += dt
-        if self._goal is not None and self._waited >= _AGAIN:
-            self.aim(self._goal)
         one = self._followed
         if one is None:
             self.resting += dt
-            return self._q
-        otg = one.otg
-        self._elapsed += dt
-        otg.time = one.profile.at(self._elapsed)[0]
-        self.resting = 0.0 if self._goal is not None else max(0.0, otg.over)
-        before, self._q = self._q, self._set_point(one, self._elapsed)
-        if dt > 0.0:
-            self._speed = (self._q - before) / dt
-        if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
-            self._go_on(one, rate=one.profile.at(self._elapsed)[1])
-        return self._q
+        else:
+            before, self._q = self._q, there
+            self._elapsed += dt
+            one.otg.time = one.profile.at(self._elapsed)[0]
+            self.resting = 0.0 if self._goal is not None else max(0.0, one.otg.over)
+            if dt > 0.0:
+                self._speed = (self._q - before) / dt
+            if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
+                self._go_on(one, rate=one.profile.at(self._elapsed)[1])
+        if self._goal is not None and self._waited >= _AGAIN:
+            self.aim(self._goal)
+        return there
 
     def brake(self, *, scale: float, rate: float) -> None:
         """Come to rest along the line; ends when `is_still`.
@@ -314,7 +321,7 @@ class StraightFollower:
         place, turn, speed, change = self._state()
         centre = self._turned(turn)
         inward = self._limits.axes.T
-        target = np.concatenate([inward @ goal[:3], inward @ _between(centre, goal[3:])])
+        target = np.concatenate([inward @ goal[:3], inward @ self._turn_to(goal, place, centre)])
         distance = target - _unrotated(place)
         free = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
         (velocity, acceleration, jerk), speed, change = _along(distance, free, speed, change)
@@ -323,6 +330,29 @@ class StraightFollower:
         start = (_unrotated(place), speed, change)
         minimum = self._limits.timing.min_trajectory_time
         return otg.aim(start, target, speed=np.zeros(6), minimum=minimum) and self._follow(otg, centre)
+
+    def _turn_to(self, goal: Array, place: Array, centre: Quat) -> Array:
+        """Rotation vector to a target in the base, shape (3,) [rad]; half a turn goes where the arm can follow.
+
+        Args:
+            goal: the target pose.
+            place: position now, along the axes of the limits, shape (3,) [m].
+            centre: orientation now.
+        """
+        start, end, here = np.array(centre), goal[3:], self._limits.axes @ place
+        turn = turn_between(start, end)
+        if not is_half_turn(start, end):
+            return turn
+        other = turn_between(start, end, is_other=True)
+
+        def can_turn(by: Array) -> bool:
+            def at(s: float, near: Array) -> Array:
+                point = (here + s * (goal[:3] - here)).tolist()
+                return self._inverse.joints(point, _rotated(centre, (s * by).tolist()), near, a3=self._a3)
+
+            return goes_on(self._robot, at, self._q)
+
+        return other if not can_turn(turn) and can_turn(other) else turn
 
     def _follow(self, otg: OnlineTrajectory, centre: Quat, *, scale: float = 1.0) -> bool:
         """Follow a trajectory from its start; False: the axes could not brake on it, or not get on to it."""
@@ -437,16 +467,6 @@ def _spin(otg: OnlineTrajectory, time: float) -> Array:
 def _unrotated(place: Array) -> Array:
     """Coordinates of a position without rotation from the centre, shape (6,)."""
     return np.concatenate([place, np.zeros(3)])
-
-
-def _between(start: Quat, end: Array) -> Array:
-    """Rotation vector from one orientation to another by the smaller angle, in the base, shape (3,) [rad]."""
-    x, y, z, w = multiply(end, np.array(start) * (-1.0, -1.0, -1.0, 1.0)).tolist()
-    length = sqrt(x * x + y * y + z * z)
-    if length < _TINY:
-        return np.zeros(3)
-    angle = 2.0 * atan2(length, abs(w)) * (1.0 if w >= 0.0 else -1.0)
-    return np.array([x, y, z]) * (angle / length)
 
 
 def _along(
@@ -607,6 +627,10 @@ class SmartFollower:
             self._passes = bool(pass_at.any())
             self.resting = 0.0
 
+    def ahead(self, dt: float) -> Array:
+        """What `advance` would return if no further target came, shape (7,) [rad]."""
+        return np.array(self._otg.position(self._otg.time + dt)) if self._otg.has_begun else self._still
+
     def advance(self, dt: float) -> Array:
         """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad]."""
         if not self._otg.has_begun:
@@ -701,12 +725,24 @@ class DirectFollower:
         self._left = max(self._limits.timing.min_trajectory_time, least)
         self.resting = 0.0
 
+    def ahead(self, dt: float) -> Array:
+        """What `advance` would return if no further target came, shape (7,) [rad]."""
+        return self._next(dt)[0] if self._brake is None else self._brake.ahead(dt)
+
     def advance(self, dt: float) -> Array:
         """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad]."""
         if self._brake is not None:
             return self._brake.advance(dt)
+        self._q, self._dq = self._next(dt)
+        if dt > 0.0:
+            self._left = max(0.0, self._left - dt)
+            self.resting = self.resting + dt if self._left == 0.0 else 0.0
+        return self._q
+
+    def _next(self, dt: float) -> tuple[Array, Array]:
+        """Set-point and its velocity after `dt` seconds of the motion's own time, shape (7,) each [rad, rad/s]."""
         if dt <= 0.0:
-            return self._q
+            return self._q, self._dq
         limits, distance = self._limits, self._target - self._q
         ceiling = np.minimum(limits.velocity, _stoppable(np.abs(distance), limits.acceleration))
         # an axis that had to pass its target, since that came too near, stays within its range
@@ -717,13 +753,8 @@ class DirectFollower:
             -_stoppable(-below, limits.acceleration),
             _stoppable(above, limits.acceleration),
         )
-        self._dq = self._dq + np.clip(
-            velocity - self._dq, -limits.acceleration * dt, limits.acceleration * dt
-        )
-        self._q = self._q + np.clip(self._dq * dt, np.minimum(below, 0.0), np.maximum(above, 0.0))
-        self._left = max(0.0, self._left - dt)
-        self.resting = self.resting + dt if self._left == 0.0 else 0.0
-        return self._q
+        dq = self._dq + np.clip(velocity - self._dq, -limits.acceleration * dt, limits.acceleration * dt)
+        return self._q + np.clip(dq * dt, np.minimum(below, 0.0), np.maximum(above, 0.0)), dq
 
     def brake(self, *, scale: float, rate: float) -> None:
         """Come to rest as fast as the axes may."""

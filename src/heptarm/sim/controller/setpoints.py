@@ -7,11 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Set-points this far beyond a limit are rounding errors [rad].
 ON_LIMIT = 1e-9
+#: So far beyond a limit a compliant arm gives at a set-point on it [rad]: position control begins with no more.
+GIVEN = 2e-4
 #: Largest velocity of a set-point, relative to the axis' limit.
 OVERSPEED = 1.2
 
@@ -65,7 +67,9 @@ class SetPoints:
         self.before, self.now = self.now, self.after
 
     def stay(self, here: Array) -> None:
-        """Rest at a position."""
+        """Rest at a position; on a limit, where a compliant arm is a hair beyond it."""
+        inside = np.clip(here, self._lowest + ON_LIMIT, self._highest - ON_LIMIT)
+        here = np.where(np.abs(inside - here) < GIVEN, inside, here)
         self.before, self.now, self.after = here.copy(), here.copy(), here.copy()
 
     def continue_from(self, here: Array, speed: Array) -> None:

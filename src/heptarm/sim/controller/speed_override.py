@@ -10,7 +10,7 @@ from heptarm.model.kinematics import flange, jacobian
 from heptarm.planning.jerk_profile import JerkProfile, ProfileLimits, change
 from heptarm.planning.motion import TICK
 from heptarm.sim.controller.setpoints import SetPoints
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Rate at which overrides and pauses change the speed: [1/s], [1/s²], [1/s³].
@@ -103,9 +103,13 @@ class SpeedOverride:
         """The factor of the tick before."""
         return self._before
 
-    def keep(self, factor: float) -> None:
-        """Replace the factor of the running tick: an axis cannot follow the change."""
-        self.factor = self.scale = self._free = factor
+    def change_by(self, part: float) -> None:
+        """Make only a part of the running tick's change, 0 to 1, and the rest later: an axis cannot follow."""
+        self.factor = self.scale = self._before + part * (self.factor - self._before)
+        self.rate *= part
+        if self._slew is not None:
+            self._slew_time -= (1.0 - part) * TICK
+            self._free = self._slewed(self._slew)
 
     def rest(self) -> None:
         """Motion time does not advance from now on; the motion begins again from rest."""
@@ -136,7 +140,15 @@ class SpeedOverride:
         if goal != self._goal or self._slew is None:
             state = (self._free, 0.0, 0.0) if self._slew is None else self._slew.at(self._slew_time)
             self._goal, self._slew, self._slew_time = goal, change(state, goal, OVERRIDE_SLEW), 0.0
-        self._slew_time += TICK
-        self._free = min(1.0, max(0.0, self._slew.at(self._slew_time)[0]))
-        if self._slew_time >= self._slew.duration:
+        elif self._slew_time >= self._slew.duration:
             self._free, self._slew = goal, None
+            return
+        self._slew_time += TICK
+        self._free = self._slewed(self._slew)
+
+    def _slewed(self, slew: JerkProfile) -> float:
+        return (
+            self._goal
+            if self._slew_time >= slew.duration
+            else min(1.0, max(0.0, slew.at(self._slew_time)[0]))
+        )

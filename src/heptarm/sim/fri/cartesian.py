@@ -6,15 +6,16 @@ angle of A3 [rad].
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
 
-from heptarm.errors import Unreachable
 from heptarm.fri.protocol import messages as m
-from heptarm.model.kinematics import flange, forward, jacobian
-from heptarm.values.arrays import Array
-from heptarm.values.pose import quaternion, rotation
+from heptarm.model.inverse_kinematics import PathInverse
+from heptarm.model.kinematics import flange
+from heptarm.values.checks import Array
+from heptarm.values.pose import Pose, quaternion, rotation
 from heptarm.values.robot import RobotModel
 
 #: FRI's name of the flange.
@@ -22,11 +23,6 @@ NAME = "Flange"
 
 #: Largest deviation of a quaternion's norm from 1.
 NORM = 1e-3
-#: Largest error of a solution [m, rad].
-TOLERANCE = 1e-9
-STEPS = 8
-#: Largest step of a joint in one iteration [rad].
-LARGEST_STEP = 0.2
 
 
 def transformation(robot: RobotModel, q: tuple[float, ...]) -> m.Transformation:
@@ -71,33 +67,21 @@ def _error(goal: Array, here: Array) -> Array:
 def joints(robot: RobotModel, goal: Array, a3: float, near: Array) -> Array:
     """Joint positions next to `near` for a pose of the flange with A3 at an angle.
 
-    Newton's method on the pose and A3 together: seven equations, seven joints.
-
     Args:
         robot: the robot.
         goal: shape (4, 4) [m].
         a3: angle of A3 [rad].
-        near: start of the iteration, shape (7,) [rad]; successive poses of a session are close together.
+        near: shape (7,) [rad]; successive poses of a session are close together.
 
     Returns:
         Shape (7,) [rad].
 
     Raises:
-        Unreachable: there is no solution nearby.
+        Unreachable: no arm position reaches it with this A3.
     """
-    q = near.copy()
-    equations = np.zeros((7, 7))
-    equations[6, 2] = 1.0
-    for _ in range(STEPS):
-        error = np.append(_error(goal, forward(robot, q)), a3 - q[2])
-        if float(np.abs(error).max()) <= TOLERANCE:
-            return q
-        equations[:6] = jacobian(robot, q)
-        try:
-            step = np.linalg.solve(equations, error)
-        except np.linalg.LinAlgError:
-            break
-        q = q + step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-    raise Unreachable(
-        f"the Cartesian pose with A3 at {np.degrees(a3):.2f} deg is not reachable near the present joint position"
-    )
+    return _inverse(robot).joints(goal[:3, 3].tolist(), quaternion(goal[:3, :3]).tolist(), near, a3=a3)
+
+
+@lru_cache(maxsize=8)
+def _inverse(robot: RobotModel) -> PathInverse:
+    return PathInverse(robot, Pose.at())

@@ -10,7 +10,7 @@ from heptarm.errors import CommandRejected
 from heptarm.fri.protocol import messages as m
 from heptarm.planning.seam import FriSignal, SignalType
 from heptarm.sim.fri.settings import Event, FrameProvided, OutputWritten, Refused, SessionConfiguration
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 class SessionIo:
@@ -160,10 +160,10 @@ class IoImageSync:
 
     def update(self, exchange: SessionIo) -> None:
         """Copy the image to the session."""
-        for one in self._signals:
-            value = one.value(float(self._image[one.place]))
-            if exchange.signals[one.name].value != value.value:
-                exchange.signals[one.name] = value
+        for signal in self._signals:
+            value = signal.value(float(self._image[signal.place]))
+            if exchange.signals[signal.name].value != value.value:
+                exchange.signals[signal.name] = value
 
     def veto(self, written: m.IoValue, *, stopped: bool) -> str:
         """Why an output is refused; empty if it is accepted.

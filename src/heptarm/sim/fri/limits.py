@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Ticks without a command during which the motion continues.

@@ -12,7 +12,7 @@ from typing import Protocol
 from heptarm.errors import CommandRejected, ModeConflict
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import Mode, Position
@@ -159,13 +159,3 @@ class OverlayTarget(Protocol):
 
         The first None after an overlay brakes every axis within its limits; the interpolator continues from there.
         """
-
-
-class HoldingTarget(OverlayTarget, Protocol):
-    """An arm that can also hold its position in a control mode without an application."""
-
-    def hold(self, mode: Mode) -> None:
-        """Hold the present position in a control mode, until `release`."""
-
-    def release(self) -> None:
-        """End the hold; the arm rests in position control."""

@@ -16,7 +16,7 @@ from heptarm.fri.protocol.messages import DriveState
 from heptarm.fri.protocol.version import MAX_DATAGRAM
 from heptarm.io.udp import own_address
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.fri.controller import MOST_REFUSALS, Controller
+from heptarm.sim.fri.controller_side import MOST_REFUSALS, Controller
 from heptarm.sim.fri.faults import FaultScenario, FaultyLink
 from heptarm.sim.fri.overlay import MotionOverlay, OverlayTarget, Reading
 from heptarm.sim.fri.settings import Event, Refused, SessionConfiguration
@@ -42,7 +42,7 @@ def connected_to(port: int) -> int | None:
     """The remote port of a connected UDP socket on a port of this machine; None: there is none, or it is not Linux."""
     with contextlib.suppress(OSError), open("/proc/net/udp", encoding="ascii") as table:
         for line in list(table)[1:]:
-            local, remote = (int(one.partition(":")[2], 16) for one in line.split()[1:3])
+            local, remote = (int(part.partition(":")[2], 16) for part in line.split()[1:3])
             if local == port and remote:
                 return remote
     return None

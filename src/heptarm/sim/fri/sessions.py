@@ -13,7 +13,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import CommandMode, IoValue
 from heptarm.fri.protocol.version import Version
 from heptarm.planning.seam import Hold
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.controller.command import MotionCommand, MotionListener
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.fri.io import IoImageSync, SessionSignal
@@ -190,7 +190,7 @@ class Sessions:
             self._version,
             period_ms=period_ms,
             multiplier=multiplier,
-            signals=tuple(one.value(float(image[one.place])) for one in signals),
+            signals=tuple(signal.value(float(image[signal.place])) for signal in signals),
             transformations=transformations,
         )
         arm = _Arm(self._plant)

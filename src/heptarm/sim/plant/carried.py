@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.scene import PREFIX
-from heptarm.values.arrays import Array, Value
+from heptarm.values.checks import Array, Value
 from heptarm.values.pose import Pose
 from heptarm.values.shape import MOST_SHAPES, Shape, ShapeKind
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: A drive trips at this multiple of the axis' highest speed. FRI clients may command 1.2 times that speed.

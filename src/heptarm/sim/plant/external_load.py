@@ -7,7 +7,8 @@ from math import inf
 import mujoco
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.sim.plant.arm_vectors import ArmVectors
+from heptarm.values.checks import Array
 
 #: Damping of the least squares near singularities.
 _DAMPED = 1e-6 * np.eye(6)
@@ -19,27 +20,24 @@ class ExternalLoad:
     Args:
         model: MuJoCo's model; its first seven joints are the arm's.
         data: its state.
+        arm: vectors of the arm.
 
     Attributes:
         torque: external load acting on the joints, shape (7,) [Nm].
         wrench: force and torque acting on the flange, base axes, shape (6,) [N, Nm].
-        is_misjudged: whether the controller's load data differ from the true payload.
 
     The arrays stay the same.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, arm: ArmVectors) -> None:
         self._model, self._data = model, data
         self._site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._jp = np.zeros((3, model.nv))
         self._jr = np.zeros((3, model.nv))
-        self._applied, self._constraint = data.qfrc_applied[:7], data.qfrc_constraint[:7]
-        self._pulled = data.xfrc_applied
+        self._applied = arm.applied
         self._push: Array | None = None
         self._until = inf
-        self.is_misjudged = False
-        self.torque = np.zeros(7)
-        self.wrench = np.zeros(6)
+        self.torque, self.wrench = arm.load, arm.wrench
         self._jacobian = np.zeros((6, 7))
 
     @property
@@ -61,16 +59,6 @@ class ExternalLoad:
             return
         mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
         self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
-
-    def measure(self, inertial: Array) -> None:
-        """After the dynamics of a tick: the torques.
-
-        Args:
-            inertial: M q̈ + h - τ, the residual of the controller's model, shape (7,) [Nm].
-        """
-        # forces on bodies and unknown payloads appear in no vector of MuJoCo, only in the residual
-        explained = not self.is_misjudged and not self._pulled.any()
-        self.torque[:] = self._applied + self._constraint if explained else inertial
 
     def resolve(self, *, is_loaded: bool) -> None:
         """The wrench of the torques; zero without any load."""

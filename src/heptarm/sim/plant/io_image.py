@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 
 
 class IoImage:

@@ -1,13 +1,10 @@
-"""The arithmetic of a tick in C: position control, sensors, supervision of the drives, and the published state.
-
-The Python modules are the reference, and compute wherever there is no compiler: `heptarm.sim.control.laws`, and `Plant`
-with its parts. tests/sim/test_native_tick.py compares the two.
-"""
+"""The arithmetic of a tick, in C: position control, sensors, supervision of the drives, and the published state."""
 
 from __future__ import annotations
 
 import ctypes
 import functools
+from dataclasses import fields
 from typing import Any
 
 import mujoco
@@ -17,10 +14,11 @@ from heptarm._library import Unavailable, library
 from heptarm.model.native import constants
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
-from heptarm.sim.control.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING
+from heptarm.sim.control_laws.laws import GAINS
 from heptarm.sim.controller.setpoints import SetPoints
+from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.shared_state import SharedState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 AXES = 7
@@ -37,19 +35,18 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     (
         "reals",
         0,
-        "q dq acceleration bias passive applied constraint pulled actuators mass armature ranges shown",
+        "q dq acceleration bias passive applied constraint pulled actuators mass armature ranges shown gains",
     ),
     # what a tick computes
     ("reals", 0, "torque tau_cmd tau load wrench"),
     ("word", 0, "stride pulls is_misjudged flags mode order left is_awaited"),
-    ("real", 0, "mass_damping stiffness_damping"),
     # the running motion: its table, where it is in that, how far its time and an axis come in a tick; where the part
     # begins and ends whose progress is shown, and where the next one begins
     ("table", 0, "table"),
     ("cursor", 0, "cursor"),
     ("reals", 0, "leap"),
     ("real", 0, "step part_begin part_end mark"),
-    ("real", AXES, "stiffness most"),
+    ("real", AXES, "most"),
     ("real", 3 * AXES, "points"),
     # `struct arm` of the robot; MuJoCo's model and state, its functions, and vectors of all its degrees of freedom
     ("address", 0, "arm model data"),
@@ -108,13 +105,13 @@ def tick_library() -> ctypes.CDLL:
     """Load the functions; MuJoCo's profiler is off from then on, unless the program has given it a clock.
 
     Raises:
-        Unavailable: this system is not supported, or has no compiler.
+        Unavailable: the compiled part of heptarm is missing, or this MuJoCo does not show its functions.
     """
     made = library(holds_gil=True)
     made.ht_size.restype = made.ht_sense.restype = made.ht_strained.restype = _WORD
     made.ht_write.restype, made.ht_publish.restype = None, _WORD
-    made.ht_command.argtypes = made.ht_sense.argtypes = (_POINTER,)
-    made.ht_command.restype = None
+    made.ht_command.argtypes = made.ht_drive.argtypes = made.ht_sense.argtypes = (_POINTER,)
+    made.ht_command.restype = made.ht_drive.restype = None
     made.ht_strained.argtypes = (_POINTER, _WORD)
     made.ht_write.argtypes = (_POINTER, _WORD, _REAL, _REAL)
     made.ht_tick.restype, made.ht_tick.argtypes = _WORD, made.ht_write.argtypes
@@ -137,11 +134,11 @@ class NativeTick:
         model: MuJoCo's model.
         data: its state.
         shared: where the states are published.
+        arm: its vectors; they stay where they are.
         ranges: of the drives' supervision, see `DriveMonitor`; None: it is off.
-        arrays: vectors of the members of `struct tick` that are pointers; they stay where they are.
 
     Raises:
-        Unavailable: this system is not supported, or has no compiler.
+        Unavailable: the compiled part of heptarm is missing, or this MuJoCo does not show its functions.
     """
 
     def __init__(
@@ -150,34 +147,34 @@ class NativeTick:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         shared: SharedState,
+        arm: ArmVectors,
         *,
         ranges: Array | None,
-        **arrays: Array,
     ) -> None:
         library = tick_library()
-        self._command, self._sense = library.ht_command, library.ht_sense
+        self._command, self._drive, self._sense = library.ht_command, library.ht_drive, library.ht_sense
         self._strained, self._write, self._publish = library.ht_strained, library.ht_write, library.ht_publish
         self._tick, self._put, self._follow = library.ht_tick, library.ht_put, library.ht_follow
         self._memory = memory = _Memory()
         self._table: MotionTable | None = None
         self._words = (0, 0, 0)
         self._at = ctypes.addressof(memory)
-        arrays |= {"vector": np.zeros(model.nv), "product": np.zeros(model.nv)}
-        arm = constants(robot)
-        self._kept = (model, data, shared, ranges, arrays, arm)
+        numbers, vector, product = constants(robot), np.zeros(model.nv), np.zeros(model.nv)
+        self._kept = (model, data, shared, ranges, arm, numbers, vector, product)
         memory.model, memory.data = model._address, data._address
         functions = _mujoco()
         for name, member in _CALLED.items():
             setattr(memory, member, ctypes.cast(getattr(functions, name), _POINTER).value)
         memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
-        for name, values in arrays.items():
-            setattr(memory, name, values.ctypes.data)
-        memory.pulls = arrays["pulled"].size
+        for field in fields(arm):
+            setattr(memory, field.name, getattr(arm, field.name).ctypes.data)
+        memory.vector, memory.product = vector.ctypes.data, product.ctypes.data
+        memory.pulls = arm.pulled.size
         if ranges is not None:
             memory.ranges = ranges.ctypes.data
-        memory.arm = ctypes.cast(arm, _POINTER).value
-        memory.mass_damping, memory.stiffness_damping = MASS_DAMPING, STIFFNESS_DAMPING
-        memory.stiffness[:], memory.most[:] = STIFFNESS.tolist(), robot.tau_max.tolist()
+        memory.arm = ctypes.cast(numbers, _POINTER).value
+        memory.gains = GAINS.ctypes.data
+        memory.most[:] = robot.tau_max.tolist()
         self._points = np.frombuffer(memory.points).reshape(3, AXES)
 
     def believe(self, mass: Array, bias: Array, *, is_misjudged: bool) -> None:
@@ -278,11 +275,15 @@ class NativeTick:
         memory, self._words = self._memory, words
         memory.flags, memory.mode, memory.order = words
 
-    def command(self, before: Array, now: Array, after: Array) -> None:
-        """Drive the motors towards set-points of shape (7,) [rad] of the last, this and the next tick."""
-        points = self._points
-        points[0], points[1], points[2] = before, now, after
+    def command(self, points: SetPoints) -> None:
+        """Position control without a preload: compute the torques of the motors, and `drive` them."""
+        rows = self._points
+        rows[0], rows[1], rows[2] = points.before, points.now, points.after
         self._command(self._at)
+
+    def drive(self) -> None:
+        """Let the motors exert `torque`, as far as they can."""
+        self._drive(self._at)
 
     def sense(self) -> bool:
         """Torques at the sensors and external load, after the dynamics; returns whether there is a load."""

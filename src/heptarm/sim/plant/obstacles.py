@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.carried import GEOMS, OBSTACLE_PREFIX, mujoco_size
-from heptarm.values.arrays import Array, Value
+from heptarm.values.checks import Array, Value
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape

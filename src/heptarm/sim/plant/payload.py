@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import HeptarmError
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import Body, symmetric
 
 #: No load at all.

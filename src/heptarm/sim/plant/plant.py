@@ -1,49 +1,87 @@
-"""The plant: a simulated LBR with its motion controller, advanced by one millisecond per tick."""
+"""The plant: a simulated LBR with its motion controller, advanced by one millisecond per tick.
+
+Theory of operation
+-------------------
+
+**A tick** computes the state k + 1 from the state k, in the order of a real controller's cycle:
+
+1. changes of the load on the flange are taken (`FlangeLoad`), and the interpolator advances: cancellations,
+   conditions and stops first, then the set-point of the next tick;
+2. `Drives` computes the torques of the motors: the control law in force, or the brakes; MuJoCo integrates
+   between `mj_step1` and `mj_step2`, since a law needs the inertia matrix of the posture that it acts on;
+3. the sensors are read, and the external load and its wrench at the flange are derived from them as a
+   controller would: what it does not know (an undeclared payload, say) shows as an external load;
+4. each drive supervises itself and may trip, whatever the controller commands;
+5. the state is written into its slot of the shared memory and published. `time` of tick k is k ms: the plant
+   has no other clock, so it may run at any pace.
+
+**Three forms of a tick**, from the general to the fast one; tests hold them together, bit by bit or
+nearly:
+
+* *In parts* (`_simulate`): impedance laws, brakes, pushes, noisy sensors, overlays of FRI clients.
+* *At once* (`NativeTick.tick`): `_is_plain`, so position control of an arm that nothing disturbs. C does
+  steps 2 to 5. If it finds a load or a strained drive on the way, it leaves the rest to Python: see `LOADED`,
+  `STRAINED`.
+* *Many at once* (`NativeTick.follow`): `_foreseen`, so that the table of the running joint motion alone
+  decides about the set-points. C does step 1, too, until the table or a part of the motion ends, somebody
+  waits for a state, or a tick is no longer plain. The interpolator learns of it when it is next asked for
+  anything (`Interpolator.catch_up`).
+
+What makes the fast forms safe is one test before each call, `_is_undisturbed`: whatever any thread may have
+done in between is a flag that this property reads. A new way to disturb the arm has to appear there, or in
+`_is_plain`.
+
+**States.** The arm is *in motion* or *at rest* under a control law; a stop (`safety.latched`) brings it to
+rest on the path, and then the *brakes close*; they open when the stop is withdrawn and somebody resumes. A
+drive that *trips* closes the brakes where the arm is, moving or not; position control takes over from there
+without a step. `Drives` has these states; `SafetyController` decides about stops; the interpolator knows
+neither.
+
+**Threads.** One thread calls `tick`. Any thread may call the verbs (`submit`, `cancel`, `pause`,
+`set_load_data`, ...): they append to a queue or set a flag, which the next tick takes; none waits.
+`snapshot`, `interpolated` and `body_pose` are for the thread of the ticks. Everybody else reads the state
+from the shared memory, where a sequence number marks a torn one, so that no reader can delay a tick.
+`on_wake` and `on_safety` are called by the thread of the ticks, and must not block.
+
+**Memory.** `ArmVectors` names the vectors of the arm once. MuJoCo, the tick in C and the parts all use these
+arrays; none of them is ever replaced, only written to, since C keeps their addresses.
+"""
 
 from __future__ import annotations
 
 import logging
-from collections import deque
 from collections.abc import Callable, Sequence
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, nan
 
 import mujoco
 import numpy as np
 
-from heptarm._library import Unavailable
-from heptarm.model.inverse_kinematics import status_of
-from heptarm.model.kinematics import flange
 from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
-from heptarm.sim.control.controller import ActiveLaw
-from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
+from heptarm.sim.control_laws.active_law import ActiveLaw
+from heptarm.sim.control_laws.laws import MeasuredState, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
-from heptarm.sim.plant.carried import CarriedShapes, FlangeShapes
-from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
+from heptarm.sim.plant.arm_vectors import ArmVectors
+from heptarm.sim.plant.carried import CarriedShapes
+from heptarm.sim.plant.drive_monitor import DriveMonitor
+from heptarm.sim.plant.drives import Drives
 from heptarm.sim.plant.external_load import ExternalLoad
+from heptarm.sim.plant.flange_load import FlangeLoad
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.native import DONE, ELSEWHERE, LOADED, NativeTick
-from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.safety_monitor import UNLIMITED, ExternalTorqueMonitor, SafetyLimits
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import Body, RobotModel, robot
 
 log = logging.getLogger("heptarm.sim")
-
-#: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after this many ticks.
-BRAKE_SPEED = 0.02
-BRAKE_TICKS = 400
-#: A brake that cannot hold its axis slips as far behind it [rad]; no drive trips at once when the brakes open.
-BRAKE_SLIP = 0.8 * LAG
 
 #: Flags as plain integers: an operation on two flags of an enumeration takes a microsecond.
 _MOVING, _BRAKES_OPEN = int(SafetyFlags.MOVING), int(SafetyFlags.BRAKES_OPEN)
@@ -127,96 +165,42 @@ class Plant:
         limits: SafetyLimits = UNLIMITED,
     ) -> None:
         self.robot: RobotModel = robot(model)
-        self._errors = errors
         self.model = compiled(model, boxes, scene, room=True)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
-        self.shared = SharedState()
-        self.tick_count = 0
+        self.shared, self.tick_count = SharedState(), 0
         self.on_wake: Callable[[int], None] | None = None
-        self._views()
-        self._load = ExternalLoad(self.model, self.data)
+        self.on_safety: Callable[[int, int], None] | None = None
+        # safety flags, and the operation mode above them: as reported, and of the newest state
+        self._reported = self._newest = 0
+        self.signals, self.safety = IoImage(self.shared.signals), SafetyController()
+        self._errors = errors
+        self._arm = arm = ArmVectors.of(self.model, self.data, has_errors=errors is not None)
+        self._load = ExternalLoad(self.model, self.data, arm)
         bare = compiled(model) if is_mounted(self.model) else None
-        self._limits = limits
-        self._safety_monitor: ExternalTorqueMonitor | None = None
-        if limits.torque < inf:
-            self._safety_monitor = ExternalTorqueMonitor(copy(self.model if bare is None else bare), limits)
-        self._payload = PayloadModel(self.model, self.data, self._mass, bare)
-        self._mounted = FlangeShapes(self.model)
-        self._changes: deque[Callable[[], None]] = deque()  # of what is carried; made before the next tick
-        self._control = ActiveLaw(self.robot, self.model, self.data)
-        self.signals = IoImage(self.shared.signals)
+        self._carried = FlangeLoad(self.model, self.data, arm.mass, bare=bare, limits=limits)
         self._gripper: SimulatedGripper | None = None
         if scene is not None and has_gripper(self.model):
             self._gripper = SimulatedGripper(self.model, self.data, self.signals, scene.wiring)
+        monitor = DriveMonitor(self.robot) if monitored else None
+        ranges = None if monitor is None else monitor.scales
+        self._native = NativeTick(self.robot, self.model, self.data, self.shared, arm, ranges=ranges)
         self._sensed = MeasuredState(
-            self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
+            arm.q, arm.dq, arm.mass[:7, :7], arm.bias, arm.passive, arm.q, arm.q, arm.q
         )
-        self.safety = SafetyController()
-        self.on_safety: Callable[[int, int], None] | None = None  # called with changed flags and mode
-        # safety flags, and the operation mode above them: as reported, and of the newest state
-        self._flags = self._seen = 0
-        # whether the next ticks need no more than the table of the running motion, while the safety flags are these
-        self._is_foreseen, self._shown = False, 0
-        self._brakes: PositionLaw | None = None  # closed
-        self._braked = self._sensed
-        self._halted = 0  # ticks for which a stop on the path has been in force
-        self._monitor = DriveMonitor(self.robot) if monitored else None
-        self._native = self._in_c()
-        self._tripped = False  # by a drive's own supervision
+        law = ActiveLaw(self.robot, self.model, self.data)
+        self._drives = Drives(arm, self._native, self._sensed, law, monitor=monitor, errors=errors)
         self.interpolator = Interpolator(
-            self.robot, _Inputs(self.shared), self._sensed, self._load, self._control, self.safety
+            self.robot, _Inputs(self.shared), self._sensed, self._load, law, self.safety
         )
         self.condition_monitor = self.interpolator.condition_monitor
         self.submit = self.interpolator.queue.submit
+        self._foreseen: int | None = None
         self._take_loads()
         self.tick_count = -1
         self._write(0.0, nan)
         self._publish()
-
-    def _views(self) -> None:
-        d = self.data
-        self._q, self._dq, self._acc = d.qpos[:7], d.qvel[:7], d.qacc[:7]
-        self._bias, self._passive = d.qfrc_bias[:7], d.qfrc_passive[:7]
-        self._ctrl = d.ctrl[:7]
-        self._armature = self.model.dof_armature[:7].copy()
-        self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
-        self._mass = np.zeros((self.model.nv, self.model.nv))
-        mujoco.mj_fullM(self.model, d, self._mass)
-        self._measured = (
-            self._q if self._errors is None else self._q.copy()
-        )  # positions that the sensors show
-        self._torque, self._tau, self._tau_cmd = np.zeros(7), np.zeros(7), np.zeros(7)
-
-    def _in_c(self) -> NativeTick | None:
-        """The arithmetic of a tick in C; None: where it is not available."""
-        d, monitor = self.data, self._monitor
-        try:
-            return NativeTick(
-                self.robot,
-                self.model,
-                d,
-                self.shared,
-                ranges=None if monitor is None else monitor.scales,
-                q=self._q,
-                dq=self._dq,
-                acceleration=self._acc,
-                passive=self._passive,
-                applied=d.qfrc_applied[:7],
-                constraint=d.qfrc_constraint[:7],
-                pulled=d.xfrc_applied,
-                actuators=self._ctrl,
-                armature=self._armature,
-                shown=self._measured,
-                torque=self._torque,
-                tau_cmd=self._tau_cmd,
-                tau=self._tau,
-                load=self._load.torque,
-                wrench=self._load.wrench,
-            )
-        except Unavailable:
-            return None
 
     @property
     def time_ns(self) -> int:
@@ -280,7 +264,7 @@ class Plant:
 
     def set_load_data(self, load: Body) -> None:
         """Declare the load data of the controller; also the true payload, unless `set_payload` sets another one."""
-        self._changes.append(lambda: self._payload.declare(load))
+        self._carried.declare(load)
 
     def set_safety_load(self, load: Body, *, workpiece: float) -> None:
         """Set the load that the safety functions count: tools and the safety workpiece.
@@ -292,34 +276,25 @@ class Plant:
         Raises:
             ValueError: the safety configuration allows no workpiece as heavy as that.
         """
-        most = self._limits.workpiece
-        if workpiece > most:
-            raise ValueError(
-                f"the safety workpiece has {workpiece:g} kg, the safety configuration allows {most:g} kg"
-            )
-        monitor = self._safety_monitor
-        if monitor is not None:
-            self._changes.append(lambda: monitor.count(load))
+        self._carried.count(load, workpiece=workpiece)
 
     def set_payload(self, load: Body) -> None:
         """Set the true payload on the flange; declared load data do not change it any more."""
-        self._changes.append(lambda: self._payload.set_true(load))
+        self._carried.set_true(load)
 
     def carry(self, bodies: Sequence[CarriedShapes]) -> None:
         """Mount the shapes of tool and workpiece on the flange, in place of those before; they collide.
 
         Where the scene has a tool on the flange, it stays there alone.
         """
-        self._changes.append(lambda: self._mounted.mount(bodies))
+        self._carried.mount(bodies)
 
     def _take_loads(self) -> None:
-        payload, sensed = self._payload, self._sensed
-        while self._changes:
-            self._changes.popleft()()
-        sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
-        self._is_ideal = self._errors is None and self._safety_monitor is None and not payload.differs
-        if self._native is not None:
-            self._native.believe(payload.mass, payload.bias, is_misjudged=payload.differs)
+        carried, sensed = self._carried, self._sensed
+        carried.take()
+        known = carried.model
+        sensed.mass, sensed.bias = known.mass, known.bias
+        self._native.believe(known.mass, known.bias, is_misjudged=known.differs)
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
         """Change the parameters of the running command's control mode; does nothing for another command or mode."""
@@ -362,7 +337,7 @@ class Plant:
         Returns:
             How many ticks they were.
         """
-        if self._is_foreseen and self._is_undisturbed:
+        if self._foreseen is not None and self._is_undisturbed:
             done = self._follow(most)
             if done:
                 return done
@@ -375,29 +350,28 @@ class Plant:
     def _is_undisturbed(self) -> bool:
         """Whether nothing has happened since the last tick that the next one has to look at."""
         return not (
-            self._changes
+            self._carried.has_changed
             or self._load.is_pushed
-            or self.safety.flags != self._shown
+            or self.safety.flags != self._foreseen
             or self.interpolator.is_disturbed
         )
 
     def _foresee(self) -> None:
         """Find out whether the next ticks need no more than the running motion's table, unless something happens."""
-        native, interpolator = self._native, self.interpolator
-        self._is_foreseen = (
-            native is not None and self._gripper is None and interpolator.is_foreseen and self._is_plain
-        )
-        if native is None or not self._is_foreseen:
+        interpolator = self.interpolator
+        if self._gripper is not None or not interpolator.is_foreseen or not self._is_plain:
+            self._foreseen = None
             return
-        run, self._shown = interpolator.run, self.safety.flags
+        run, self._foreseen = interpolator.run, self.safety.flags
         assert run is not None and run.table is not None
         part = (*run.plan.measured(run.part), run.plan.end_of(run.part))
-        native.prepare(interpolator.command, run.table, time=run.time, step=interpolator.step, part=part)
+        self._native.prepare(
+            interpolator.command, run.table, time=run.time, step=interpolator.step, part=part
+        )
 
     def _follow(self, most: int) -> int:
         """Compute at most so many ticks by the table of the running motion; returns how many."""
         native, interpolator = self._native, self.interpolator
-        assert native is not None
         done = native.follow(self.tick_count + 1, most)
         left = DONE if done == most else native.left
         if not done and left == DONE:
@@ -418,15 +392,15 @@ class Plant:
 
     def _compute(self) -> None:
         """Compute the next tick: set-point, control law, dynamics."""
-        if self._changes:
+        if self._carried.has_changed:
             self._take_loads()
         progress, remaining = self._advance()
         if self._gripper is not None:
             self._gripper.tick()
-        native, left = self._native, ELSEWHERE
-        if native is not None and self._is_plain:
+        left = ELSEWHERE
+        if self._is_plain:
             words, times = self._words(), (progress, remaining)
-            left = native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
+            left = self._native.tick(self.tick_count + 1, self.interpolator.command, words=words, times=times)
         self._complete(left, progress, remaining)
 
     def _complete(self, left: int, progress: float, remaining: float) -> None:
@@ -437,33 +411,35 @@ class Plant:
             self._simulate()
         elif left == LOADED:
             self._load.resolve(is_loaded=True)
-        if self._monitor is not None and not self._tripped:
-            self._supervise(self._monitor)
+        self._supervise()
         self._write(progress, remaining)
 
     @property
     def _is_plain(self) -> bool:
         """Whether `NativeTick.tick` may compute the next tick: position control, and nothing special."""
+        carried, interpolator = self._carried, self.interpolator
         return (
-            self._is_ideal
-            and self._control.is_plain
-            and self._brakes is None
-            and not (self.interpolator.is_overlaid or self._load.is_pushed)
-            and (self._monitor is None or not self._monitor.is_strained)
+            self._errors is None
+            and carried.torque_monitor is None
+            and not carried.model.differs
+            and self._drives.is_plain
+            and not (interpolator.is_overlaid or self._load.is_pushed)
         )
 
     def _simulate(self) -> None:
         """Control law, dynamics, and what the sensors show."""
-        m, d = self.model, self.data
+        m, d, carried, interpolator = self.model, self.data, self._carried, self.interpolator
         mujoco.mj_step1(m, d)
         self._load.apply(self.tick_count * TICK)
-        mujoco.mj_fullM(m, d, self._mass)
-        if self._payload.differs:
-            self._payload.believe()
-        watched = self._safety_monitor if self.interpolator.order and not self.safety.latched else None
+        mujoco.mj_fullM(m, d, self._arm.mass)
+        if carried.model.differs:
+            carried.model.believe()
+        watched = carried.torque_monitor if interpolator.order and not self.safety.latched else None
         if watched is not None:
             watched.follow(d)
-        self._drive()
+        self._drives.exert(
+            interpolator.command, is_overlaid=interpolator.is_overlaid, action=interpolator.action
+        )
         mujoco.mj_step2(m, d)
         self._sense()
         if watched is not None:
@@ -472,188 +448,78 @@ class Plant:
     def _publish(self) -> None:
         """Give readers the computed state, and wake those that wait for it: they read it when it is due."""
         self.tick_count = k = self.tick_count + 1
-        if self._native is not None:
-            is_awaited = self._native.publish(k)
-        else:
-            header = self.shared.header
-            self.shared.ints[k % SLOTS, StateWords.SEQ] = 2 * k + 2
-            header[HeaderWords.NEWEST] = k
-            is_awaited = k * TICK_NS >= header[HeaderWords.WAKE]
-        if is_awaited and self.on_wake is not None:
+        if self._native.publish(k) and self.on_wake is not None:
             self.on_wake(k * TICK_NS)
-        if self._seen != self._flags:
-            self._flags = self._seen
+        if self._newest != self._reported:
+            self._reported = self._newest
             if self.on_safety is not None:
-                self.on_safety(self._flags, self._flags >> 32)
-
-    def _drive(self) -> None:
-        """The control law in force: torques of the motors."""
-        interpolator, native = self.interpolator, self._native
-        command = interpolator.command
-        if (
-            native is not None
-            and self._control.is_plain
-            and self._brakes is None
-            and not interpolator.is_overlaid
-        ):
-            native.command(command.before, command.now, command.after)
-        else:
-            sensed = self._sensed
-            sensed.before, sensed.now, sensed.after = command
-            sensed.is_overlaid = interpolator.is_overlaid
-            torque = (
-                self._control.torque(sensed) if self._brakes is None else self._brakes.torque(self._braked)
-            )
-            if interpolator.is_overlaid and interpolator.action is not None:
-                self._control.superpose(torque, interpolator.action)
-            np.minimum(torque, self._limit, out=torque)
-            np.maximum(torque, self._least, out=self._torque)
-            self._tau_cmd[:] = self._torque if self._brakes is None else 0.0
-            self._ctrl[:] = self._torque
-        if self._errors is not None:
-            self._torque -= self._errors.friction(self._dq)
-            self._ctrl[:] = self._torque
+                self.on_safety(self._reported, self._reported >> 32)
 
     def _sense(self) -> None:
         """What the sensors show after the dynamics, and the external load."""
-        load, sensed = self._load, self._sensed
-        if self._native is not None:
-            is_loaded = self._native.sense()
-        else:
-            # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
-            self._tau[:] = self._torque - self._armature * self._acc + self._passive
-            load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - self._torque)
-            is_loaded = bool(load.torque.any())
+        load, is_loaded = self._load, self._native.sense()
         if self._errors is not None:
-            reading = self._errors.read(self._q, self._tau)
-            self._measured[:], self._tau[:] = reading.q, reading.tau
+            arm = self._arm
+            reading = self._errors.read(arm.q, arm.tau)
+            arm.shown[:], arm.tau[:] = reading.q, reading.tau
             load.torque -= reading.tau_error
             is_loaded = True
         load.resolve(is_loaded=is_loaded)
 
     def _advance(self) -> tuple[float, float]:
         """Compute the next set-point; returns progress and remaining time."""
-        if self.safety.latched or self._brakes is not None:
-            self._brake_or_open()
+        if self.safety.latched:
+            self._drives.stop(rests=self.interpolator.rests)
+        elif self._drives.are_braked:
+            self._drives.release(self.interpolator.command)
         return self.interpolator.advance()
 
-    def _supervise(self, monitor: DriveMonitor) -> None:
-        """Let a drive trip: its brakes close at once, wherever the arm is."""
-        is_stiff = self._brakes is None and self._control.is_stiff
-        native = self._native
-        if (
-            native is not None
-            and not monitor.is_strained
-            and not native.strained(self.interpolator.command.after, is_stiff=is_stiff)
-        ):
-            return
-        lag = self.interpolator.command.after - self._q if is_stiff else None
-        reason = monitor.check(self._dq, self._q, self._tau, lag)
+    def _supervise(self) -> None:
+        """End the running command where a drive trips."""
+        reason = self._drives.supervise(self.interpolator.command.after)
         if reason:
-            self._tripped = True
             self.safety.request_stop(StopRequest.DRIVE_ERROR)
             self.interpolator.trip(reason)
-            self._close_brakes()
             log.warning("%s", reason)
 
     def _watch(self, monitor: ExternalTorqueMonitor) -> None:
         """Let a safety function stop the arm on its path."""
-        reason = monitor.check(self._load.torque, self._sensed.mass, self._sensed.bias, self._acc)
+        reason = monitor.check(
+            self._load.torque, self._sensed.mass, self._sensed.bias, self._arm.acceleration
+        )
         if reason:
             self.safety.request_stop(StopRequest.PROTECTIVE_STOP)
             log.warning("%s", reason)
 
-    def _brake_or_open(self) -> None:
-        """Close the brakes when a stop has brought the arm to rest; open them when execution may continue."""
-        if not self.safety.latched:
-            if self._tripped and self._brakes is not None:  # the arm is where the brakes have stopped it
-                self._control.take_over(self._brakes.released(self._braked))
-                self.interpolator.command.stay(self._q)
-            if self._tripped and self._monitor is not None:
-                self._monitor.acknowledge(self._q)
-            self._brakes, self._halted, self._tripped = None, 0, False
-            return
-        if self._tripped:
-            here = self._braked.now
-            np.clip(here, self._q - BRAKE_SLIP, self._q + BRAKE_SLIP, out=here)
-        self._halted = self._halted + 1 if self.interpolator.rests else 0
-        if self._brakes is not None or not self._halted:
-            return
-        if self._halted > BRAKE_TICKS or float(np.abs(self._dq).max()) < BRAKE_SPEED:
-            self._close_brakes()
-
-    def _close_brakes(self) -> None:
-        here = self._q.copy()
-        self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-        self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
-
     def _write(self, progress: float, remaining: float) -> None:
         """Write the state after the next tick into its slot; readers see it after `_publish`."""
-        k, shared, after = self.tick_count + 1, self.shared, self.interpolator.command.after
-        given = self._words()
-        if self._native is not None:
-            self._native.write(k, after, words=given, times=(progress, remaining))
-            return
-        words, reals = shared.ints[k % SLOTS], shared.floats[k % SLOTS]
-        words[StateWords.SEQ] = 2 * k + 1
-        words[StateWords.TIME] = k * TICK_NS
-        q = self._measured
-        reals[StateWords.Q] = q
-        reals[StateWords.Q_CMD] = after
-        reals[StateWords.DQ] = self._dq
-        reals[StateWords.TAU] = self._tau
-        reals[StateWords.TAU_EXT] = self._load.torque
-        reals[StateWords.TAU_CMD] = self._tau_cmd
-        values = q.tolist()
-        (x, y, z), p = flange(self.robot, values)
-        reals[StateWords.POSE] = (*p, *_quaternion(x, y, z))
-        reals[StateWords.WRENCH] = self._load.wrench
-        words[StateWords.FLAGS], words[StateWords.MODE], words[StateWords.ORDER] = given
-        reals[StateWords.PROGRESS], reals[StateWords.REMAINING] = progress, remaining
-        reals[StateWords.E1], words[StateWords.STATUS] = values[2], status_of(self.robot, values)
-        words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
+        after, words = self.interpolator.command.after, self._words()
+        self._native.write(self.tick_count + 1, after, words=words, times=(progress, remaining))
 
     def _words(self) -> tuple[int, int, int]:
         """Flags, operation mode and running command of the next tick."""
         safety, order = self.safety, self.interpolator.order
         flags, mode = safety.flags, safety.mode
-        if self._brakes is None:
+        if not self._drives.are_braked:
             flags |= _BRAKES_OPEN
         if self.interpolator.is_paused or safety.latched:
             flags |= _PAUSED
-        self._seen = flags | mode << 32  # a change of the mode alone is reported, too
+        self._newest = flags | mode << 32  # a change of the mode alone is reported, too
         return (flags | _MOVING if order else flags), mode, order
 
     @property
     def snapshot(self) -> Snapshot:
         """The newest state, copied."""
-        slot = self.shared.floats[self.tick_count % SLOTS]
+        slot, arm = self.shared.floats[self.tick_count % SLOTS], self._arm
         return Snapshot(
             self.tick_count * TICK,
-            self._measured.copy(),
+            arm.shown.copy(),
             self.interpolator.command.after.copy(),
-            self._dq.copy(),
-            self._tau.copy(),
-            self._load.torque.copy(),
-            self._tau_cmd.copy(),
-            self._load.wrench.copy(),
+            arm.dq.copy(),
+            arm.tau.copy(),
+            arm.load.copy(),
+            arm.tau_cmd.copy(),
+            arm.wrench.copy(),
             self.interpolator.order,
             float(slot[StateWords.PROGRESS]),
         )
-
-
-def _quaternion(x: tuple[float, ...], y: tuple[float, ...], z: tuple[float, ...]) -> tuple[float, ...]:
-    """Quaternion x y z w of the columns of a rotation, computed from its largest component."""
-    xx, yy, zz = x[0], y[1], z[2]
-    w = xx + yy + zz
-    if w >= xx and w >= yy and w >= zz:
-        q = (y[2] - z[1], z[0] - x[2], x[1] - y[0], 1.0 + w)
-    elif xx >= yy and xx >= zz:
-        q = (1.0 + xx - yy - zz, x[1] + y[0], x[2] + z[0], y[2] - z[1])
-    elif yy >= zz:
-        q = (x[1] + y[0], 1.0 + yy - xx - zz, y[2] + z[1], z[0] - x[2])
-    else:
-        q = (x[2] + z[0], y[2] + z[1], 1.0 + zz - xx - yy, x[1] - y[0])
-    n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) ** -0.5
-    n = -n if q[3] < 0 else n
-    return q[0] * n, q[1] * n, q[2] * n, q[3] * n

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.payload import NOTHING, LoadedModel
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import Body
 
 #: An external torque beyond the limit that ends sooner does not stop the arm [ticks].

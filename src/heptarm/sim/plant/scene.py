@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.files import read_xml, unreadable
 
 FOLDER = Path(__file__).parents[1] / "scenes"

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Errors of gain and offset of a torque sensor as fractions of reading and highest torque: within the 2 % of KUKA's

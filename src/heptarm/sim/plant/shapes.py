@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from heptarm.errors import require
 from heptarm.sim.plant.appearance import HIDDEN_GROUP
-from heptarm.values.arrays import Array, Value
+from heptarm.values.checks import Array, Value
 
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 

@@ -81,19 +81,19 @@ def arguments(argv: list[str] | None = None) -> SimulatorOptions:
         prog="python -m heptarm.sim.runtime.cabinet", description="A virtual KUKA cabinet."
     )
     types = get_type_hints(SimulatorOptions)
-    for one in fields(SimulatorOptions):
-        kind, how = types[one.name], {"help": one.metadata["help"]}
+    for field in fields(SimulatorOptions):
+        kind, how = types[field.name], {"help": field.metadata["help"]}
         if kind is bool:
-            parser.add_argument(flag(one.name), action="store_true", **how)
+            parser.add_argument(flag(field.name), action="store_true", **how)
             continue
-        if one.metadata["metavar"]:
-            how["metavar"] = one.metadata["metavar"]
-        if isinstance(one.default, tuple):
+        if field.metadata["metavar"]:
+            how["metavar"] = field.metadata["metavar"]
+        if isinstance(field.default, tuple):
             part: Any = get_args(kind)[0]
-            parser.add_argument(flag(one.name), action="append", default=[], type=part, **how)
+            parser.add_argument(flag(field.name), action="append", default=[], type=part, **how)
         else:
             parser.add_argument(
-                flag(one.name), type=Path if one.default is None else kind, default=one.default, **how
+                flag(field.name), type=Path if field.default is None else kind, default=field.default, **how
             )
     found: dict[str, Any] = vars(parser.parse_args(argv))
     values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in found.items()}

@@ -104,9 +104,12 @@ def command_of(order: seam.MotionOrder, java: Any) -> MotionCommand:
     listener = JavaListener(java)
     watches = tuple(
         ConditionWatch(
-            one.condition, partial(java.fired, one.part, one.breaks, one.index), one.breaks, one.part
+            condition.condition,
+            partial(java.fired, condition.part, condition.breaks, condition.index),
+            condition.breaks,
+            condition.part,
         )
-        for one in order.conditions
+        for condition in order.conditions
     )
     return MotionCommand(order.id, order.motion, order.tcp, mode, axes, listener, listener, watches)
 
@@ -252,7 +255,7 @@ class JavaPlant:
             multiplier=given.receive_multiplier,
             port=given.local_port or None,
             transformations=given.transformations,
-            signals=tuple(SessionSignal.of(one) for one in given.signals),
+            signals=tuple(SessionSignal.of(signal) for signal in given.signals),
             channel=channel.changed,
         )
 
@@ -273,8 +276,10 @@ class JavaPlant:
         given = seam.CarriedBodies.decode(bytes(carried.encode()))
         self._plant.carry(
             [
-                CarriedShapes(one.name, tuple(map(_shape, one.shapes)), _pose(one.pose), is_tool=one.is_tool)
-                for one in given.bodies
+                CarriedShapes(
+                    body.name, tuple(map(_shape, body.shapes)), _pose(body.pose), is_tool=body.is_tool
+                )
+                for body in given.bodies
             ]
         )
 

@@ -122,7 +122,7 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     if name == "where":
         return name, [words.split()[1]]
     if name in ("set", "press"):
-        return name, _named(words, name)
+        return name, _word_values(words, name)
     if name == "clear":
         rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
         if rest and rest[0] not in _REQUESTS:
@@ -132,14 +132,14 @@ def understood(words: str) -> tuple[str, list[float | str]]:
         values = [float(one) for one in rest]
     except ValueError:
         raise ValueError(f"{words!r}: the values of {name} must be numbers") from None
-    if name in ("drive_error", "joint_limit") and any(one not in range(1, 8) for one in values):
+    if name in ("drive_error", "joint_limit") and any(value not in range(1, 8) for value in values):
         raise ValueError(f"{words!r}: axis must be 1 to 7, got {values[0]:g}")
     if name == "override" and not 0.0 <= values[0] <= 1.0:
         raise ValueError(f"{words!r}: override must be in [0, 1], got {values[0]:g}")
     return name, list(values)
 
 
-def _named(words: str, name: str) -> list[float | str]:
+def _word_values(words: str, name: str) -> list[float | str]:
     """Values of an action that names a signal or a bar of keys; these are case-sensitive."""
     first, *rest = words.split()[1:]
     if name == "press":

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from xml.etree import ElementTree
 
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import shown
+from heptarm.values.checks import shown
 from heptarm.values.files import read_xml, unreadable
 
 Value = str | int | float | bool
@@ -159,7 +159,7 @@ def read_project(file: Path) -> Project:
         return Project(
             tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
             tuple(frame for world in root.iter("world") for frame in _frames(world, "")),
-            tuple(one for world in root.iter("world") for one in _redundancies(world, "")),
+            tuple(redundancy for world in root.iter("world") for redundancy in _redundancies(world, "")),
         )
     except ValueError as error:
         raise _unreadable(file, str(error)) from None

@@ -7,7 +7,7 @@ that follow each other without a pause, and a machine that was suspended kept it
 A sensor's reading is there at once, a simulated one has to be computed: so a tick whose state somebody waits for begins
 early, by about as long as it takes and as its readers take to wake; they see its state when it is due. With an FRI
 session open it begins when it is due, since the answer to the state before is one of its inputs.
-While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
+While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `Rest`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects what is new
 every few seconds, in the pause between two ticks. To look through all that the waiting motions consist of takes
 milliseconds: that is done while the robot rests, or once a minute.
@@ -27,13 +27,16 @@ import time
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heptarm.planning.seam import TICK_NS, HeaderWords
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.values.simulator_options import RealTime
+
+if TYPE_CHECKING:
+    from heptarm.sim.runtime.rest import Rest
 
 #: A parameter of glibc's mallopt(3).
 _M_ARENA_MAX = -8
@@ -73,16 +76,6 @@ COLLECT_PAUSE = 0.5
 
 _PR_SET_TIMERSLACK = 29
 _HISTORY = 1 << 17
-
-
-class RestingPlant(Protocol):
-    """A plant whose ticks need no simulation while it rests: `heptarm.sim.runtime.rest.Rest`."""
-
-    def begins(self) -> bool:
-        """Whether it rests; asked after each tick."""
-
-    def pass_time(self) -> bool:
-        """Let time pass, publishing the ticks that become due; returns whether the rest is over."""
 
 
 @dataclass(slots=True)
@@ -178,7 +171,7 @@ class RealtimeLoop:
         *,
         speed: float = 1.0,
         real_time: RealTime = "fri",
-        rest: RestingPlant | None = None,
+        rest: Rest | None = None,
     ) -> None:
         self._shared, self._rest, self._real_time = shared, rest, real_time
         self.is_real_time = False
@@ -252,7 +245,7 @@ class RealtimeLoop:
             gc.collect(_NEW)
         self._collected = now
 
-    def _pass_rest(self, rest: RestingPlant) -> None:
+    def _pass_rest(self, rest: Rest) -> None:
         """Let the time pass while the plant rests."""
         header, over = self._shared.header, False
         while not (over or self._stop):

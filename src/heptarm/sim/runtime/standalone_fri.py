@@ -1,4 +1,4 @@
-"""The controller side of FRI without a cabinet application, for any client: `heptarm sim --fri VERSION`.
+"""The controller side of FRI without a cabinet application, for any client: `heptarm sim fri VERSION`.
 
 It behaves like the usual FRI application on a cabinet: it opens a session, holds the position with an overlay as soon
 as the connection is good enough, and reports events. Unlike there, nobody has to restart it: after an error it waits
@@ -15,7 +15,7 @@ from heptarm.errors import ModeConflict
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.sim.fri.faults import FaultScenario
-from heptarm.sim.fri.overlay import HoldingTarget, MotionOverlay, control_mode
+from heptarm.sim.fri.overlay import MotionOverlay, OverlayTarget, control_mode
 from heptarm.sim.fri.server import PORT, Address, Server
 from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import (
@@ -44,8 +44,8 @@ _COMMANDS = {
 }
 
 
-class SimulatedArm(HoldingTarget, Protocol):
-    """An arm that can be ticked, with a shared state that has the time."""
+class SimulatedArm(OverlayTarget, Protocol):
+    """An arm that can be ticked, has the time in a shared state, and can hold its position without an application."""
 
     @property
     def shared(self) -> SharedState:
@@ -53,6 +53,12 @@ class SimulatedArm(HoldingTarget, Protocol):
 
     def tick(self) -> None:
         """One millisecond."""
+
+    def hold(self, mode: Mode) -> None:
+        """Hold the present position in a control mode, until `release`."""
+
+    def release(self) -> None:
+        """End the hold; the arm rests in position control."""
 
 
 #: Usual stiffness beneath a torque overlay [Nm/rad], as public applications choose it.

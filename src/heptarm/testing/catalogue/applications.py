@@ -94,7 +94,7 @@ def _sim(name: str, source: str) -> str:
     with TemporaryDirectory(prefix="heptarm-") as folder:
         (Path(folder) / f"{name}.java").write_text(source, encoding="utf-8")
         (Path(folder) / "RoboticsAPI.data.xml").write_text(_PROJECT, encoding="utf-8")
-        command = [sys.executable, "-m", "heptarm.cli.main", "sim", "--app", folder, "--speed", "2"]
+        command = [sys.executable, "-m", "heptarm.cli.main", "sim", "app", folder, "--speed", "2"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
     if done.returncode:
         last = (done.stderr or done.stdout).strip().splitlines()[-3:]

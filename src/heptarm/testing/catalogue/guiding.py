@@ -12,7 +12,7 @@ from heptarm.testing.catalogue.modes import let_go
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import DEEPEST, HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.motion.line import lin_rel

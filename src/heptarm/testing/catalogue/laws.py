@@ -16,7 +16,7 @@ from heptarm.model.kinematics import forward
 from heptarm.testing.measure import NotShown, above, baseline, below, near
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
 
@@ -153,8 +153,8 @@ def low_pass(arm: Arm) -> None:
         session.params.goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, step]
         _run(session, 1.5)
         states = [one for one in session.history(400) if one.is_answered]
-    t = np.array([one.t for one in states])
-    q = np.array([one.q_sent[6] for one in states]) - HOME[6]
+    t = np.array([state.t for state in states])
+    q = np.array([state.q_sent[6] for state in states]) - HOME[6]
     (moved,) = np.nonzero(q > 1e-9)
     due = 2.0 * math.pi * frequency * (t[moved] - t[moved[0]] + _PERIOD * 1e-3)
     near(q[moved], step * (1.0 - (1.0 + due) * np.exp(-due)), 0.03 * step, "response", unit="rad")
@@ -213,5 +213,5 @@ def search(arm: Arm) -> None:
         near(float(session.memory.done), 1.0, 0.0, "the spiral has its full size")
         _run(session, 1.0)
         states = session.history(200)
-    across = np.linalg.norm([(_place(arm, one.q) - begin)[:2] for one in states], axis=1)
+    across = np.linalg.norm([(_place(arm, state.q) - begin)[:2] for state in states], axis=1)
     near(float(across.max()), amplitude / stiffness, 0.3 * amplitude / stiffness, "radius", unit="m")

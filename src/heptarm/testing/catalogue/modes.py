@@ -10,7 +10,7 @@ from heptarm.errors import HeptarmError, MotionAborted, NotReady
 from heptarm.testing.measure import above, baseline, below, fresh, holds, near, note, record, watch
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.mode.sine import SineImpedance

@@ -9,7 +9,7 @@ from heptarm.arm.arm import Arm
 from heptarm.testing.measure import above, below, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp, ptp_home

@@ -9,7 +9,7 @@ from heptarm.testing.catalogue.motions import near_pose
 from heptarm.testing.measure import above, below, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.circle import arc, circ, normal_of
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.spline import ellipse, spl, spline, spline_joints

@@ -8,7 +8,7 @@ from heptarm.arm.arm import Arm
 from heptarm.testing.catalogue.modes import bent, held, let_go, settled
 from heptarm.testing.measure import above, below, near, record, watch
 from heptarm.testing.scenario import scenario
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.motion import hold

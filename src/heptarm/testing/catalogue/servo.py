@@ -11,7 +11,7 @@ from heptarm.arm.motion.servo import JointServo, PoseServo, Servo
 from heptarm.errors import CollisionForeseen, HeptarmError, MissingExtra, MotionAborted, Starved
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause
 from heptarm.values.state import State
@@ -139,7 +139,7 @@ def poses(arm: Arm) -> None:
         near(arm.wait_for_rest().pose.xyz - start.xyz, (0.0, 0.06, 0.03), 1e-3, f"offset, {engine}", unit="m")
         if engine == "smart":
             stats = servo.stats
-            reasons = [one.reason for one in stats.slowdowns]
+            reasons = [slowdown.reason for slowdown in stats.slowdowns]
             holds(stats.held == 3 and "out of reach" in "".join(reasons), f"held back: {reasons}")
 
 
@@ -208,7 +208,7 @@ def kept_clear(arm: Arm) -> None:
                 reason = error.text
         while servo.tick() and arm.state.pose.distance_to(last) > 2e-3 and servo.t < _ANSWER:
             servo.set(last)
-        gap = min(one.distance for one in model.clearances(arm.state.q))
+        gap = min(clearance.distance for clearance in model.clearances(arm.state.q))
         held = servo.stats.held
     holds(held == 1, f"{held} target was refused: {reason}")
     near(gap, 0.022, 0.005, "distance that is left", unit="m")

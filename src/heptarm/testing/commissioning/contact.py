@@ -6,15 +6,16 @@ import numpy as np
 
 from heptarm import model
 from heptarm.arm.arm import Arm
-from heptarm.sim.control.cartesian_impedance import GUIDED_STIFFNESS
-from heptarm.sim.control.laws import GUIDED, STIFFNESS
+from heptarm.sim.control_laws.cartesian_impedance import GUIDED_STIFFNESS
+from heptarm.sim.control_laws.laws import GUIDED, STIFFNESS
 from heptarm.skills.touch import touch
 from heptarm.testing.commissioning.person import PATIENCE, Person, PersonTask, expect
 from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, near, step
 from heptarm.testing.measure import Unfit, watch
 from heptarm.testing.stage import DEEPEST
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.compliance import compliance
+from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.motion import hold
 from heptarm.when import force
@@ -28,6 +29,8 @@ _HANGING, _SWINGING = 3.0, 1.0
 _UP = 0.05
 #: A weight pulls the flange down by so much, of which the first part does not count [m].
 _FALL, _BEGINNING = 0.1, 0.02
+#: Depth at which the controller ends a fall that this program has not ended, as a deviation from the set-point [m].
+_DEEPEST_FALL = 0.15
 #: Time for which a compliant arm is watched without a weight [s].
 _FREE = 0.5
 
@@ -87,10 +90,23 @@ def stiffness(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     )
 
 
+def _sinking() -> CartesianImpedance:
+    """Vertically compliant. The controller itself ends a fall, by its depth or speed, if this program does not."""
+    mode = compliance("z", frame="base")
+    return CartesianImpedance(
+        mode.stiffness,
+        damping=mode.damping,
+        nullspace_stiffness=mode.nullspace_stiffness,
+        max_velocity=mode.max_velocity,
+        max_deviation={"z": _DEEPEST_FALL},
+        frame=mode.frame,
+    )
+
+
 @step(
     movement=Movement(
         "The flange",
-        "down by 0.2 m at most, pulled by the weight",
+        f"down by {_DEEPEST_FALL:g} m at most, pulled by the weight",
         f"{1000 * GUIDED[0]:g} mm/s; the arm is compliant vertically: hang {MASS:g} kg on the flange and drop it "
         "and drop it when you are asked to",
     ),
@@ -98,7 +114,7 @@ def stiffness(arm: Arm, person: Person) -> tuple[Comparison, ...]:
 )
 def guiding(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     """Does a direction without stiffness resist a weight as assumed, by a critical damper, below the bound of speed?"""
-    handle = arm.start(hold(PATIENCE), mode=compliance("z", frame="base"))
+    handle = arm.start(hold(PATIENCE), mode=_sinking())
     handle.wait_started(PATIENCE)
     free = watch(arm, _FREE)
     begin = free[-1].pose.z

@@ -10,7 +10,7 @@ from heptarm.testing.commissioning.person import Person
 from heptarm.testing.commissioning.step import Comparison, Movement, at_most, largest, near, same, step
 from heptarm.testing.measure import MotionStates, fresh, record
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.motion.line import Lin, lin
 from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp

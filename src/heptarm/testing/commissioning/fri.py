@@ -10,7 +10,7 @@ from heptarm.arm.arm import Arm
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import Quality, SessionState
-from heptarm.sim.fri.controller import MIRROR, MIRRORED, SETTLED
+from heptarm.sim.fri.controller_side import MIRROR, MIRRORED, SETTLED
 from heptarm.testing.commissioning.person import Person
 from heptarm.testing.commissioning.step import (
     Comparison,

@@ -18,8 +18,6 @@ _ASIDE = deg(0, 0, 25, 0, 0, 10, 0)
 #: By which E1 is changed, with the flange held still [deg].
 _FARTHER = 20.0
 _A3 = 2
-#: Axes A5 and A7 coincide here.
-_COAXIAL = deg(0, 45, 0, -90, 0, 0, 0)
 #: Largest difference of angles that are the same [deg].
 _SAME = 0.2
 
@@ -47,24 +45,40 @@ def e1(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     return (*found, _angle("A3 after a line without a redundancy", fresh(arm).q[_A3], farther))
 
 
-@step(
-    movement=Movement(
-        "The arm to 0, 45, 0, -90, 0, 0, 0 deg, and perhaps A5 and A7 against each other",
-        "by up to 170 deg",
-        "a tenth of every axis' speed",
-    ),
-    needs=("ptp",),
-)
-def own_pose(arm: Arm, person: Person) -> tuple[Comparison, ...]:
-    """Do joints that the pose leaves free stay in a motion to the arm's own pose?"""
-    arm.move(ptp(_COAXIAL))
-    arm.wait_for_rest()
-    start = fresh(arm)
-    arm.move(ptp(start.pose))
-    arm.wait_for_rest()
-    moved = np.degrees(np.abs(fresh(arm).q - start.q))
-    arm.move(ptp(HOME))
-    return (near("largest move of a joint", float(moved.max()), 0.0, _SAME, "deg"),)
+def _free_joints(name: str, where: str, *degrees: float) -> None:
+    """Make the step of a posture whose pose leaves joints free."""
+    posture = deg(*degrees)
+
+    def own_pose(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+        arm.move(ptp(posture))
+        arm.wait_for_rest()
+        start = fresh(arm)
+        arm.move(ptp(start.pose))
+        arm.wait_for_rest()
+        moved = np.degrees(np.abs(fresh(arm).q - start.q))
+        arm.move(ptp(HOME))
+        return (near("largest move of a joint", float(moved.max()), 0.0, _SAME, "deg"),)
+
+    own_pose.__name__ = name
+    own_pose.__doc__ = (
+        f"With {where}, do joints that the pose leaves free stay in a motion to the arm's own pose?"
+    )
+    target = ", ".join(f"{angle:g}" for angle in degrees)
+    step(
+        movement=Movement(
+            f"The arm to {target} deg, and perhaps the free joints against each other",
+            "by up to 170 deg",
+            "a tenth of every axis' speed",
+        ),
+        needs=("ptp",),
+    )(own_pose)
+
+
+_free_joints("own_pose_a2", "A2 at 0", 20, 0, 40, -90, 0, 60, 0)
+_free_joints("own_pose_a6", "A6 at 0", 0, 45, 0, -90, 0, 0, 0)
+_free_joints("own_pose_a2_a6", "A2 and A6 at 0", 20, 0, 40, -90, 20, 0, 10)
+_free_joints("own_pose_a4", "A4 at 0", 20, 40, 10, 0, 20, 30, 10)
+_free_joints("own_pose_candle", "all axes at 0", 0, 0, 0, 0, 0, 0, 0)
 
 
 def _angle(quantity: str, measured: float, wanted: float) -> Comparison:

@@ -45,16 +45,16 @@ class StepOutcome:
             "text": self.text,
             "comparisons": [
                 {
-                    "quantity": one.quantity,
-                    "expected": one.expected,
-                    "measured": one.measured,
-                    "agrees": one.agrees,
+                    "quantity": comparison.quantity,
+                    "expected": comparison.expected,
+                    "measured": comparison.measured,
+                    "agrees": comparison.agrees,
                     "value": None
-                    if isinstance(one.value, float) and not math.isfinite(one.value)
-                    else one.value,
-                    "unit": one.unit,
+                    if isinstance(comparison.value, float) and not math.isfinite(comparison.value)
+                    else comparison.value,
+                    "unit": comparison.unit,
                 }
-                for one in self.comparisons
+                for comparison in self.comparisons
             ],
         }
 
@@ -81,7 +81,7 @@ class CommissioningReport:
 
     def count(self, verdict: Agreement) -> int:
         """Number of steps with a verdict."""
-        return sum(one.verdict is verdict for one in self.outcomes)
+        return sum(outcome.verdict is verdict for outcome in self.outcomes)
 
     @property
     def ok(self) -> bool:
@@ -103,7 +103,7 @@ class CommissioningReport:
             "date": self.date,
             "simulated": self.is_simulated,
             "counts": {verdict.value: self.count(verdict) for verdict in Agreement},
-            "steps": [one.data for one in self.outcomes],
+            "steps": [outcome.data for outcome in self.outcomes],
         }
         return json.dumps(data, ensure_ascii=False, indent=1) + "\n"
 
@@ -122,13 +122,21 @@ class CommissioningReport:
         for outcome in self.outcomes:
             if not outcome.comparisons:
                 lines.append(_row(outcome.step.name, outcome.step.question, "", "", outcome.verdict.value))
-            for one in outcome.comparisons:
-                verdict = Agreement.AGREES if one.agrees else Agreement.DIFFERS
-                lines.append(_row(outcome.step.name, one.quantity, one.expected, one.measured, verdict.value))
+            for comparison in outcome.comparisons:
+                verdict = Agreement.AGREES if comparison.agrees else Agreement.DIFFERS
+                lines.append(
+                    _row(
+                        outcome.step.name,
+                        comparison.quantity,
+                        comparison.expected,
+                        comparison.measured,
+                        verdict.value,
+                    )
+                )
         reasons = [one for one in self.outcomes if one.text]
         if reasons:
             lines += ["", "## Reasons", ""]
-            lines += [f"- `{one.step.name}` {one.verdict.value}: {one.text}" for one in reasons]
+            lines += [f"- `{reason.step.name}` {reason.verdict.value}: {reason.text}" for reason in reasons]
         return "\n".join(lines) + "\n"
 
 

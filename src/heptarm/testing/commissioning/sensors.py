@@ -11,7 +11,7 @@ from heptarm.testing.commissioning.person import Person, PersonTask
 from heptarm.testing.commissioning.step import Comparison, Movement, at_most, largest, near, step
 from heptarm.testing.measure import Unfit, record, watch
 from heptarm.testing.stage import HOME
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, instance, integer, one_or_each, shown, within
+from heptarm.values.checks import Array, Value, array, frozen, instance, integer, one_or_each, shown, within
 from heptarm.values.condition.condition import AnyOf, Condition
 from heptarm.values.condition.force import JOINT, JointTorqueOutside
 from heptarm.values.state import State

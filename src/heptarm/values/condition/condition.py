@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Value, shown, within
+from heptarm.values.checks import Value, shown, within
 
 
 def check_band(low: float, high: float, limit: float, unit: str) -> None:

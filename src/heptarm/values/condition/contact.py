@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, shown
+from heptarm.values.checks import Array, Value, array, frozen, shown
 from heptarm.values.pose import Pose
 from heptarm.values.result import Result
 from heptarm.values.text import degrees, fixed, lines

@@ -15,7 +15,7 @@ from math import isnan, nan
 from typing import ClassVar
 
 from heptarm.errors import LimitError
-from heptarm.values.arrays import shown, within, word
+from heptarm.values.checks import shown, within, word
 from heptarm.values.condition.condition import Condition, band_text, check_band
 from heptarm.values.frames import TOOL, check_name
 

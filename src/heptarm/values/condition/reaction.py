@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias, cast, get_args
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Value, shown, within
+from heptarm.values.checks import Value, shown, within
 
 #: Longest retreat [m].
 FARTHEST = 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import finite, shown, within, word
+from heptarm.values.checks import finite, shown, within, word
 from heptarm.values.condition.condition import Condition, band_text, check_band
 from heptarm.values.frames import check_name
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Value, finite, shown
+from heptarm.values.checks import Value, finite, shown
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue

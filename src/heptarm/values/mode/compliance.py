@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import optional, shown, within
+from heptarm.values.checks import optional, shown, within
 from heptarm.values.condition.contact import axis_of
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.directions import DIRECTIONS, one

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, shown, within
+from heptarm.values.checks import Array, Value, array, frozen, one_or_each, shown, within
 
 #: Index of a direction by its name.
 DIRECTIONS = {"x": 0, "y": 1, "z": 2, "c": 3, "b": 4, "a": 5}

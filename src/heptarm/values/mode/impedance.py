@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array, Value, flag, one_or_each, within
+from heptarm.values.checks import Array, Value, flag, one_or_each, within
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.directions import (
     FORCE,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TypeAlias, get_args
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Value, shown
+from heptarm.values.checks import Value, shown
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 

@@ -12,7 +12,7 @@ from math import isnan, nan, pi
 import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, finite, flag, optional, shown
+from heptarm.values.checks import Array, Value, finite, flag, optional, shown
 from heptarm.values.mode.directions import (
     DIRECTIONS,
     FORCE,

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, fractions, frozen, instance, optional, shown, within
+from heptarm.values.checks import Array, Value, fractions, frozen, instance, optional, shown, within
 from heptarm.values.motion.motion import Triggered
 from heptarm.values.robot import RobotModel
 
@@ -116,7 +116,11 @@ def keywords(kind: type) -> Callable[[_Function], _Function]:
 
     def decorate(function: _Function) -> _Function:
         signature = inspect.signature(function)
-        own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
+        own = [
+            parameter
+            for parameter in signature.parameters.values()
+            if parameter.kind is not inspect.Parameter.VAR_KEYWORD
+        ]
         more = [
             inspect.Parameter(
                 name,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError
-from heptarm.values.arrays import Array, array, frozen, optional, word
+from heptarm.values.checks import Array, array, frozen, optional, word
 from heptarm.values.motion.motion import Motion
 
 #: What stops at a limit; what happens to a joint that is beyond its limit at the start.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, array, shown
+from heptarm.values.checks import Array, array, shown
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of

@@ -12,7 +12,7 @@ from math import inf
 from typing import TypeVar
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Value, within
+from heptarm.values.checks import Value, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.trigger import Action, Trigger
 from heptarm.values.robot import RobotModel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import Value, shown
+from heptarm.values.checks import Value, shown
 
 #: From the start's to the end's orientation; the start's throughout; interpolated from the neighbours in a spline; as
 #: the joints turn it in a PTP. In the order of the protocol.

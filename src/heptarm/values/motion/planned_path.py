@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array, Value, array, frozen, instance, within, word
+from heptarm.values.checks import Array, Value, array, frozen, instance, within, word
 from heptarm.values.clearance import Clearance
 from heptarm.values.motion.spline import JointSpline
 from heptarm.values.pose import Pose, check_pose

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array, array
+from heptarm.values.checks import Array, array
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.dynamics import Blended, JointSettings, keywords, settings
 from heptarm.values.pose import Pose, Redundancy, check_pose, deg, given_in, near_of

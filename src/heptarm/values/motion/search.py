@@ -7,7 +7,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from heptarm.values.arrays import Array, Value, within
+from heptarm.values.checks import Array, Value, within
 
 #: Defaults of a spiral: distance between two turns [m] and speed along it [m/s].
 PITCH = 4e-4

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, finite_entries, shown, within
+from heptarm.values.checks import Array, Value, array, finite_entries, shown, within
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.circle import Circ, normal_of
 from heptarm.values.motion.dynamics import (
@@ -236,12 +236,12 @@ def _segment(one: object, index: int) -> Segment:
 
 @keywords(JointSplineSettings)
 def spline_joints(
-    points: Sequence[npt.ArrayLike | Ptp], **limits: Unpack[JointSplineSettings]
+    points: Sequence[npt.ArrayLike | Ptp | PtpPose], **limits: Unpack[JointSplineSettings]
 ) -> JointSpline:
     """Smooth curve in joint space through joint positions.
 
     Args:
-        points: joint positions, shape (7,) [rad], or ptp(...) for a point with limits of its own.
+        points: joint positions, shape (7,) [rad], or ptp(...) of joint positions for a point with limits of its own.
         **limits: dynamics, speed, acceleration and jerk, see `ptp`.
 
     Raises:

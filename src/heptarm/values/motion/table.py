@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from heptarm.values.arrays import Array, shown
+from heptarm.values.checks import Array, shown
 from heptarm.values.files import read_text, unreadable
 
 _WHAT = "a table of joint positions"

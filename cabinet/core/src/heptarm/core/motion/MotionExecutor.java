@@ -28,7 +28,38 @@ import heptarm.wire.ServoOpen;
 import heptarm.wire.StopKind;
 import heptarm.wire.When;
 
-/** Executes programs one after the other and reports their outcome. */
+/**
+ * Executes programs one after the other and reports their outcome.
+ *
+ * <p><b>States of a program.</b> A {@link Program} <i>waits</i> in the queue, <i>runs</i> (there is at most one, {@link
+ * #running}), and has <i>ended</i>. Its items go to the robot one after the other; motions that blend, and no others, as one
+ * batch ({@link BlendedBatches}), since the robot plans a blend only where it has both motions in advance. A program ends when
+ * all its items have ended, or early for a {@link Cause}: cancelled, replaced, stopped, safety, a break condition, failed. The
+ * first cause counts. A safety stop often looks like a failed motion at first; so the robot's state decides which of the two it
+ * was, and a second report may only make the text more precise. While the arm reacts to a break condition (a retreat, say), a
+ * stop may still take the place of that cause: until {@link Program#settle} it is not the final one.
+ *
+ * <p><b>The end is asked for, then awaited.</b> {@link Program#end} notes the cause and cancels the robot's jobs, from the last
+ * to the first so that none starts meanwhile. It does not wait. The motion thread waits until the robot has reported the end of
+ * each item, so the next program starts from an arm at rest, and "finished" is reported once and last. A program that never ran
+ * is reported by the request that ended it. After a failure the waiting programs are dropped: the robot is not where they should start.
+ *
+ * <p><b>An activity</b>, a servo motion or an FRI session that commands the robot, is a program without items: it runs for as
+ * long as its client keeps it open. It starts only while nothing runs or waits, since it begins at the present position, and nobody can
+ * know where that is behind a queue.
+ *
+ * <p><b>Threads.</b> One thread, {@code ha-motion}, calls the robot's {@code start} and nothing else does: the robot executes
+ * motions in the order of these calls, and a call may take as long as the planning of a spline. Requests come from the readers
+ * of all connections, the watchdog and the safety monitor; they take the lock for a moment, change queue or cause, and return,
+ * so a stop never waits for a motion that is being planned. The robot reports starts, segments and ends from threads of its own
+ * ({@link Program#listener}); these only note and wake.
+ *
+ * <p><b>Locks.</b> This object's lock guards {@link #queue}, {@link #running}, {@link #lastId} and {@link #closed}. Each
+ * program's own lock guards its state. They are never held together, and neither while the robot is called or an event is
+ * reported: such a call may block, or come back here. So between two steps of a request the state may change; each step
+ * therefore tolerates a program that has ended meanwhile ({@link Program#adopt} cancels a job that came too late). {@link
+ * #whileIdle} is the one exception: no motion may start while a load is changed, so it holds the lock meanwhile.
+ */
 public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatus.Source {
     private static final int MAX_QUEUED = 1000;
     private static final int MAX_ITEMS = 20000;

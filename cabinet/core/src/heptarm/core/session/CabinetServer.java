@@ -132,7 +132,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         byte[] body = event.body();
         for (ClientConnection client : places.clients) {
             if (client.isOpen()) {
-                client.event(event.type(), body);
+                client.outbox.event(event.type(), body);
             }
         }
     }

@@ -88,19 +88,19 @@ final class DatagramPeer {
             forged++;
             return;
         }
-        int type = (data[PREFIX + 4] & 0xFF) << 8 | data[PREFIX + 5] & 0xFF;
+        int type = FrameEncoder.getU16(data, PREFIX + FrameEncoder.TYPE);
         if (!Messages.byDatagram(type) || !Messages.fromClient(type)) {
             damaged++;
             return;
         }
         int stream = stream(type);
-        long number = FrameEncoder.getInt(data, PREFIX + FrameEncoder.SEQUENCE) & 0xFFFFFFFFL;
+        long number = FrameEncoder.getU32(data, PREFIX + FrameEncoder.SEQUENCE);
         if (number <= newest[stream]) {
             old++;
             return;
         }
         long now = clock.nanos();
-        long sent = (long) FrameEncoder.getInt(data, PREFIX + 18) << 32 | FrameEncoder.getInt(data, PREFIX + 22) & 0xFFFFFFFFL;
+        long sent = FrameEncoder.getLong(data, PREFIX + FrameEncoder.STAMP);
         if (sent < now - (long) (receiver.oldest() * clock.rate() * 1e9)) {
             late++;
             return;
@@ -109,14 +109,14 @@ final class DatagramPeer {
         accepted++;
         from = fromPort;
         heard = Math.max(heard, Math.min(sent, now));
-        handle(type, FrameEncoder.getInt(data, PREFIX + 14) & 0xFFFFFFFFL, sent, data, PREFIX + Protocol.HEADER,
+        handle(type, FrameEncoder.getU32(data, PREFIX + FrameEncoder.REQUEST), sent, data, PREFIX + Protocol.HEADER,
                 end - PREFIX - Protocol.HEADER, now);
     }
 
     private static boolean isFrame(byte[] data, int length, int end) {
         return length <= Protocol.MAX_DATAGRAM && end >= PREFIX + Protocol.HEADER
-                && ((data[PREFIX] & 0xFF) << 8 | data[PREFIX + 1] & 0xFF) == Protocol.MAGIC
-                && (data[PREFIX + 2] & 0xFF) == Protocol.MAJOR && data[PREFIX + FrameEncoder.FLAGS] == FrameEncoder.TAGGED
+                && FrameEncoder.getU16(data, PREFIX) == Protocol.MAGIC
+                && (data[PREFIX + FrameEncoder.VERSION] & 0xFF) == Protocol.MAJOR && data[PREFIX + FrameEncoder.FLAGS] == FrameEncoder.TAGGED
                 && FrameEncoder.getInt(data, PREFIX + FrameEncoder.LENGTH) == end - PREFIX - Protocol.HEADER;
     }
 

@@ -7,14 +7,16 @@ import heptarm.wire.Protocol;
 
 /** Encodes frames; the connection that sends one fills in its sequence number. */
 final class FrameEncoder {
-    /** Offset of the flags in the header. */
+    /** Offsets of the fields of a header; before them is the magic number. */
+    static final int VERSION = 2;
     static final int FLAGS = 3;
+    static final int TYPE = 4;
+    static final int LENGTH = 6;
+    static final int SEQUENCE = 10;
+    static final int REQUEST = 14;
+    static final int STAMP = 18;
     /** Flag of a frame that ends with a tag. */
     static final int TAGGED = 1;
-    /** Offset of the sequence number in the header. */
-    static final int SEQUENCE = 10;
-    /** Offset of the length of the body in the header. */
-    static final int LENGTH = 6;
     /** Initial buffer size [bytes]; most frames fit into it. */
     private static final int CAPACITY = 1024;
 
@@ -54,6 +56,18 @@ final class FrameEncoder {
     private static byte[] withLength(byte[] frame) {
         putInt(frame, LENGTH, frame.length - Protocol.HEADER);
         return frame;
+    }
+
+    static int getU16(byte[] data, int at) {
+        return (data[at] & 0xFF) << 8 | data[at + 1] & 0xFF;
+    }
+
+    static long getU32(byte[] data, int at) {
+        return getInt(data, at) & 0xFFFFFFFFL;
+    }
+
+    static long getLong(byte[] data, int at) {
+        return (long) getInt(data, at) << 32 | getU32(data, at + 4);
     }
 
     static int getInt(byte[] data, int at) {

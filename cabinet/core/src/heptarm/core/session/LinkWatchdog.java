@@ -35,21 +35,21 @@ final class LinkWatchdog implements Watchdog.Check {
         long now = clock.nanos();
         double scale = 1e-9 / clock.rate(); // time-outs of the link are in the client's seconds
         for (ClientConnection client : clients) {
-            client.pingByDatagram();
-            double silence = client.silence() * scale;
-            long writing = client.writeBegan();
+            client.datagrams.ping();
+            double silence = client.silence.confirmed(client.datagrams.heard()) * scale;
+            long writing = client.sent.began();
             if (writing != 0 && (now - writing) * scale > MAX_WRITE) {
                 client.leave("it does not read what it subscribed to");
             } else if (silence > SILENT_HEARTBEATS * heartbeat) {
                 client.goodbye(Code.SILENT, "silent for " + Math.round(silence * 1000) + " ms, at most "
                         + Math.round(SILENT_HEARTBEATS * heartbeat * 1000) + " ms are allowed");
-            } else if (client.silenceOverTcp() * scale > Math.max(MAX_TCP_SILENCE, 2 * SILENT_HEARTBEATS * heartbeat)) {
-                client.goodbye(Code.SILENT, "only datagrams came for " + Math.round(client.silenceOverTcp() * scale) + " s");
+            } else if (client.silence.overTcp() * scale > Math.max(MAX_TCP_SILENCE, 2 * SILENT_HEARTBEATS * heartbeat)) {
+                client.goodbye(Code.SILENT, "only datagrams came for " + Math.round(client.silence.overTcp() * scale) + " s");
             } else if (authority.isController(client) && silence > authority.watchdog()) {
                 authority.lost(client, "silent for " + Math.round(silence * 1000) + " ms, its watchdog time is "
                         + Math.round(authority.watchdog() * 1000) + " ms");
-            } else if ((now - client.lastSent()) * scale > heartbeat) {
-                client.event(Ping.TYPE, new Ping(now).body());
+            } else if ((now - client.sent.lastSent()) * scale > heartbeat) {
+                client.outbox.event(Ping.TYPE, new Ping(now).body());
             }
         }
     }

@@ -55,7 +55,7 @@ final class RequestDispatcher {
                 return;
             }
             if (message instanceof Ping) {
-                client.answer(new Pong(((Ping) message).sent, client.lastReceived()), 0);
+                client.outbox.answer(new Pong(((Ping) message).sent, client.silence.lastReceived()), 0);
                 return;
             }
             if (message instanceof Pong) {
@@ -74,7 +74,7 @@ final class RequestDispatcher {
                 return;
             }
             CommandHandler.validate(message);
-            client.answer(answer(client, message), request);
+            client.outbox.answer(answer(client, message), request);
         } catch (WireException e) {
             reject(client, type, request, new CommandRejected(Code.BAD_BODY, "message " + type + ": " + e.getMessage()));
         } catch (CommandRejected e) {
@@ -132,9 +132,9 @@ final class RequestDispatcher {
         } else if (message instanceof ReleaseControl) {
             authority.release(client, client.name() + " released control");
         } else if (message instanceof OpenDatagrams) {
-            return client.openDatagrams();
+            return client.datagrams.open();
         } else if (message instanceof GetDatagramStatistics) {
-            return client.datagramCounts();
+            return client.datagrams.counts();
         } else {
             return commands.answer(message);
         }
@@ -148,6 +148,6 @@ final class RequestDispatcher {
 
     private static void reject(ClientConnection client, int type, long request, CommandRejected why) {
         long id = CommandHandler.isTarget(type) ? 0 : request; // a target has a number there
-        client.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), id);
+        client.outbox.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), id);
     }
 }

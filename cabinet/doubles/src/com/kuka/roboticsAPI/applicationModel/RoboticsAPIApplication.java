@@ -14,7 +14,7 @@ public abstract class RoboticsAPIApplication extends RoboticsAPITask {
 
     /** Called by a generated {@code main}; no effect, since the cabinet runs applications. */
     public void runApplication() {
-        throw new IllegalStateException("the cabinet runs applications: heptarm sim --app FOLDER --app-class "
+        throw new IllegalStateException("the cabinet runs applications: heptarm sim app FOLDER --app-class "
                 + getClass().getSimpleName());
     }
 

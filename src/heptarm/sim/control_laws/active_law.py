@@ -6,10 +6,16 @@ import mujoco
 import numpy as np
 
 from heptarm.planning.seam import HandGuide
-from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
-from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
-from heptarm.sim.control.laws import ControlLaw, JointImpedanceLaw, MeasuredState, PositionLaw, Superposition
-from heptarm.values.arrays import Array
+from heptarm.sim.control_laws.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
+from heptarm.sim.control_laws.hand_guiding_law import HandGuidingLaw
+from heptarm.sim.control_laws.laws import (
+    ControlLaw,
+    JointImpedanceLaw,
+    MeasuredState,
+    PositionLaw,
+    Superposition,
+)
+from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
 from heptarm.values.mode.sine import SineImpedance
@@ -83,7 +89,8 @@ class ActiveLaw:
         if isinstance(mode, JointImpedance):
             if self.retune(mode):
                 return False
-            self._law, self._frames = JointImpedanceLaw(self._robot, mode.stiffness, mode.damping), None
+            law = JointImpedanceLaw(self._robot, self._flange, mode.stiffness, mode.damping, tcp=tcp[:3])
+            self._law, self._frames = law, None
         elif isinstance(mode, CartesianImpedance | SineImpedance):
             frame = mode.base.frame if isinstance(mode, SineImpedance) else mode.frame
             frames = (tcp, frame, axes)

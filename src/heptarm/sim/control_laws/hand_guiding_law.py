@@ -12,9 +12,9 @@ from math import isnan
 import numpy as np
 
 from heptarm.planning.seam import HandGuide
-from heptarm.sim.control.cartesian_impedance import FlangeKinematics
-from heptarm.sim.control.laws import BRAKING, GUIDED, GUIDED_AXIS, MeasuredState
-from heptarm.values.arrays import Array
+from heptarm.sim.control_laws.cartesian_impedance import FlangeKinematics
+from heptarm.sim.control_laws.laws import BRAKING, GUIDED, GUIDED_AXIS, MeasuredState
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Decay rate of allowed velocities, so that the arm does not drift [1/s].

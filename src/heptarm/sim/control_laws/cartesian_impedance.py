@@ -16,8 +16,8 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import joints
 from heptarm.planning.motion import TICK
-from heptarm.sim.control.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
-from heptarm.values.arrays import Array
+from heptarm.sim.control_laws.laws import GUIDED, GUIDED_AXIS, MeasuredState, braking, freedom
+from heptarm.values.checks import Array
 from heptarm.values.frames import BASE, TOOL
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance

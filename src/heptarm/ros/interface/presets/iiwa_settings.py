@@ -1,4 +1,4 @@
-"""What the services of iiwa_stack have set; see `heptarm.ros.interface.iiwa_stack`."""
+"""What the services of iiwa_stack have set; see `heptarm.ros.interface.presets.iiwa_stack`."""
 
 from __future__ import annotations
 

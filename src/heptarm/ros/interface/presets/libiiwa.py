@@ -18,7 +18,7 @@ from heptarm.errors import CommandRejected, HeptarmError, NotReady, ShapeError
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.motions import joint_target, pose_target
 from heptarm.ros.interface.service import Service, ServiceResponse
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.force import JointTorqueOutside, NormalForceAbove
 from heptarm.values.frames import FLANGE

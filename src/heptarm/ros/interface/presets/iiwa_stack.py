@@ -24,7 +24,7 @@ from heptarm.ros.interface.motions import pose_of, stamped_pose
 from heptarm.ros.interface.service import ServiceResponse
 from heptarm.ros.node.target_stream import StreamLimits
 from heptarm.ros.trajectory.goal import GoalOutcome
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 from heptarm.values.frames import FLANGE, TOOL
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
@@ -383,7 +383,7 @@ def move_to_pose_straight(context: NodeContext, goal: Any) -> GoalWork:
 def move_along_spline(context: NodeContext, goal: Any) -> GoalWork:
     """Move along a spline of poses, lines and arcs."""
     settings = context.iiwa_stack
-    segments = [_segment(context, one) for one in goal.spline.segments]
+    segments = [_segment(context, segment) for segment in goal.spline.segments]
     return _start(context, spline(segments, moving=settings.moving, **settings.path))
 
 

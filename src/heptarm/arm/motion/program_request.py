@@ -16,7 +16,7 @@ from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.translate.motions import in_base, item
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.errors import CommandRejected, ShapeError, inside
-from heptarm.values.arrays import Array, within
+from heptarm.values.checks import Array, within
 from heptarm.values.condition.condition import Condition, check_condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.mode.mode import Mode, check_mode

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import Field
+from dataclasses import MISSING, Field
 from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
@@ -30,6 +30,21 @@ class Value:
     __slots__ = ()
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Keep the short form: a dataclass makes one of its own where its class has none."""
+        super().__init_subclass__(**options)
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = cls.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        """The call that makes it, without what is at its default or left open (NaN)."""
+        given = [
+            f"{name}={getattr(self, name)!r}"
+            for name, field in self.__dataclass_fields__.items()
+            if field.repr and not _is_default(getattr(self, name), field)
+        ]
+        return f"{type(self).__qualname__}({', '.join(given)})"
+
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented
@@ -50,6 +65,13 @@ def _key(value: object) -> object:
     if isinstance(value, np.ndarray):
         return value.tobytes()
     return "nan" if isinstance(value, float) and value != value else value
+
+
+def _is_default(value: object, field: Field[Any]) -> bool:
+    if isinstance(value, (float, np.ndarray)) and np.size(value) and np.isnan(value).all():
+        return True
+    default = field.default if field.default_factory is MISSING else field.default_factory()
+    return _key(value) == _key(default)
 
 
 def frozen(values: npt.ArrayLike) -> Array:
@@ -184,7 +206,7 @@ def within(value: float, name: str, low: float, high: float, *, above: bool = Fa
     if not (low < number if above else low <= number) or not number <= high:
         of_unit = f" {unit}" if unit else ""
         bounds = f"{'(' if above else '['}{low:g}, {high:g}]{of_unit}"
-        meant = other_unit(number, unit)
+        meant = other_unit(number, unit) if unit else _of_percent(number, high)
         raise LimitError(
             f"{name} must be in {bounds}, got {number:g}{of_unit}",
             code=2 if math.isfinite(number) else 1,
@@ -194,6 +216,13 @@ def within(value: float, name: str, low: float, high: float, *, above: bool = Fa
             hint=meant[1] if meant is not None and low <= meant[0] <= high and meant[0] != low else "",
         )
     return number
+
+
+def _of_percent(value: float, high: float) -> tuple[float, str] | None:
+    """What a number without a unit would be if it were given in percent; None: it is no fraction."""
+    if high != 1.0 or not 1.0 < value <= 100.0:
+        return None
+    return value / 100.0, f"it is a fraction: did you mean {value / 100.0:g}?"
 
 
 def other_unit(value: float, unit: str) -> tuple[float, str] | None:
@@ -343,7 +372,8 @@ def fractions(value: npt.ArrayLike | None, name: str, *, nan: bool = False) -> A
     if value is None:
         return frozen(np.full(7, np.nan))
     result = one_or_each(value, 7, name, nan=nan)
+    is_one = np.ndim(value) == 0
     for index, entry in enumerate(result.tolist()):
         if entry == entry:  # not NaN
-            within(entry, f"{name}[{index}]", 0.0, 1.0, above=True)
+            within(entry, name if is_one else f"{name}[{index}]", 0.0, 1.0, above=True)
     return result

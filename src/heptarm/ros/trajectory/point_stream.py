@@ -16,7 +16,7 @@ import numpy as np
 from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal
 from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Longest period of a stream of points [s], and longest window; what ends later is an ordinary trajectory.
@@ -195,7 +195,7 @@ class PointStream:
     def _fit(self, period: float, window: float) -> tuple[Array, Array]:
         """Present position [rad] and velocity [rad/s] of the stream, shape (7,): a straight line through its points."""
         end, last = self._points[-1]
-        recent = [one for one in self._points if end - one[0] <= window]
+        recent = [point for point in self._points if end - point[0] <= window]
         times = np.array([time for time, _ in recent]) - end
         if times[0] > -period / 2.0:
             return last, np.zeros(7)

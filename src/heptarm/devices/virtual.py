@@ -14,7 +14,7 @@ import numpy.typing as npt
 from heptarm.devices.device import REST, DeviceInput, InputDevice, Roles
 from heptarm.errors import CommandRejected
 from heptarm.io.clock import Clock, RealClock
-from heptarm.values.arrays import callback, finite, flag, instance
+from heptarm.values.checks import callback, finite, flag, instance
 from heptarm.values.files import path_of, read_text, refuse_existing, unreadable, unwritable
 from heptarm.values.sealed import Sealed
 

@@ -28,7 +28,7 @@ from heptarm.fri.protocol.codec import decode_command
 from heptarm.fri.protocol.protobuf import MalformedMessage
 from heptarm.fri.protocol.version import Version, is_framed
 from heptarm.planning.seam import TICK_NS
-from heptarm.sim.control.laws import Superposition
+from heptarm.sim.control_laws.laws import Superposition
 from heptarm.sim.fri import cartesian
 from heptarm.sim.fri.io import SessionIo
 from heptarm.sim.fri.limits import COAST, CommandInterpolator, CommandLimits
@@ -43,7 +43,7 @@ from heptarm.sim.fri.settings import (
     SessionConfiguration,
     StateChanged,
 )
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Receive periods for which a session is in MONITORING_READY before an overlay takes it on.

@@ -1,4 +1,4 @@
-"""`heptarm sim --fri VERSION`: the controller side of FRI on a simulated arm, for any FRI client, without a cabinet."""
+"""`heptarm sim fri VERSION`: the controller side of FRI on a simulated arm, for any FRI client, without a cabinet."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ import weakref
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
 
 from heptarm.cli.output import emit, is_silent, lines
+from heptarm.cli.sim.options import ArmOptions
 from heptarm.errors import CommandRejected, ConnectFailed, require
 from heptarm.fri.protocol.messages import IoDirection, IoType, IoValue
 from heptarm.fri.protocol.version import Version
-from heptarm.values.arrays import within
+from heptarm.values.checks import within
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.pose import deg
+from heptarm.values.robot import RobotModel, robot
 
 if TYPE_CHECKING:
     from heptarm.sim.fri.faults import LinkFaults
@@ -35,64 +39,102 @@ _WORDS = {"true": 1.0, "false": 0.0}
 START = (0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0)
 
 
+@Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FriControllerOptions:
-    """Options of `heptarm sim --fri`.
+    """Options of `heptarm sim fri` beside those of the arm; texts are as on the command line."""
 
-    Attributes:
-        version: of FRI, such as "1.15".
-        model: of the robot.
-        command: "monitor", "position", "torque", "wrench" or "pose".
-        client: HOST:PORT where the client listens.
-        period: between two messages [ms].
-        multiplier: the client answers every n-th message.
-        port: the controller's own; None: the client's, or the next free one on the same machine.
-        signals: that the client sees, as `signal` reads them.
-        frames: names of frames that the client is asked for.
-        mode: "position", "joint-impedance" or "cartesian-impedance"; "": the usual one of the command.
-        stiffness: of the impedance, numbers with commas between them; "": the usual one.
-        start: joint positions at the beginning, seven numbers [deg]; "": `START`.
-        force: on the flange from the beginning, three numbers, base axes [N]; "": none.
-        network: faults of the network in both directions, each NAME=VALUE.
-        faults: actions of the operator, each NAME@SECONDS.
-        payload: on the flange, MASS or MASS,X,Y,Z [kg, m]; "": none.
-        sensors: "ideal", "noisy" or "noisy:SEED".
-        speed: simulated seconds per second.
-    """
+    command: Annotated[
+        Literal["monitor", "position", "torque", "wrench", "pose"],
+        Parameter(name="--fri-command", help="What the client may command."),
+    ] = "position"
+    client: Annotated[str, Parameter(name="--fri-client", help="HOST:PORT where the client listens.")] = (
+        "127.0.0.1:30200"
+    )
+    period: Annotated[float, Parameter(name="--fri-period", help="Time between two messages [ms].")] = 5.0
+    multiplier: Annotated[
+        int, Parameter(name="--fri-multiplier", help="The client answers every n-th message.")
+    ] = 1
+    port: Annotated[
+        int | None,
+        Parameter(
+            name="--fri-port",
+            help="UDP port to send from. Default: the client's port, or the next free one.",
+        ),
+    ] = None
+    signals: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--fri-io",
+            help="GROUP.NAME<TYPE is an input that the client reads, GROUP.NAME>TYPE an output that it writes, "
+            "TYPE bool, u8 (or other bits) or analog; may be repeated. Type `set GROUP.NAME VALUE` while it runs.",
+        ),
+    ] = ()
+    frames: Annotated[
+        tuple[str, ...],
+        Parameter(name="--fri-frame", help="Name of a frame that the client is asked for; may be repeated."),
+    ] = ()
+    mode: Annotated[
+        Literal["", "position", "joint-impedance", "cartesian-impedance"],
+        Parameter(
+            name="--fri-mode",
+            help="Control mode under the overlay. Default: position; joint-impedance for torques, "
+            "cartesian-impedance for wrenches.",
+        ),
+    ] = ""
+    stiffness: Annotated[
+        str,
+        Parameter(
+            name="--fri-stiffness",
+            help="Of joint-impedance: one number or seven [Nm/rad], default 200. Of cartesian-impedance: along and "
+            "about the axes, as 2000,200, or six numbers [N/m, Nm/rad], default 2000,200.",
+        ),
+    ] = ""
+    start: Annotated[
+        str,
+        Parameter(name="--fri-start", help="A1,...,A7 at the start [deg]. Default: 0,30,0,-90,0,60,0."),
+    ] = ""
+    force: Annotated[
+        str,
+        Parameter(
+            name="--fri-force",
+            help="FX,FY,FZ on the flange from the start, base axes [N]; --fault 'push 0 0 -20 2@5' pushes for 2 s "
+            "after 5 s.",
+        ),
+    ] = ""
+    network: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--fri-network",
+            help="Fault of the network in both directions, as loss=0.01, delay=0.002 or jitter=0.001: loss, duplicate, "
+            "corrupt, reorder and burst are probabilities, delay, jitter and burst_time [s]; may be repeated.",
+        ),
+    ] = ()
 
-    version: str
-    model: str
-    command: str
-    client: str
-    period: float
-    multiplier: int
-    port: int | None
-    signals: tuple[str, ...]
-    frames: tuple[str, ...]
-    mode: str
-    stiffness: str
-    start: str
-    force: str
-    network: tuple[str, ...]
-    faults: tuple[str, ...]
-    payload: str
-    sensors: str
-    speed: float
+
+_DEFAULTS = FriControllerOptions()
+_ARM = ArmOptions()
 
 
-def run(options: FriControllerOptions, *, verbose: bool, as_json: bool) -> int:
-    """Offer one session after the other until Ctrl-C or SIGTERM; return the exit code.
+def fri(
+    version: Annotated[str, Parameter(help="FRI version, such as 1.15, 2.5 or 2.7.")],
+    /,
+    *,
+    options: FriControllerOptions = _DEFAULTS,
+    arm: ArmOptions = _ARM,
+) -> int:
+    """Run a bare FRI controller, without a cabinet, for any client: one session after the other until Ctrl-C.
 
-    Args:
-        options: what to run.
-        verbose: also print each change of quality.
-        as_json: print objects.
+    For example:
+
+        heptarm sim fri 2.5 --fri-command torque --fri-period 2
 
     Raises:
         CommandRejected: version, command and period do not go together; the text gives the reason.
         ConnectFailed: the port is taken, or the client's address is none.
     """
-    standalone, operator = _made(options, listener=_printer(verbose=verbose, as_json=as_json))
+    model = robot(arm.model or "iiwa14", flange=arm.flange or None)
+    standalone, operator = _made(version, model, options, arm)
     before = {}
     for number in (system.SIGTERM, system.SIGINT):
         if system.getsignal(number) is not system.SIG_IGN:  # a shell's background job ignores Ctrl-C
@@ -100,17 +142,17 @@ def run(options: FriControllerOptions, *, verbose: bool, as_json: bool) -> int:
     controller, own = standalone.server.controller, standalone.server.port
     ready = {
         "ready": True,
-        "fri": options.version,
+        "fri": version,
         "client": options.client,
         "port": own,
-        "model": options.model,
+        "model": model.name,
         "command": options.command,
     }
-    if as_json:
+    if arm.as_json:
         emit(ready)
     else:
         print(
-            f"A virtual {options.model} speaks FRI {options.version} from UDP port {own} to a client on "
+            f"A virtual {model.name} speaks FRI {version} from UDP port {own} to a client on "
             f"{options.client}, every {options.period:g} ms, and offers a {options.command} overlay. Ctrl-C ends it."
         )
         sys.stdout.flush()
@@ -122,7 +164,7 @@ def run(options: FriControllerOptions, *, verbose: bool, as_json: bool) -> int:
     for number, handler in before.items():
         system.signal(number, handler)
     counts = asdict(controller.meter.counts)
-    if as_json:
+    if arm.as_json:
         emit({"ended": True, "answers": counts, "refused": controller.traffic.refused})
     else:
         print(
@@ -133,7 +175,7 @@ def run(options: FriControllerOptions, *, verbose: bool, as_json: bool) -> int:
 
 
 def _made(
-    options: FriControllerOptions, *, listener: Callable[[Event], None]
+    version: str, model: RobotModel, options: FriControllerOptions, arm: ArmOptions
 ) -> tuple[Standalone, SimulatedOperator]:
     """The controller with its arm, and the operator beside it."""
     require("mujoco", extra="sim")
@@ -150,12 +192,11 @@ def _made(
         command_mode,
         usual_mode,
     )
-    from heptarm.values.robot import robot
 
     try:
-        spoken = Version.of(options.version)
+        spoken = Version.of(version)
     except ValueError as error:
-        raise CommandRejected(str(error), parameter="--fri", value=options.version) from None
+        raise CommandRejected(str(error), parameter="--fri", value=version) from None
     command, link = command_mode(options.command), link_faults(options.network)
     settings = StandaloneSettings(
         configuration=SessionConfiguration(
@@ -169,27 +210,28 @@ def _made(
         port=options.port,
         command=command,
         mode=control(options.mode, options.stiffness, usual_mode(command)),
-        speed=within(options.speed, "speed", 0.0, 100.0, above=True),
+        speed=within(arm.speed, "speed", 0.0, 100.0, above=True),
         scenario=FaultScenario(to_client=link, from_client=replace(link, seed=link.seed + 1)),
     )
     start = deg(*(numbers(options.start, "--fri-start", 7) if options.start else START))
-    robot(options.model).check(start, "--fri-start")
+    model.check(start, "--fri-start")
     try:
-        errors = sensor_errors(robot(options.model), options.sensors)
+        errors = sensor_errors(model, arm.sensors)
     except ValueError as error:
-        raise CommandRejected(str(error), parameter="sensors", value=options.sensors) from None
-    plant = Plant(options.model, q=tuple(start.tolist()), errors=errors)
+        raise CommandRejected(str(error), parameter="sensors", value=arm.sensors) from None
+    plant = Plant(model.name, q=tuple(start.tolist()), errors=errors)
     if options.force:
         x, y, z = numbers(options.force, "--fri-force", 3)
         plant.apply_wrench((x, y, z))
     operator = SimulatedOperator(plant)
     try:
-        if options.payload:
-            plant.set_payload(parse_payload(options.payload))
-        for fault in options.faults:
+        if arm.payload:
+            plant.set_payload(parse_payload(arm.payload))
+        for fault in arm.fault:
             operator.schedule(fault)
     except ValueError as error:
         raise CommandRejected(str(error)) from None
+    listener = _printer(verbose=arm.verbose, as_json=arm.as_json)
     return Standalone(OperatedArm(plant, operator), settings, listener=listener), operator
 
 
@@ -228,7 +270,7 @@ def numbers(text: str, name: str, *counts: int) -> tuple[float, ...]:
         CommandRejected: they are not as many, or not finite numbers.
     """
     try:
-        values = tuple(float(one) for one in text.split(","))
+        values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
     if len(values) not in counts or not all(map(isfinite, values)):
@@ -250,7 +292,7 @@ def link_faults(texts: tuple[str, ...]) -> LinkFaults:
     """
     from heptarm.sim.fri.faults import LinkFaults
 
-    known = [one.name for one in fields(LinkFaults) if one.name not in ("silence", "seed")]
+    known = [field.name for field in fields(LinkFaults) if field.name not in ("silence", "seed")]
     values = {}
     for text in texts:
         name, _, value = text.partition("=")

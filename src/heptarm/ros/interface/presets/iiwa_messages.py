@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.ros.interface.messages import RosAdapter, pose_message
-from heptarm.values.arrays import Array
+from heptarm.values.checks import Array
 from heptarm.values.state import State
 
 

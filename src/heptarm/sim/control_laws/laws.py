@@ -8,14 +8,18 @@ motion.
 
 from __future__ import annotations
 
+import ctypes
+import functools
 from dataclasses import dataclass
 from math import exp
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
+from heptarm._library import library
 from heptarm.planning.motion import TICK
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.checks import Array, frozen
 from heptarm.values.robot import RobotModel
 
 #: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's.
@@ -26,6 +30,9 @@ STIFFNESS = frozen([15000.0, 15000.0, 10000.0, 10000.0, 7500.0, 5000.0, 5000.0])
 #: of the arm have damping ratios of 0.6 to 1, and the law is stable at 1 ms in every posture.
 MASS_DAMPING = 90.0
 STIFFNESS_DAMPING = 0.004
+#: All of these for `ht_position` of tick.c.
+GAINS = frozen([*STIFFNESS, MASS_DAMPING, STIFFNESS_DAMPING])
+_GAINS_AT = GAINS.ctypes.data
 #: Time constant with which a preload fades when the brakes have opened [s].
 PRELOAD_FADING = 0.1
 #: Least damping of a joint, also of one without stiffness [Nm s/rad].
@@ -81,6 +88,21 @@ class Superposition:
     wrench: Array | None = None
 
 
+class FlangeMotion(Protocol):
+    """Where the flange is and how it moves with the joints, after `update`.
+
+    Attributes:
+        rotation: of the flange in the base, shape (3, 3).
+        jacobian: of the flange, base axes, shape (6, 7).
+    """
+
+    rotation: Array
+    jacobian: Array
+
+    def update(self) -> None:
+        """Compute them for the present positions."""
+
+
 class ControlLaw(Protocol):
     """A control law in force."""
 
@@ -103,8 +125,21 @@ class ControlLaw(Protocol):
         """Torques of the motors, shape (7,) [Nm]."""
 
 
+@functools.cache
+def _position_law() -> Any:
+    """`ht_position` of tick.c, whose ticks use the same law.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing.
+    """
+    function = library(holds_gil=True).ht_position
+    address = ctypes.c_void_p
+    function.argtypes, function.restype = (address, address, address, ctypes.c_int64), None
+    return function
+
+
 class PositionLaw:
-    """Position control with elastic joints.
+    """Position control with elastic joints: M (q̈_d + a ė) + h + K (e + b ė), with e the distance to the set-point.
 
     The motors follow the set-points; the measured positions are those of the links, which a load deflects from them by
     its torque divided by `STIFFNESS`. Nothing compensates this deflection: the controller knows the gravity of the load
@@ -139,15 +174,30 @@ class PositionLaw:
 
     def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
-        error = sensed.now - sensed.q
-        slip = (sensed.after - sensed.before) * 500.0 - sensed.dq
-        acceleration = (sensed.after - 2 * sensed.now + sensed.before) * 1e6
-        acceleration += MASS_DAMPING * slip
-        torque: Array = sensed.mass @ acceleration + sensed.bias - sensed.passive
-        torque += STIFFNESS * (error + STIFFNESS_DAMPING * slip)
+        torque = self._undisturbed(sensed)
         if self._preload is not None:
             self._preload = self._keeps * self._preload
             torque += self._preload
+        return torque
+
+    @staticmethod
+    def _undisturbed(sensed: MeasuredState) -> Array:
+        """The torques without a preload."""
+        given = np.concatenate(
+            (
+                sensed.before,
+                sensed.now,
+                sensed.after,
+                sensed.q,
+                sensed.dq,
+                sensed.bias,
+                sensed.passive,
+                np.zeros(7),
+            )
+        )
+        mass = sensed.mass
+        _position_law()(_GAINS_AT, given.ctypes.data, mass.ctypes.data, mass.strides[0] // 8)
+        torque: Array = given[49:]
         return torque
 
 
@@ -175,12 +225,15 @@ class JointImpedanceLaw:
 
     The damping ratio is that of each joint alone, with its inertia at the present posture:
     d = 2 ζ √(k m).
-    A joint without stiffness is guided by hand: its damper is a real one, and its speed is bounded.
+    A joint without stiffness is guided by hand: its damper is a real one, and its speed is bounded, as is that of the
+    tool frame.
 
     Args:
         robot: the robot.
+        flange: of the simulated arm.
         stiffness: shape (7,) [Nm/rad].
         damping: ratio, shape (7,).
+        tcp: flange to tool frame, x y z [m].
     """
 
     is_stiff = False
@@ -188,8 +241,17 @@ class JointImpedanceLaw:
     stays = False
     violation = ""
 
-    def __init__(self, robot: RobotModel, stiffness: Array, damping: Array) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        flange: FlangeMotion,
+        stiffness: Array,
+        damping: Array,
+        *,
+        tcp: tuple[float, ...],
+    ) -> None:
         self._fastest = GUIDED_AXIS * robot.dq_max
+        self._flange, self._offset = flange, np.array(tcp)
         self._stiffness = self._from = self._goal = stiffness
         self._damping = damping
         self._ramp = RAMP
@@ -215,6 +277,18 @@ class JointImpedanceLaw:
             torque += damper * ((sensed.after - sensed.before) * 500.0)
         if free.any():
             slip = sensed.dq - (sensed.after - sensed.before) * 500.0
-            fast = np.where(free > 0.0, np.abs(slip) / self._fastest, 0.0)
-            torque += sensed.mass @ braking(slip, float(fast.max()))
+            torque += sensed.mass @ braking(slip, self._too_fast(slip, free > 0.0))
         return torque
+
+    def _too_fast(self, slip: Array, free: npt.NDArray[np.bool_]) -> float:
+        """The largest ratio of a speed to its bound: of the axes that are free, and of the tool frame."""
+        flange = self._flange
+        flange.update()
+        twist = flange.jacobian @ slip
+        along = twist[:3] + np.cross(twist[3:], flange.rotation @ self._offset)
+        fast = np.where(free, np.abs(slip) / self._fastest, 0.0)
+        return max(
+            float(fast.max()),
+            float(np.linalg.norm(along)) / GUIDED[0],
+            float(np.linalg.norm(twist[3:])) / GUIDED[1],
+        )
