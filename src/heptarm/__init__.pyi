@@ -111,6 +111,9 @@ from .errors import (
     NoContact as NoContact,
 )
 from .errors import (
+    NoPath as NoPath,
+)
+from .errors import (
     NotInControl as NotInControl,
 )
 from .errors import (
@@ -247,6 +250,18 @@ from .values.motion.line import (
 )
 from .values.motion.motion import (
     hold as hold,
+)
+from .values.motion.planned_path import (
+    Path as Path,
+)
+from .values.motion.planned_path import (
+    Region as Region,
+)
+from .values.motion.planned_path import (
+    SearchStats as SearchStats,
+)
+from .values.motion.planned_path import (
+    Upright as Upright,
 )
 from .values.motion.ptp import (
     ptp as ptp,

@@ -201,6 +201,30 @@ class CollisionForeseen(CommandRejected):
         self.motion = motion
 
 
+class NoPath(CommandRejected):
+    """No path was found around the bodies of a world; nothing moves.
+
+    Attributes:
+        reason: "start", "goal", "inverse kinematics", "constraint", "not connected" or "time".
+        clearance: the two bodies that are in the way at the start or at the goal; None: not for this reason.
+        states: joint positions that the search has reached.
+        nearest: distance between what is reached from the start and from the goals [rad]; infinite: nothing was.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        *,
+        reason: str = "",
+        clearance: Any = None,
+        states: int = 0,
+        nearest: float = float("inf"),
+        **details: Any,
+    ) -> None:
+        super().__init__(text, **details)
+        self.reason, self.clearance, self.states, self.nearest = reason, clearance, states, nearest
+
+
 class UnknownSetting(CommandRejected, AttributeError):
     """An object has no setting of this name, or it cannot be set; nothing was set."""
 

@@ -52,6 +52,7 @@ ARGUMENTS = {
     "move lin": "0.5 0 0.5 0 0 0",
     "plan ptp": "0 0 0 0 0 0 0",
     "plan lin": "0.5 0 0.5 0 0 0",
+    "plan to": "0.5 0 0.5 0 0 0",
     "teach": "{folder}/taught.npz",
     "replay": "{folder}/recorded.npz",
     "bench": "--fri",

@@ -37,6 +37,7 @@ HOMONYMS: dict[str, str] = {
     "Safety": "FRI's own enumeration beside the group of a state; heptarm.fri.protocol distinguishes them",
     "SessionState": "the states of each of the two protocols: heptarm.wire and heptarm.fri",
     "State": "what a program reads: of an arm (heptarm.State), of an FRI session (heptarm.fri.State)",
+    "Path": "of a motion in conditions (heptarm.when.path), found around bodies (heptarm.Path): the field's word",
     "Policy": "heptarm.fri.Policy for missing commands, heptarm.rl's trained policy: the field's word in both",
 }
 _JAVA = re.compile(

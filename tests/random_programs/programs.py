@@ -200,7 +200,7 @@ class Fri:
 
     @property
     def is_compliant(self) -> bool:
-        """Whether the arm is compliant, or its set-points are the client's, which the judge of motions does not know."""
+        """Whether the arm is compliant, or set-points are the client's, which the judge of motions does not know."""
         return True
 
     def run(self, arm: ha.Arm) -> None:

@@ -13,6 +13,7 @@ import heptarm.do
 import heptarm.fri
 import heptarm.model
 import heptarm.modes
+import heptarm.planning
 import heptarm.shapes
 import heptarm.testing
 import heptarm.when
@@ -26,6 +27,7 @@ from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_o
 
 MODULES = (
     *(heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model, heptarm.shapes),
+    heptarm.planning,
     heptarm.testing,
 )
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
@@ -66,12 +68,14 @@ OBJECTS: dict[str, object] = {
 
 #: Methods that a program has no reason to call; and `save` and `plot`, which draw and write.
 CALLED_BY_HEPTARM = ("given", "longest_duration", "path_time", "plot", "replace", "save", "turn_time")
-#: What a correct call raises here: a state without torques is stale, and there is no file or library.
+#: What a correct call raises here: a state without torques is stale, and there is no file, library or body to remove.
 EXPECTED: dict[str, type[Exception]] = {
     "CollisionGuard.collision": heptarm.StaleState,
     "CollisionGuard.seen": heptarm.StaleState,
     "Trajectory.load": heptarm.CommandRejected,
     "load": heptarm.CommandRejected,
+    "mesh": heptarm.CommandRejected,
+    "CollisionModel.remove": heptarm.CommandRejected,
     "law_from": heptarm.CommandRejected,
 }
 

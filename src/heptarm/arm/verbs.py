@@ -48,11 +48,12 @@ from heptarm.arm.motion.servo import (
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
+from heptarm.planning.search import STATES, TIMEOUT, Goal
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
 from heptarm.values.checks import array, callback, instance, integer, shown, within, word
-from heptarm.values.clearance import CollisionCheck
+from heptarm.values.clearance import CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -60,6 +61,8 @@ from heptarm.values.files import path_of
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.planned_path import Path as FoundPath
+from heptarm.values.motion.planned_path import Upright
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
@@ -538,6 +541,56 @@ class ArmVerbs(Sealed):
             start=None if start is None else array(start, 7, "start"),
             step=within(step, "step", 0.001, 1.0, unit="s"),
             check=None if collision_check is None else _checked(collision_check),
+        )
+
+    def find_path(
+        self,
+        goal: Goal,
+        *,
+        avoid: PlanningWorld | None = None,
+        keep: Upright | None = None,
+        speed: float | None = None,
+        timeout: float = TIMEOUT,
+        states: int = STATES,
+        seed: int = 0,
+        stop: Callable[[], bool] | None = None,
+    ) -> FoundPath:
+        """Find a path around bodies, from where the arm rests, with what is attached to it. Nothing moves.
+
+        The path is a motion: `move(path)` lets the cabinet follow it as a joint spline, also in a program with others.
+        It is checked again before it is sent, against `avoid` as it is then. Needs `pip install 'heptarm[sim]'`.
+
+        It is an aid for programs, no safety function: it knows only the bodies of the model.
+
+        Args:
+            goal: joint positions, shape (7,) [rad]; a pose of the tool frame in the base, with any elbow; a `Region`;
+                or several of these, of which the path reaches one.
+            avoid: model of the bodies, such as a `heptarm.CollisionModel`, whose margin is kept; None:
+                `arm.collision_check`.
+            keep: constraint along the path, such as `Upright("z", within=0.1)`; None: none.
+            speed: ceiling for which its duration is computed, (0, 1]; the lower one of this and `arm.speed`.
+            timeout: longest search [s].
+            states: most joint positions that the search reaches.
+            seed: of its random numbers: the same one finds the same path in the same world.
+            stop: called again and again; the search ends when it returns true.
+
+        Raises:
+            NoPath: none was found; the text has the bodies in the way, or how near it came.
+            ModeConflict: a motion runs.
+            StaleState: the newest state is too old, or lacks the joints.
+            CommandRejected: the model is of another robot; LimitError and ShapeError are such errors.
+            MissingExtra: the planner is not installed.
+        """
+        terms = self._terms(mode=None, speed=speed, until=None, then=None)
+        return self._foresight.find_path(
+            goal,
+            avoid=avoid,
+            keep=keep,
+            speed=terms.speed,
+            timeout=timeout,
+            states=states,
+            seed=seed,
+            stop=stop,
         )
 
     @property

@@ -46,7 +46,7 @@ COMMANDS = {
     "completion": "completion:completion",
 }
 MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin-rel": "motion:move_lin_rel"}
-PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_lin_rel"}
+PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_lin_rel", "to": "plan:plan_to"}
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}

@@ -11,9 +11,12 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, FrameOfPose, Json, Overwrite, Speed
 from heptarm.cli.output import emit
+from heptarm.errors import ShapeError
+from heptarm.planning.search import TIMEOUT
 from heptarm.values.frames import BASE
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.planned_path import Upright
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose
 
@@ -35,11 +38,12 @@ class PlanOptions:
     degrees: Degrees = False
     speed: Speed = 0.1
     scene: Annotated[
-        str, Parameter(help="Check the path for collisions in this scene: a ready one, or a file (MJCF).")
+        str,
+        Parameter(help="Bodies to keep clear of, or to find a path around: a ready scene, or a file (MJCF)."),
     ] = ""
     box: Annotated[
         tuple[str, ...],
-        Parameter(help="Check it against this fixed box: X,Y,Z,LENGTH,WIDTH,HEIGHT [m]; may be repeated."),
+        Parameter(help="Likewise this fixed box: X,Y,Z,LENGTH,WIDTH,HEIGHT [m]; may be repeated."),
     ] = ()
     out: Annotated[
         Path | None, Parameter(name=["--out", "-o"], help="Write a figure: .png, .svg, .pdf or .html.")
@@ -118,12 +122,63 @@ def plan_lin_rel(
     return _plan(lin_rel(x, y, z, *_angles((a, b, c), options), frame=frame), options)
 
 
+def plan_to(
+    goal: Annotated[
+        tuple[float, ...],
+        Parameter(
+            help="Seven joint positions [rad]; or a pose of the tool frame in the base, with any elbow: x y z [m], "
+            "a b c [rad]. Angles with --deg [deg]."
+        ),
+    ],
+    /,
+    *,
+    seed: Annotated[int, Parameter(help="Of the search: the same seed finds the same path.")] = 0,
+    timeout: Annotated[float, Parameter(help="Longest search [s].")] = TIMEOUT,
+    upright: Annotated[
+        float | None,
+        Parameter(
+            help="The z axis of the tool frame is turned by at most so much on the path [rad], --deg [deg]."
+        ),
+    ] = None,
+    options: PlanOptions = _OPTIONS,
+) -> int:
+    """Around the bodies of --scene and --box, to joint positions or a pose.
+
+    For example:
+
+        heptarm plan to 0.5 0.3 0.4 180 0 180 --deg --scene shelf --target lab1
+    """
+    from heptarm.sim.collision import CollisionModel
+
+    if len(goal) not in (6, 7):
+        raise ShapeError(
+            f"goal must be seven joint positions or the six numbers of a pose, got {len(goal)} numbers",
+            parameter="goal",
+            hint="for example heptarm plan to 0 30 0 -90 0 60 0 --deg",
+        )
+    angles = _angles(goal if len(goal) == 7 else goal[3:], options)
+    to = np.array(angles) if len(goal) == 7 else Pose.xyz_abc(*goal[:3], *angles)
+    keep = None if upright is None else Upright("z", within=_angles((upright,), options)[0])
+    with options.target.connect(control=False) as arm:
+        world = CollisionModel(arm.robot.name, scene=options.scene, boxes=options.box)
+        path = arm.find_path(to, avoid=world, keep=keep, speed=options.speed, timeout=timeout, seed=seed)
+        preview = arm.plan(path, speed=options.speed)
+    found = {
+        "path": str(path),
+        "points": [one.q.tolist() for one in path.points],
+        "clearance_m": None if path.clearance is None else path.clearance.distance,
+        "states": path.stats.states,
+        "seconds": path.stats.seconds,
+    }
+    return _show(preview, options, found)
+
+
 def _angles(values: tuple[float, ...], options: PlanOptions) -> list[float]:
     return [float(value) for value in (np.radians(values) if options.degrees else values)]
 
 
 def _plan(motion: Motion, options: PlanOptions) -> int:
-    """Look ahead and print it; the exit code is 1 if bodies would touch."""
+    """Look ahead and print it."""
     with options.target.connect(control=False) as arm:
         check = None
         if options.scene or options.box:
@@ -131,6 +186,11 @@ def _plan(motion: Motion, options: PlanOptions) -> int:
 
             check = CollisionModel(arm.robot.name, scene=options.scene, boxes=options.box)
         preview = arm.plan(motion, speed=options.speed, collision_check=check)
+    return _show(preview, options, {})
+
+
+def _show(preview: ProgramPreview, options: PlanOptions, found: dict[str, Any]) -> int:
+    """Print a preview behind what was found, and draw it; the exit code is 1 if bodies would touch."""
     written: dict[str, Any] = {}
     if options.out is not None:
         from heptarm.record import plot
@@ -139,9 +199,9 @@ def _plan(motion: Motion, options: PlanOptions) -> int:
     if options.show:
         preview.show()
     if options.as_json:
-        emit(preview_data(preview) | written)
+        emit(found | preview_data(preview) | written)
     else:
-        print(preview, *written.values(), sep="\n")
+        print(*([found["path"]] if found else []), preview, *written.values(), sep="\n")
     return 1 if preview.collisions else 0
 
 

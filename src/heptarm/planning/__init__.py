@@ -1,5 +1,12 @@
-"""From commands to trajectories: geometry, inverse kinematics along the path, timing within all limits.
+"""From commands to trajectories: paths, also around bodies, inverse kinematics along them, timing within all limits.
 
 Pure computation, once for each command in the caller's thread; the tick only evaluates the result. Targets and limits
-of a command are in `targets`, a motion or several as one path in `program` and `spline`, its timing in `time_scaling`.
+of a command are in `targets`, a motion or several as one path in `program` and `spline`, its timing in `time_scaling`,
+the search of a path around bodies in `search`.
 """
+
+from heptarm.errors import NoPath
+from heptarm.planning.search import find_path
+from heptarm.values.motion.planned_path import Path, Region, SearchStats, Upright
+
+__all__ = ["NoPath", "Path", "Region", "SearchStats", "Upright", "find_path"]

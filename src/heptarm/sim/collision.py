@@ -13,15 +13,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, ShapeError, require
+from heptarm.errors import CommandRejected, LimitError, ShapeError, require
 from heptarm.values.checks import Array, array, finite_entries, instance, numbers, shown, within
 from heptarm.values.clearance import Clearance, TouchOnPath
+from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose
+from heptarm.values.robot import RobotModel
+from heptarm.values.robot import robot as known
 from heptarm.values.sealed import Sealed
+from heptarm.values.shape import ORIGIN, Shape
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 
 if TYPE_CHECKING:
+    from heptarm.sim.distances import Distances
     from heptarm.sim.plant.carried import CarriedShapes
+    from heptarm.sim.plant.obstacles import Obstacle
     from heptarm.sim.plant.scene import Scene
     from heptarm.sim.plant.world import Box
 
@@ -29,8 +35,14 @@ if TYPE_CHECKING:
 MARGIN = 0.005
 #: Default of the distance up to which clearances are reported [m].
 NEAR = 0.1
-#: Default of the largest movement of a joint between two checks on a path [rad].
-STEP = 0.02
+#: Default of what counts as occupied around a point of a cloud [m].
+POINT_RADIUS = 0.01
+#: Bodies on a path may be nearer than a margin of 0 between two checks, by half of this [m].
+_LEAST_MARGIN = 1e-3
+#: Farther bodies are not looked for on a path: that takes longer than shorter steps [m].
+_FAR = 0.05
+#: Most spheres of a cloud.
+_MOST_SPHERES = 5000
 #: Compiled models that are kept, one for each tool and workpiece that was carried lately.
 _MOST_KEPT = 8
 
@@ -39,7 +51,7 @@ class CollisionModel(Sealed):
     """The collision model of an arm, its tool and its scene; needs `pip install 'heptarm[sim]'`.
 
     It reads joint positions and nothing else, so it serves a robot as well as a simulator. Bodies of the scene stay
-    where its file has them, unless you `place` or `hold` them.
+    where its file has them, unless you `place` or `hold` them; others can be added and removed while a program runs.
 
     A gripper counts as open, as wide as it gets.
 
@@ -47,8 +59,7 @@ class CollisionModel(Sealed):
         robot: name of the robot, such as "iiwa14".
         scene: a ready scene by its name, or a file in MuJoCo's format; "": none. See docs/guide/scenes.md.
         boxes: fixed boxes, each "X,Y,Z,LENGTH,WIDTH,HEIGHT": centre and edges in the base [m].
-        margin: bodies nearer than this count as touching [m], 0 to 0.1. A path is checked at points, so let it cover
-            what is between them.
+        margin: bodies nearer than this count as touching [m], 0 to 0.1.
         allowed: pairs of names of bodies that may touch, such as ("tool", "table").
 
     Raises:
@@ -76,44 +87,42 @@ class CollisionModel(Sealed):
                 value=allowed,
                 hint='for example [("tool", "table")]',
             )
-        self._mujoco: Any = require("mujoco", extra="sim")
+        require("mujoco", extra="sim")
         from heptarm.sim.plant.scene import Scene
         from heptarm.sim.plant.world import Box
-        from heptarm.values.robot import robot as known
 
-        known(robot)
+        self._robot = known(robot)
+        self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
+        self._allowed = frozenset(frozenset(pair) for pair in pairs)
+        self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
+        self._added: dict[str, Obstacle] = {}
+        self._carried: tuple[CarriedShapes, ...] = ()
         try:
             made = [Box.of(text) for text in texts]
             self._models = _Models(robot, made, Scene.of(scene) if scene else None)
-            self._load(self._models.carrying(()))
+            self._distances = self._compiled()
         except ValueError as error:
             if isinstance(error, CommandRejected):
                 raise
             raise CommandRejected(str(error), parameter="scene" if scene else "boxes") from None
-        self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
-        self._allowed = {frozenset(pair) for pair in pairs}
-        self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
 
-    def _load(self, model: Any) -> None:
-        """Take a model; its positions are the initial ones."""
-        from heptarm.sim.plant.gripper import driven_joints, has_gripper
+    def _compiled(self, before: Distances | None = None) -> Distances:
+        """The distances of the present world; free bodies are where they were before."""
+        from heptarm.sim.distances import Distances
 
-        mujoco = self._mujoco
-        self._model, self._data = model, mujoco.MjData(model)
-        if has_gripper(model):  # open, which is where it needs most room
-            for joint in driven_joints(model):
-                self._data.qpos[model.jnt_qposadr[joint]] = model.jnt_range[joint, 1]
-        self._flange = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange"))
-        root = model.body("link_0").id  # the arm and what is mounted on it are of the tree of the base
-        self._is_own = [int(model.body_rootid[body]) == root for body in range(model.nbody)]
-        names = [str(model.body(body).name) for body in range(model.nbody)]
-        self._names = [_plain(name) for name in names]
-        self._is_tool = [name != plain for name, plain in zip(names, self._names, strict=True)]
-        self._free_at = {
-            self._names[int(model.jnt_bodyid[joint])]: int(model.jnt_qposadr[joint])
-            for joint in range(model.njnt)
-            if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-        }
+        model = self._models.carrying(self._carried, tuple(self._added.values()))
+        made = Distances(model, self._allowed)
+        if before is not None:
+            for name in made.free:
+                if name in before.free:
+                    made.put(name, before.place_of(name))
+        made.hold(self._held)
+        return made
+
+    @property
+    def robot(self) -> RobotModel:
+        """The robot and its limits."""
+        return self._robot
 
     @property
     def margin(self) -> float:
@@ -123,48 +132,165 @@ class CollisionModel(Sealed):
     @property
     def allowed(self) -> frozenset[frozenset[str]]:
         """Pairs of names of bodies that may touch."""
-        return frozenset(self._allowed)
+        return self._allowed
 
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies: of the arm, its tool and the scene."""
-        return tuple(self._names[1:])
+        return self._distances.names
+
+    @property
+    def checks(self) -> int:
+        """Postures whose distances were computed since the world was changed last."""
+        return self._distances.checks
 
     # --------------------------------------------------------------------------------- the world
 
-    def place(self, body: str, pose: Pose) -> None:
-        """Put a free body of the scene somewhere: its pose in the base.
+    def add(self, name: str, shape: Shape | Mesh | Sequence[Shape | Mesh], *, at: Pose = ORIGIN) -> None:
+        """Add a body to the world. It can be placed, held and removed.
+
+        Args:
+            name: of the body, of which there is none yet.
+            shape: one of `heptarm.shapes`, or several that are one body: `box`, `sphere`, `cylinder`, `capsule`,
+                `mesh`, `height_map`.
+            at: pose of its frame in the base.
 
         Raises:
-            CommandRejected: the scene has no free body of that name.
+            ShapeError: wrong types.
+            CommandRejected: there is a body of that name, or it would be inside the base of the arm, which never moves.
         """
-        address = self._free(body)
-        check_pose(pose)
+        given = (shape,) if isinstance(shape, Shape | Mesh) else _listed(shape, "shape")
+        if not given:
+            raise ShapeError("shape must have at least one shape, got none", parameter="shape", value=shape)
+        parts: tuple[Shape | Mesh, ...] = tuple(instance(one, (Shape, Mesh), "shape") for one in given)
+        self._add(name, parts, np.zeros((0, 3)), 0.0, at)
+
+    def add_points(
+        self, cloud: npt.ArrayLike, *, radius: float = POINT_RADIUS, name: str = "points", at: Pose = ORIGIN
+    ) -> None:
+        """Add a cloud of points, such as of a depth camera, as one body. Points nearer than `radius` become one sphere.
+
+        Args:
+            cloud: points, shape (n, 3) [m].
+            radius: distance from each point that counts as occupied [m], 0.001 to 0.5.
+            name: of the body, of which there is none yet.
+            at: pose of the cloud's frame, such as of the camera, in the base.
+
+        Raises:
+            ShapeError: not points of shape (n, 3), or none.
+            LimitError: a point that is not finite, a radius outside its range, or more than 5000 spheres.
+            CommandRejected: as in `add`.
+        """
+        from heptarm.sim.plant.obstacles import merged
+
+        points = finite_entries(numbers(cloud, "cloud", "points of shape (n, 3)"), "cloud")
+        if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+            raise ShapeError(
+                f"cloud must be points of shape (n, 3), got shape {points.shape}", parameter="cloud"
+            )
+        size = within(radius, "radius", 1e-3, 0.5, unit="m")
+        centres, covering = merged(points, size)
+        if len(centres) > _MOST_SPHERES:
+            raise LimitError(
+                f"a cloud must have at most {_MOST_SPHERES} points that are {size:g} m apart, got {len(centres)}",
+                code=2,
+                parameter="cloud",
+                value=len(centres),
+                hint="give a larger radius, or leave out what the arm cannot reach",
+            )
+        self._add(name, (), centres, covering, at)
+
+    def _add(
+        self, name: str, parts: tuple[Shape | Mesh, ...], points: Array, radius: float, at: Pose
+    ) -> None:
+        from heptarm.sim.plant.obstacles import Obstacle
+
+        instance(name, str, "name")
+        check_pose(at, "at")
+        if not name or "/" in name or name in ("world", *self._distances.names):
+            raise CommandRejected(
+                f"name must be a new name without a slash, got {shown(name)}",
+                parameter="name",
+                value=name,
+                hint="remove the body of that name first, or place it: bodies are listed in `bodies`",
+            )
+        self._added[name] = Obstacle(name, parts, at, points, radius)
+        try:
+            made = self._compiled(self._distances)
+            self._check_base(made, name)
+        except ValueError as error:
+            del self._added[name]
+            if isinstance(error, CommandRejected):
+                raise
+            raise CommandRejected(f"{name} is no body: {error}", parameter="shape", value=name) from None
+        self._distances = made
+
+    def _check_base(self, made: Distances, name: str) -> None:
+        """Refuse a body inside the base of the arm.
+
+        Raises:
+            CommandRejected: it is inside.
+        """
+        geoms, distances = made.pairs(np.zeros(7), 0.0)
+        for pair, distance in zip(geoms.tolist(), distances.tolist()):
+            names = made.named(*pair)
+            if names == ("link_0", name) and distance < 0.0:
+                raise CommandRejected(
+                    f"{name} would be {-distance * 1e3:.0f} mm inside link_0, the base of the arm, which never moves",
+                    parameter="at",
+                    value=name,
+                    hint="give its pose in the base of the arm [m], or leave out the points on the arm itself",
+                )
+
+    def remove(self, body: str) -> None:
+        """Remove a body that was added.
+
+        Raises:
+            CommandRejected: no body of that name was added.
+        """
+        instance(body, str, "body")
+        if body not in self._added:
+            raise _unknown(body, tuple(self._added), "a body that was added")
+        del self._added[body]
         self._held.pop(body, None)
-        self._put(address, pose)
+        self._distances = self._compiled(self._distances)
+
+    def place(self, body: str, pose: Pose) -> None:
+        """Put a free body of the scene, or one that was added, somewhere: its pose in the base.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        check_pose(pose)
+        if self._held.pop(body, None) is not None:
+            self._distances.hold(self._held)
+        self._distances.put(body, pose)
 
     def hold(self, body: str, pose: Pose) -> None:
-        """Let the arm hold a free body of the scene: from now on it moves with the flange, and may touch the tool.
+        """Let the arm hold a free body: from now on it moves with the flange, and may touch the tool.
 
         Args:
             body: its name.
             pose: of the body in the flange frame, such as `flange.inverse() @ where_it_was_grasped`.
 
         Raises:
-            CommandRejected: the scene has no free body of that name.
+            CommandRejected: there is no free body of that name.
         """
-        self._free(body)
+        self._check_free(body)
         check_pose(pose)
         self._held[body] = pose
+        self._distances.hold(self._held)
 
     def release(self, body: str) -> None:
         """Let the arm hold a body no more; it stays where it was in the last check. See `place`.
 
         Raises:
-            CommandRejected: the scene has no free body of that name.
+            CommandRejected: there is no free body of that name.
         """
-        self._free(body)
+        self._check_free(body)
         self._held.pop(body, None)
+        self._distances.hold(self._held)
 
     def carrying(
         self,
@@ -173,7 +299,7 @@ class CollisionModel(Sealed):
         *,
         at: Pose | None = None,
     ) -> CollisionModel:
-        """The same model, with the scene as it is now, of an arm that carries a tool and a workpiece.
+        """The same model, with the world as it is now, of an arm that carries a tool and a workpiece.
 
         Their shapes are bodies with their names, mounted on the flange. They, the flange and the link before it count
         as neighbours. Where the scene has a tool of its own, that one is on the flange, and the shapes of `tool` are
@@ -194,29 +320,15 @@ class CollisionModel(Sealed):
         if at is not None:
             check_pose(at, "at")
         view = copy(self)
-        view._held = dict(self._held)
-        view._load(self._models.carrying(_carried(tool, workpiece, at)))
-        for name, address in self._free_at.items():
-            pose = self._data.qpos[address : address + 7]
-            view._data.qpos[view._free_at[name] : view._free_at[name] + 7] = pose
+        view._held, view._added = dict(self._held), dict(self._added)
+        view._carried = _carried(tool, workpiece, at)
+        view._distances = view._compiled(self._distances)
         return view
 
-    def _free(self, name: str) -> int:
-        """Where the pose of a free body is in qpos."""
+    def _check_free(self, name: str) -> None:
         instance(name, str, "body")
-        if name not in self._free_at:
-            listed = ", ".join(self._free_at) or "none"
-            raise CommandRejected(
-                f"body must be a free body of the scene, one of {listed}; got {shown(name)}",
-                parameter="body",
-                value=name,
-                allowed=listed,
-            )
-        return self._free_at[name]
-
-    def _put(self, address: int, pose: Pose) -> None:
-        self._data.qpos[address : address + 3] = pose.xyz
-        self._data.qpos[address + 3 : address + 7] = np.roll(pose.quat, 1)
+        if name not in self._distances.free:
+            raise _unknown(name, self._distances.free, "a free body of the scene")
 
     # ------------------------------------------------------------------------------------ checks
 
@@ -243,15 +355,33 @@ class CollisionModel(Sealed):
             if frozenset((one.first, one.second)) not in self._allowed
         )
 
-    def first_on(self, path: npt.ArrayLike, *, step: float = STEP) -> TouchOnPath | None:
+    def distances(self, q: npt.ArrayLike, *, below: float = NEAR) -> Array:
+        """Distance of the nearest two bodies at each of many joint positions; pairs that may touch do not count.
+
+        Args:
+            q: joint positions, shape (n, 7) [rad].
+            below: largest distance that is computed [m], 0 to 1. A smaller one is faster.
+
+        Returns:
+            Shape (n,) [m]; infinite where nothing is nearer than `below`. See `touching` for the names.
+
+        Raises:
+            ShapeError: another shape.
+        """
+        rows, bound = _rows(q, "q"), within(below, "below", 0.0, 1.0, unit="m")
+        return np.array([self._distances.nearest(row, bound) for row in rows])
+
+    def first_on(self, path: npt.ArrayLike) -> TouchOnPath | None:
         """The first place on a joint path at which two bodies touch.
+
+        Bodies are not checked at fixed steps: from where the nearest two are a distance d apart, the arm may move on
+        until one of its points could have moved by d plus `margin` (conservative advancement, Mirtich 1996). So bodies
+        that are apart by `margin` wherever they are checked never meet between two checks, however thin they are.
 
         Pairs that touch at its start already do not count while they do not get nearer: so the arm can leave a contact.
 
         Args:
             path: joint positions, straight from one to the next, shape (n, 7) [rad].
-            step: largest movement of a joint between two checks [rad], 1e-4 to 0.5. At 0.8 m from an axis, 0.02 rad are
-                16 mm.
 
         Returns:
             The place and the nearest pair there; None: nothing touches.
@@ -259,27 +389,53 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: no path.
         """
-        points = finite_entries(numbers(path, "path", "joint positions of shape (n, 7)"), "path")
-        if points.ndim != 2 or points.shape[1] != 7 or not len(points):
-            raise ShapeError(
-                f"path must be joint positions of shape (n, 7), got shape {points.shape}",
-                parameter="path",
-                hint="for example [[0, 0.5, 0, -1.5, 0, 1, 0], [0.3, 0.5, 0, -1.5, 0, 1, 0]]",
-            )
+        points = _rows(path, "path")
         moves = np.abs(np.diff(points, axis=0)).max(axis=1) if len(points) > 1 else np.zeros(0)
         length = float(moves.sum()) or 1.0
-        size = within(step, "step", 1e-4, 0.5, unit="rad")
-        start = {(one.first, one.second): one.distance for one in self.touching(points[0])}
+        known = {(one.first, one.second): one.distance for one in self.touching(points[0])}
         done = 0.0
         for first, last, move in zip(points[:-1], points[1:], moves.tolist()):
-            count = max(1, int(np.ceil(move / size)))
-            for number in range(1, count + 1):
-                q = first + number / count * (last - first)
-                found = self._new(q, start)
-                if found is not None:
-                    return TouchOnPath(found, (done + number / count * move) / length, q)
+            found = self._first_between(first, last, known)
+            if found is not None:
+                clearance, fraction = found
+                return TouchOnPath(
+                    clearance, (done + fraction * move) / length, first + fraction * (last - first)
+                )
             done += move
         return None
+
+    def _first_between(
+        self, first: Array, last: Array, known: dict[tuple[str, str], float]
+    ) -> tuple[Clearance, float] | None:
+        """The first touch on a straight joint path, and the fraction at which it is.
+
+        Args:
+            first: joint positions at its beginning.
+            last: likewise at its end.
+            known: pairs that touch there, and may while they do not get nearer; what is left is taken out.
+        """
+        change = last - first
+        moved, least = self._distances.moved(change), max(self._margin, _LEAST_MARGIN)
+        if not moved:
+            return None
+        at, is_last = 0.0, False
+        distance = self._distances.nearest(first, self._reach(moved)) if not known else self._margin
+        while not is_last:
+            reach = min(max(distance, self._margin), self._reach((1.0 - at) * moved))
+            at += (reach + least) / moved
+            is_last = at >= 1.0
+            at = min(at, 1.0)
+            q = last if is_last else first + at * change
+            distance = self._distances.nearest(q, self._reach((1.0 - at) * moved))
+            if distance < self._margin or known:
+                found = self._new(q, known)
+                if found is not None:
+                    return found, at
+        return None
+
+    def _reach(self, moved: float) -> float:
+        """How far it pays to look for the nearest body when points still move so far [m]."""
+        return min(max(moved, self._margin), max(_FAR, self._margin))
 
     def _new(self, q: Array, start: dict[tuple[str, str], float]) -> Clearance | None:
         """The nearest pair that touches at joint positions and did not at the start, or is nearer now."""
@@ -294,44 +450,13 @@ class CollisionModel(Sealed):
         return None
 
     def _clearances(self, q: Array, below: float) -> tuple[Clearance, ...]:
-        model, data, mujoco = self._model, self._data, self._mujoco
-        model.geom_margin[:] = model.body_margin[:] = below  # of the narrow and of the broad phase
-        data.qpos[:7] = q
-        mujoco.mj_kinematics(model, data)
-        if self._held:
-            at = Pose.of(data.site_xpos[self._flange], _quaternion(mujoco, data.site_xmat[self._flange]))
-            for name, pose in self._held.items():
-                self._put(self._free_at[name], at @ pose)
-            mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_collision(model, data)
         nearest: dict[tuple[str, str], float] = {}
-        for geom_pair, distance in zip(data.contact.geom[: data.ncon], data.contact.dist[: data.ncon]):
-            pair = self._pair(*geom_pair.tolist())
-            if pair is not None and distance <= below:
-                nearest[pair] = min(nearest.get(pair, np.inf), float(distance))
-        found = [Clearance(*pair, distance) for pair, distance in nearest.items()]
+        geoms, distances = self._distances.pairs(q, below)
+        for pair, distance in zip(geoms.tolist(), distances.tolist()):
+            names = self._distances.named(*pair)
+            nearest[names] = min(nearest.get(names, np.inf), distance)
+        found = [Clearance(*names, distance) for names, distance in nearest.items()]
         return tuple(sorted(found, key=lambda one: one.distance))
-
-    def _pair(self, first: int, second: int) -> tuple[str, str] | None:
-        """Names of two shapes' bodies, that of the arm first; None if none is of the arm, its tool or what it holds."""
-        bodies = int(self._model.geom_bodyid[first]), int(self._model.geom_bodyid[second])
-        arm = [self._is_own[body] for body in bodies]
-        held = [self._names[body] in self._held and not own for own, body in zip(arm, bodies)]
-        if not any(arm) and not any(held):
-            return None
-        if any(held) and any(own and self._is_tool[body] for own, body in zip(arm, bodies)):
-            return None  # the gripper touches what it holds
-        names = self._name(first), self._name(second)
-        if all(arm):
-            return (min(names), max(names))
-        is_first = arm[0] or (held[0] and not arm[1])
-        return names if is_first else (names[1], names[0])
-
-    def _name(self, geom: int) -> str:
-        """Name of the body of a shape; of a shape without a body its own."""
-        body = int(self._model.geom_bodyid[geom])
-        return (self._names[body] if body else _plain(self._model.geom(geom).name)) or "world"
 
 
 class _Models:
@@ -345,16 +470,17 @@ class _Models:
 
     def __init__(self, robot: str, boxes: list[Box], scene: Scene | None) -> None:
         self._robot, self._boxes, self._scene = robot, boxes, scene
-        self._made: dict[tuple[CarriedShapes, ...], Any] = {}
+        self._made: dict[tuple[tuple[CarriedShapes, ...], tuple[Obstacle, ...]], Any] = {}
 
-    def carrying(self, carried: tuple[CarriedShapes, ...]) -> Any:
-        """The model of an arm that carries shapes; the last ones are kept."""
+    def carrying(self, carried: tuple[CarriedShapes, ...], obstacles: tuple[Obstacle, ...]) -> Any:
+        """The model of an arm that carries shapes, among bodies that were added; the last ones are kept."""
         from heptarm.sim.plant.world import compiled
 
-        model = self._made.pop(carried, None)
+        key = (carried, obstacles)
+        model = self._made.pop(key, None)
         if model is None:
-            model = compiled(self._robot, self._boxes, self._scene, carried=carried)
-        self._made[carried] = model
+            model = compiled(self._robot, self._boxes, self._scene, carried=carried, obstacles=obstacles)
+        self._made[key] = model
         for oldest in list(self._made)[:-_MOST_KEPT]:
             del self._made[oldest]
         return model
@@ -374,14 +500,34 @@ def _carried(
     return tuple(one for one in found if one.shapes)
 
 
-def _plain(name: str) -> str:
-    from heptarm.sim.plant.carried import plain
-
-    return plain(name)
+def _unknown(name: str, known: tuple[str, ...], what: str) -> CommandRejected:
+    listed = ", ".join(known) or "none"
+    return CommandRejected(
+        f"body must be {what}, one of {listed}; got {shown(name)}",
+        parameter="body",
+        value=name,
+        allowed=listed,
+    )
 
 
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].
 _NEARER = 1e-4
+
+
+def _rows(values: npt.ArrayLike, name: str) -> Array:
+    """Joint positions of shape (n, 7).
+
+    Raises:
+        ShapeError: another shape, or none.
+    """
+    points = finite_entries(numbers(values, name, "joint positions of shape (n, 7)"), name)
+    if points.ndim != 2 or points.shape[1] != 7 or not len(points):
+        raise ShapeError(
+            f"{name} must be joint positions of shape (n, 7), got shape {points.shape}",
+            parameter=name,
+            hint="for example [[0, 0.5, 0, -1.5, 0, 1, 0], [0.3, 0.5, 0, -1.5, 0, 1, 0]]",
+        )
+    return points
 
 
 def _listed(values: object, name: str) -> list[Any]:
@@ -393,10 +539,3 @@ def _listed(values: object, name: str) -> list[Any]:
     if isinstance(values, str | bytes) or not isinstance(values, Iterable):
         raise ShapeError(f"{name} must be a list, got {shown(values)}", parameter=name, value=values)
     return list(values)
-
-
-def _quaternion(mujoco: Any, matrix: Array) -> Array:
-    """Quaternion x y z w of MuJoCo's rotation matrix, shape (4,)."""
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, matrix)
-    return np.roll(quat, -1)

@@ -7,6 +7,7 @@ from typing import Protocol, TypeVar, runtime_checkable
 
 from heptarm.values.checks import Array, Value
 from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
 from heptarm.values.tool import KnownTool, Workpiece
 
 _Model_co = TypeVar("_Model_co", covariant=True)
@@ -82,6 +83,35 @@ class ClearanceModel(Protocol):
 
     def clearances(self, q: Array, *, below: float) -> tuple[Clearance, ...]:
         """Pairs of bodies nearer than a distance [m] at joint positions, shape (7,) [rad]."""
+
+
+@runtime_checkable
+class PlanningWorld(Protocol):
+    """What a search for a path needs; `heptarm.CollisionModel` is one."""
+
+    @property
+    def robot(self) -> RobotModel:
+        """The robot and its limits."""
+
+    @property
+    def margin(self) -> float:
+        """Bodies nearer than this count as touching [m]."""
+
+    @property
+    def checks(self) -> int:
+        """Postures whose distances were computed so far."""
+
+    def distances(self, q: Array, *, below: float) -> Array:
+        """Distance of the nearest two bodies at n joint positions, shape (n, 7) [rad]; shape (n,) [m]."""
+
+    def clearances(self, q: Array, *, below: float) -> tuple[Clearance, ...]:
+        """Pairs of bodies nearer than a distance [m] at joint positions, the nearest first."""
+
+    def touching(self, q: Array) -> tuple[Clearance, ...]:
+        """Pairs of bodies that touch at joint positions, shape (7,) [rad]."""
+
+    def first_on(self, path: Array) -> TouchOnPath | None:
+        """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

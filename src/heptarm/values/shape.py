@@ -35,7 +35,8 @@ _SIZES = {
     "sphere": ("radius",),
     "capsule": ("radius", "length"),
 }
-_ORIGIN = Pose.of((0.0, 0.0, 0.0))
+#: Pose of the frame itself.
+ORIGIN = Pose.of((0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +55,7 @@ class Shape(Value):
 
     kind: ShapeKind
     size: Array
-    pose: Pose = _ORIGIN
+    pose: Pose = ORIGIN
 
     def __post_init__(self) -> None:
         word(self.kind, "kind", get_args(ShapeKind))
@@ -71,7 +72,7 @@ class Shape(Value):
                     value=value,
                     allowed="0",
                 )
-        _check_near(self.pose, "pose")
+        check_near(self.pose, "pose")
 
     def __str__(self) -> str:
         """In words: "cylinder, radius 30.0 mm, length 100.0 mm, at x ..."."""
@@ -80,7 +81,7 @@ class Shape(Value):
         return f"{self.kind}, {sizes}, at {self.pose}"
 
 
-def box(x: float, y: float, z: float, *, at: Pose = _ORIGIN) -> Shape:
+def box(x: float, y: float, z: float, *, at: Pose = ORIGIN) -> Shape:
     """A box.
 
     Args:
@@ -96,7 +97,7 @@ def box(x: float, y: float, z: float, *, at: Pose = _ORIGIN) -> Shape:
     return _made("box", (x, y, z), at)
 
 
-def cylinder(radius: float, length: float, *, at: Pose = _ORIGIN) -> Shape:
+def cylinder(radius: float, length: float, *, at: Pose = ORIGIN) -> Shape:
     """A cylinder along the z axis of `at`.
 
     Args:
@@ -111,7 +112,7 @@ def cylinder(radius: float, length: float, *, at: Pose = _ORIGIN) -> Shape:
     return _made("cylinder", (radius, length), at)
 
 
-def sphere(radius: float, *, at: Pose = _ORIGIN) -> Shape:
+def sphere(radius: float, *, at: Pose = ORIGIN) -> Shape:
     """A sphere.
 
     Args:
@@ -125,7 +126,7 @@ def sphere(radius: float, *, at: Pose = _ORIGIN) -> Shape:
     return _made("sphere", (radius,), at)
 
 
-def capsule(radius: float, length: float, *, at: Pose = _ORIGIN) -> Shape:
+def capsule(radius: float, length: float, *, at: Pose = ORIGIN) -> Shape:
     """A cylinder along the z axis of `at` with a half sphere at both ends.
 
     Args:
@@ -167,11 +168,12 @@ def _made(kind: ShapeKind, sizes: tuple[float, ...], at: Pose) -> Shape:
     checked = [
         within(value, name, 0.0, LARGEST, above=True, unit="m") for name, value in zip(_SIZES[kind], sizes)
     ]
-    _check_near(at, "at")
+    check_near(at, "at")
     return Shape(kind, frozen(np.array(checked + [0.0] * (3 - len(checked)))), at)
 
 
-def _check_near(pose: Pose, name: str) -> None:
+def check_near(pose: Pose, name: str) -> None:
+    """Refuse a pose farther than 2 m from the origin along an axis."""
     check_pose(pose, name)
     for index, value in enumerate(pose.xyz.tolist()):
         within(value, f"{name}.xyz[{index}]", -FARTHEST, FARTHEST, unit="m")

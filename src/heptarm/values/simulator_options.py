@@ -98,7 +98,7 @@ class SimulatorOptions:
     scene: str = field(
         default="",
         metadata=_about(
-            "what is around the arm and on its flange: table, peg-in-hole, bins, or a file in MuJoCo's format",
+            "what is around the arm and on its flange: table, peg-in-hole, bins, shelf, narrow-slot, or a file (MJCF)",
             metavar="NAME|FILE",
             in_target=True,
         ),

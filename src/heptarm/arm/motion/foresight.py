@@ -5,7 +5,8 @@ Both plan with the planner of the virtual cabinet, which needs `pip install 'hep
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise, takewhile
 from typing import TYPE_CHECKING
 
@@ -15,14 +16,16 @@ from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
 from heptarm.arm.motion.program_request import CheckedProgram, ProgramTerms, checked
-from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
+from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, ShapeError, Timeout, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
-from heptarm.values.checks import Array, frozen
-from heptarm.values.clearance import CollisionCheck, ForeseenCollision, TouchOnPath
+from heptarm.planning.search import Goal, find_path
+from heptarm.values.checks import Array, frozen, shown
+from heptarm.values.clearance import CollisionCheck, ForeseenCollision, PlanningWorld, TouchOnPath
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.planned_path import Path, Upright
 from heptarm.values.pose import quaternion
 from heptarm.values.state import State
 from heptarm.values.tool import unknown
@@ -93,7 +96,8 @@ class Foresight:
             MissingExtra: the planner is not installed.
         """
         boundary = self.boundary()
-        if self.check is None and boundary is None:
+        has_path = any(isinstance(one, Path) for one in program.motions)
+        if self.check is None and boundary is None and not has_path:
             return
         state = self._connection.fresh()
         queues = program.terms.when == "queue"
@@ -104,12 +108,13 @@ class Foresight:
             return
         finite = [_BRIEF if isinstance(one.motion, wire.Hold) else one for one in items]
         ahead = self._planned(finite, np.asarray(start), _STEP)
-        check = None if self.check is None else self._tooling.loaded(self.check)
         for index, path in enumerate(_paths(ahead)):
             name = f"motions[{index}]" if len(program.items) > 1 else "motion"
             if boundary is not None:
                 _check_inside(path, boundary, name)
-            touch = None if check is None else check.first_on(path)
+            checks = self._checks(program.motions[index], self.check)
+            touches = (self._tooling.loaded(one).first_on(path) for one in checks)
+            touch = next(filter(None, touches), None)
             if touch is not None:
                 of = f"motions[{index}]: " if len(program.items) > 1 else ""
                 raise CollisionForeseen(
@@ -121,6 +126,56 @@ class Foresight:
                     hint="choose another path; or arm.collision_check = None, if the model of the scene is wrong",
                 )
         self._end = ahead.q[-1] if len(items) == len(program.items) else None
+
+    @staticmethod
+    def _checks(motion: Motion, check: CollisionCheck | None) -> list[CollisionCheck]:
+        """What checks a motion: a model, and of a path the world around which it was found, as it is now."""
+        world = motion.world if isinstance(motion, Path) else None
+        return [one for one in (check, world if world is not check else None) if one is not None]
+
+    def find_path(
+        self,
+        goal: Goal,
+        *,
+        avoid: PlanningWorld | None,
+        keep: Upright | None,
+        speed: float,
+        timeout: float,
+        states: int,
+        seed: int,
+        stop: Callable[[], bool] | None,
+    ) -> Path:
+        """Find a path from where the arm rests; see `Arm.find_path`."""
+        world = self.check if avoid is None else avoid
+        if not isinstance(world, PlanningWorld):
+            raise ShapeError(
+                f"avoid must be a model of bodies, got {shown(world)}",
+                parameter="avoid",
+                value=world,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table"); None: arm.collision_check',
+            )
+        if world.robot.name != self._connection.robot.name:
+            raise CommandRejected(
+                f"avoid must be a model of this robot, the {self._connection.robot.name}, got one of the "
+                f"{world.robot.name}",
+                parameter="avoid",
+                value=world.robot.name,
+                hint="heptarm.CollisionModel(arm.robot.name, ...)",
+            )
+        found = find_path(
+            self._tooling.loaded(world),
+            start=self._rest(),
+            goal=goal,
+            tcp=self._tooling.on_flange(TOOL),
+            keep=keep,
+            speed=speed,
+            timeout=timeout,
+            states=states,
+            seed=seed,
+            stop=stop,
+        )
+        # it is checked with what the arm carries when it is sent, and with the world as it is then
+        return replace(found, world=world)
 
     def preview(
         self,
@@ -149,8 +204,7 @@ class Foresight:
         rows = ((ahead.q[k], ahead.dq[k], ahead.ddq[k]) for k in kept.tolist())
         torques = np.array([inverse_dynamics(robot, *row, load=load) for row in rows])
         tau = np.array([np.interp(ahead.t, ahead.t[kept], column) for column in torques.T]).T
-        used = self.check if check is None else check
-        used = None if used is None else tooling.loaded(used)
+        checks = [self._checks(one, self.check if check is None else check) for one in motions]
         return ProgramPreview(
             robot,
             ahead.t,
@@ -160,10 +214,22 @@ class Foresight:
             frozen(tau),
             self._poses(ahead.q),
             tuple(_listed(motions, ahead)),
-            () if used is None else tuple(_collisions(ahead, used)),
-            used is not None,
+            tuple(self._collisions(ahead, checks)),
+            all(checks),
             terms.until,
         )
+
+    def _collisions(
+        self, program: PlannedProgram, checks: Sequence[Sequence[CollisionCheck]]
+    ) -> Iterator[ForeseenCollision]:
+        """The first touch on the path of each motion, by each of its checks."""
+        bounds = zip(_bounds(program), _paths(program), strict=True)
+        for index, ((first, last), path) in enumerate(bounds):
+            for check in checks[index]:
+                touch = self._tooling.loaded(check).first_on(path)
+                if touch is not None:
+                    t = _time_of(touch, program.t[first : last + 1], path)
+                    yield ForeseenCollision(touch.clearance, t, index, touch.q)
 
     def _planned(self, items: Sequence[wire.Item], start: Array, step: float) -> PlannedProgram:
         """The program as the controller would plan it."""
@@ -236,17 +302,6 @@ def _listed(motions: Sequence[Motion], program: PlannedProgram) -> list[Previewe
     ends = [*program.begins[1:], program.duration]
     rows = zip(motions, program.begins, ends, program.is_blended, strict=True)
     return [PreviewedMotion(type(one).__name__, begin, end - begin, flows) for one, begin, end, flows in rows]
-
-
-def _collisions(program: PlannedProgram, check: CollisionCheck) -> list[ForeseenCollision]:
-    """The first touch on the path of each motion."""
-    found = []
-    for index, ((first, last), path) in enumerate(zip(_bounds(program), _paths(program), strict=True)):
-        touch = check.first_on(path)
-        if touch is not None:
-            t = _time_of(touch, program.t[first : last + 1], path)
-            found.append(ForeseenCollision(touch.clearance, t, index, touch.q))
-    return found
 
 
 def _time_of(touch: TouchOnPath, t: Array, path: Array) -> float:

@@ -23,6 +23,7 @@ from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.circle import Circ, circle_through
 from heptarm.values.motion.line import Lin
 from heptarm.values.motion.motion import Hold, Motion, triggers_of
+from heptarm.values.motion.planned_path import Path
 from heptarm.values.motion.ptp import Ptp, PtpPose
 from heptarm.values.motion.spline import JointSpline, Segment, Spline
 from heptarm.values.pose import Pose
@@ -34,6 +35,8 @@ _WHEN = {"queue": wire.When.QUEUE, "replace": wire.When.REPLACE, "reject": wire.
 _DAY = 86400.0
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
+#: A path may begin so far from where the arm is, in each joint [rad].
+_AT_BEGIN = 0.01
 
 
 def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
@@ -115,13 +118,13 @@ def resolved(
 
     Raises:
         CommandRejected: a set-point is not known yet: another motion runs, or one to a pose or home comes before. Or
-            poses in no fixed frame, or points of an arc that define no circle.
+            poses in no fixed frame, points of an arc that define no circle, or a path that begins elsewhere.
         StaleState: the newest state is too old, or lacks the joints.
     """
     place = _Place(start)
     if start is None and any(isinstance(one, Ptp) and one.keeps for one in motions):
         place = _Place(_rest(connection, connection.fresh()))
-    elif start is None and any(isinstance(one, Circ | Spline) for one in motions):
+    elif start is None and any(isinstance(one, Circ | Spline | Path) for one in motions):
         newest = connection.newest()
         place = _Place(None if newest is None or newest.groups.joints is None else _rest(connection, newest))
     made: list[Motion] = []
@@ -132,6 +135,8 @@ def resolved(
                 one = _with_kept(one, place.q, index)
             elif isinstance(one, Circ | Spline):
                 _check_arcs(one, place.seen(one.moving, tooling))
+            elif isinstance(one, Path) and place.q is not None:
+                _check_begin(one, place.q)
         place = place.behind(one)
         made.append(one)
     return tuple(made)
@@ -153,6 +158,20 @@ def _with_kept(motion: Ptp, known: Array | None, index: int) -> Ptp:
             hint="wait until the arm rests, or give all seven joints",
         )
     return replace(motion, q=np.where(np.isnan(motion.q), known, motion.q))
+
+
+def _check_begin(path: Path, here: Array) -> None:
+    """Refuse a path that begins elsewhere: the joints would move there unchecked."""
+    gap = float(np.abs(path.start - here).max())
+    if gap > _AT_BEGIN:
+        raise CommandRejected(
+            f"the path must begin where the arm is, within {_AT_BEGIN:g} rad, got {gap:.3f} rad at "
+            f"A{int(np.abs(path.start - here).argmax()) + 1}",
+            parameter="motion",
+            value=round(gap, 4),
+            allowed=f"[0, {_AT_BEGIN:g}] rad",
+            hint="find a path from here: arm.find_path(path.end), or move to path.start first",
+        )
 
 
 def _check_arcs(motion: Circ | Spline, start: Pose | None) -> None:

@@ -24,6 +24,7 @@ from heptarm.values.motion.dynamics import DynamicMotion, Dynamics
 from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.line import Lin, LinRel
 from heptarm.values.motion.motion import Hold, Motion
+from heptarm.values.motion.planned_path import Path
 from heptarm.values.motion.ptp import Ptp, PtpPose
 from heptarm.values.motion.spline import JointSpline, Segment, Spl, Spline, placed
 from heptarm.values.pose import Pose
@@ -43,7 +44,8 @@ def item(motion: Motion, robot: RobotModel, *, speed: float = 1.0, **terms: Any)
     Raises:
         LimitError: a target is outside the robot's limits; the text names joint, value and range.
     """
-    message = _message(type(motion).__name__, motion.limited_to(speed), robot)
+    sent = motion.spline if isinstance(motion, Path) else motion
+    message = _message(type(sent).__name__, sent.limited_to(speed), robot)
     terms.setdefault("until", wire.Condition())
     return wire.Item(motion=message, frame=frame_message(getattr(motion, "moving", "")), **terms)
 

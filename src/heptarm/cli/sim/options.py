@@ -112,8 +112,8 @@ class CabinetOptions(ArmOptions):
     scene: Annotated[
         str,
         Parameter(
-            help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, or a file in "
-            "MuJoCo's format (MJCF). Its bodies collide and can be grasped; the view shows them."
+            help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, shelf, "
+            "narrow-slot, or a file (MJCF). Its bodies collide and can be grasped; the view shows them."
         ),
     ] = DEFAULTS.scene
     project: Annotated[

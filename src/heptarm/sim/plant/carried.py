@@ -20,6 +20,8 @@ from heptarm.values.shape import MOST_SHAPES, Shape, ShapeKind
 
 #: Put before the names of bodies of tools and of workpieces, so that they differ from those of arm and scene.
 TOOL_PREFIX, WORKPIECE_PREFIX = "tool/", "workpiece/"
+#: Put before the names of bodies that a program adds to the world, see `heptarm.sim.plant.obstacles`.
+OBSTACLE_PREFIX = "added/"
 #: Red, green, blue and opacity of what is on the flange.
 COLOUR = (0.45, 0.47, 0.5, 1.0)
 #: Name of the body of the running plant that has what is mounted.
@@ -155,8 +157,8 @@ def mujoco_size(kind: ShapeKind, size: Array) -> Array:
 
 
 def plain(name: str) -> str:
-    """The name of a body as its scene, tool or workpiece has it."""
-    for prefix in (PREFIX, TOOL_PREFIX, WORKPIECE_PREFIX):
+    """The name of a body as its scene, tool or workpiece has it, or the program that added it."""
+    for prefix in (PREFIX, TOOL_PREFIX, WORKPIECE_PREFIX, OBSTACLE_PREFIX):
         if name.startswith(prefix):
             return name.removeprefix(prefix)
     return name

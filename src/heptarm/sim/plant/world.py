@@ -12,6 +12,7 @@ import numpy as np
 
 from heptarm.sim.plant.appearance import DRAWN_GROUP, HIDDEN_GROUP, ArmMeshes, undress
 from heptarm.sim.plant.carried import NO_TREES, CarriedShapes, make_room
+from heptarm.sim.plant.obstacles import Obstacle
 from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
@@ -118,6 +119,7 @@ def compiled(
     meshes: ArmMeshes | None = None,
     carried: Sequence[CarriedShapes] = (),
     *,
+    obstacles: Sequence[Obstacle] = (),
     room: bool = False,
     camera: Camera | None = None,
 ) -> mujoco.MjModel:
@@ -129,6 +131,7 @@ def compiled(
         scene: what else is around it and on its flange; None: nothing.
         meshes: see `specification`.
         carried: what is on the flange. Where a scene has a tool, that one is there: the shapes of another are left out.
+        obstacles: free bodies that are added to the world.
         room: whether shapes can be mounted later, see `heptarm.sim.plant.carried.FlangeShapes`.
         camera: from which it is drawn; MuJoCo knows it as `CAMERA`. None: none.
 
@@ -156,7 +159,9 @@ def compiled(
             solref=COMPLIANCE,
             rgba=[0.7, 0.6, 0.45, 1.0],
         )
-    if scene is None and not boxes:
+    for body in obstacles:
+        body.add_to(spec)
+    if scene is None and not boxes and not obstacles:
         # each link has two shapes: a search by trees takes longer than none
         spec.option.disableflags |= NO_TREES
     if camera is not None:

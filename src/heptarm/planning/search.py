@@ -1,0 +1,635 @@
+"""Searches a path around bodies: from joint positions to a goal, within a margin and under a constraint.
+
+Two trees of joint positions grow towards each other (RRT-Connect, Kuffner and LaValle 2000), under a constraint by
+steps that are projected onto it (CBiRRT, Berenson et al. 2009). What they find is shortened, laid on a joint spline
+that is checked again, and timed by the planner of the controller.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import NoPath, ShapeError, require
+from heptarm.model.batch import forward_batch, solve_batch
+from heptarm.model.kinematics import forward, jacobian
+from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
+from heptarm.values.clearance import Clearance, PlanningWorld
+from heptarm.values.motion.planned_path import Path, Region, SearchStats, Upright
+from heptarm.values.motion.ptp import Ptp
+from heptarm.values.pose import Pose, check_pose
+from heptarm.values.robot import RobotModel
+
+#: Defaults of a search: longest time [s], and most joint positions that it reaches.
+TIMEOUT, STATES = 5.0, 20_000
+_ORIGIN = Pose.of((0.0, 0.0, 0.0))
+#: Bodies at the start may overlap by so much: the arm then leaves them first [m].
+_SLIGHT = 0.005
+#: Longest step of a tree [rad], of all joints together; under a constraint.
+_STEP, _SHORT_STEP = 0.8, 0.15
+#: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
+_ELBOWS, _POSES = 36, 24
+#: Most joint positions that stand for the goals.
+_MOST_GOALS = 24
+#: A spline keeps so far from the joint limits, where it can [rad].
+_INSIDE = 0.02
+#: Shortcuts that are tried.
+_SHORTCUTS = 40
+#: Part of a constraint's tolerance that the search uses; the spline may use the rest.
+_USED = 0.7
+#: Times that points are added until the spline is as free as the straight lines.
+_REFINEMENTS = 12
+#: Samples of the spline between two of its points.
+_SAMPLES = 16
+#: Clearances up to this are reported [m].
+_REPORTED = 0.2
+
+Goal = npt.ArrayLike | Pose | Region | Sequence["npt.ArrayLike | Pose | Region"]
+
+
+def find_path(
+    world: PlanningWorld,
+    *,
+    start: npt.ArrayLike,
+    goal: Goal,
+    tcp: Pose = _ORIGIN,
+    keep: Upright | None = None,
+    speed: float = 1.0,
+    timeout: float = TIMEOUT,
+    states: int = STATES,
+    seed: int = 0,
+    stop: Callable[[], bool] | None = None,
+) -> Path:
+    """Find a path around the bodies of a world; no arm is needed, and nothing moves.
+
+    The same seed finds the same path in the same world, however fast the machine is, unless the time runs out.
+
+    Args:
+        world: the bodies, such as a `heptarm.CollisionModel`; its margin is kept.
+        start: joint positions, shape (7,) [rad]. Bodies may touch there slightly; the arm then leaves them.
+        goal: joint positions; a pose of the tool frame, with any elbow; a `Region`; or several of these, of which the
+            path reaches one.
+        tcp: pose of the tool frame in the flange frame.
+        keep: constraint along the whole path; None: none.
+        speed: fraction of each joint's maximum for which the path is timed, (0, 1].
+        timeout: longest time [s], up to 3600.
+        states: most joint positions that it reaches, 10 to 1,000,000.
+        seed: of its random numbers, 0 to 2^32 - 1.
+        stop: called again and again; the search ends when it returns true.
+
+    Raises:
+        NoPath: none was found; `reason`, and the text, have the bodies in the way or how near it came.
+        ShapeError: a wrong type or shape.
+        LimitError: a value outside its range.
+        MissingExtra: the planner is not installed.
+    """
+    if not isinstance(world, PlanningWorld):
+        raise ShapeError(
+            f"world must be a model of bodies, got {shown(world)}",
+            parameter="world",
+            value=world,
+            hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+        )
+    if keep is not None:
+        instance(keep, Upright, "keep")
+    begin = array(start, 7, "start")
+    world.robot.check(begin, "start")
+    check_pose(tcp, "tcp")
+    fraction = within(speed, "speed", 0.0, 1.0, above=True)
+    limits = _Budget(
+        within(timeout, "timeout", 0.0, 3600.0, above=True, unit="s"),
+        integer(states, "states", 10, 10**6),
+        stop,
+    )
+    random = np.random.default_rng(integer(seed, "seed", 0, 2**32 - 1))
+    require("ruckig", extra="sim")
+    checks = world.checks
+    search = _Search(world, begin, tcp, keep, limits, random)
+    search.check_start()
+    goals = search.goals(goal)
+    points, planner = search.connected(goals)
+    points = search.shortened(points)
+    spline = search.smoothed(points, fraction)
+    stats = SearchStats(planner, seed, limits.reached, world.checks - checks, limits.elapsed)
+    return Path(
+        tuple(Ptp(frozen(point)) for point in spline.points[1:]),
+        start=frozen(begin),
+        curve=frozen(spline.curve),
+        duration=spline.duration,
+        clearance=search.nearest_on(spline.curve),
+        stats=stats,
+        world=world,
+    )
+
+
+class _Budget:
+    """What a search may take, and has taken.
+
+    Attributes:
+        reached: joint positions so far.
+    """
+
+    def __init__(self, timeout: float, states: int, stop: Callable[[], bool] | None) -> None:
+        self._begin, self._timeout, self.states, self._stop = time.monotonic(), timeout, states, stop
+        self.reached = 0
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the search began [s]."""
+        return time.monotonic() - self._begin
+
+    @property
+    def is_late(self) -> bool:
+        """Whether its time has run out."""
+        return self.elapsed > self._timeout
+
+    def check(self, nearest: float) -> None:
+        """End a search that has taken too much.
+
+        Raises:
+            NoPath: it has.
+        """
+        is_late = self.is_late
+        is_stopped = self._stop is not None and self._stop()
+        if not (is_late or is_stopped or self.reached >= self.states):
+            return
+        why = "stopped" if is_stopped else f"not found in {self._timeout:g} s" if is_late else "not connected"
+        near = "" if nearest == inf else f", nearest {nearest:.2f} rad"
+        raise NoPath(
+            f"start and goal: {why}: {self.reached:,} states{near}",
+            reason="time" if is_late or is_stopped else "not connected",
+            states=self.reached,
+            nearest=nearest,
+            parameter="goal",
+            hint="give more time or states, another goal, or a smaller margin of the world; perhaps there is no way",
+        )
+
+
+class _Tree:
+    """Joint positions that are connected with a root.
+
+    Args:
+        roots: shape (n, 7) [rad].
+    """
+
+    def __init__(self, roots: Array) -> None:
+        self._q = np.empty((max(256, 2 * len(roots)), 7))
+        self._parents: list[int] = []
+        for root in roots:
+            self.add(root, -1)
+
+    def add(self, q: Array, parent: int) -> int:
+        """Add joint positions; returns their index."""
+        index = len(self._parents)
+        if index == len(self._q):
+            self._q = np.concatenate([self._q, np.empty_like(self._q)])
+        self._q[index] = q
+        self._parents.append(parent)
+        return index
+
+    def nearest(self, q: Array) -> int:
+        """Index of the nearest joint positions."""
+        return int(((self._q[: len(self._parents)] - q) ** 2).sum(axis=1).argmin())
+
+    def at(self, index: int) -> Array:
+        """Joint positions, shape (7,) [rad]."""
+        found: Array = self._q[index].copy()
+        return found
+
+    def back(self, index: int) -> list[Array]:
+        """Joint positions from there to the root."""
+        found = []
+        while index >= 0:
+            found.append(self.at(index))
+            index = self._parents[index]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Spline:
+    """A joint spline.
+
+    Attributes:
+        points: that it passes through, its start among them, shape (n, 7) [rad].
+        curve: joint positions along it, shape (m, 7) [rad].
+        duration: [s].
+    """
+
+    points: Array
+    curve: Array
+    duration: float
+
+
+class _Search:
+    """One search; its parts in the order in which they are called."""
+
+    def __init__(
+        self,
+        world: PlanningWorld,
+        start: Array,
+        tcp: Pose,
+        keep: Upright | None,
+        budget: _Budget,
+        random: np.random.Generator,
+    ) -> None:
+        self._world, self._robot, self._start = world, world.robot, start
+        self._tcp, self._budget, self._random = tcp, budget, random
+        self._cone = None if keep is None else _Cone(world.robot, tcp, keep, start)
+        self._step = _STEP if keep is None else _SHORT_STEP
+
+    # -------------------------------------------------------------------------- start and goals
+
+    def check_start(self) -> None:
+        """Refuse a start at which bodies overlap by more than a little."""
+        deep = [one for one in self._world.touching(self._start) if one.distance < -_SLIGHT]
+        if deep:
+            raise NoPath(
+                f"start is in collision: {deep[0]}; it may overlap by {_SLIGHT * 1e3:g} mm",
+                reason="start",
+                clearance=deep[0],
+                parameter="start",
+                value=round(deep[0].distance, 4),
+                hint="jog the arm away, or correct the model of the world",
+            )
+
+    def goals(self, goal: Goal) -> Array:
+        """Joint positions that reach the goal, the nearest first, shape (n, 7) [rad].
+
+        Raises:
+            NoPath: bodies are in the way at all of them, or the goal cannot be reached.
+        """
+        rows = np.concatenate([self._solutions(one) for one in _each(goal)])
+        if not len(rows):
+            raise NoPath(
+                "goal has no inverse kinematics: it is out of reach, or every arm position that reaches it violates a "
+                "joint limit",
+                reason="inverse kinematics",
+                parameter="goal",
+                hint="bring it nearer, change its orientation, or give a Region",
+            )
+        if self._cone is not None:
+            kept = np.array([self._cone.excess(row) <= 0.0 for row in rows])
+            if not kept.any():
+                raise NoPath(
+                    f"goal contradicts keep: the {self._cone.keep.axis} axis of the tool frame would be turned by "
+                    f"{min(map(self._cone.tilt, rows)):.3f} rad, at most {self._cone.keep.within:g} rad are allowed",
+                    reason="constraint",
+                    parameter="goal",
+                    hint="give a goal with that axis as at the start, or a larger angle",
+                )
+            rows = rows[kept]
+        order = np.abs((rows - self._start) / self._robot.dq_max).max(axis=1).argsort(kind="stable")
+        free: list[Array] = []
+        blocked: list[Array] = []
+        for row in rows[order]:
+            is_free = self._world.distances(row[None], below=self._world.margin)[0] >= self._world.margin
+            (free if is_free else blocked).append(row)
+            if len(free) == _MOST_GOALS:
+                break
+        if free:
+            return np.array(free)
+        best = min((self._world.touching(row) for row in blocked), key=lambda found: -found[0].distance)[0]
+        raise NoPath(
+            f"goal is in collision: {best}",
+            reason="goal",
+            clearance=best,
+            parameter="goal",
+            value=round(best.distance, 4),
+            hint=f"choose a goal with at least {self._world.margin * 1e3:g} mm of clearance",
+        )
+
+    def _solutions(self, goal: Array | Pose | Region) -> Array:
+        """Joint positions of one goal, shape (n, 7) [rad]."""
+        if isinstance(goal, np.ndarray):
+            self._robot.check(goal, "goal")
+            return goal[None]
+        back = self._tcp.inverse()
+        poses = [goal] if isinstance(goal, Pose) else _sampled(goal, self._random)
+        # a region has many poses, of which each needs fewer elbows
+        elbows = _ELBOWS if isinstance(goal, Pose) else _ELBOWS // 6
+        angles = np.linspace(self._robot.q_min[2], self._robot.q_max[2], elbows + 2)[1:-1]
+        e1, status = (
+            np.append(np.repeat(angles, 8), np.full(8, self._start[2])),
+            np.tile(np.arange(8), elbows + 1),
+        )
+        matrices = np.array([(pose @ back).matrix for pose in poses])
+        solved = solve_batch(
+            self._robot,
+            np.repeat(matrices, len(e1), axis=0),
+            e1=np.tile(e1, len(poses)),
+            status=np.tile(status, len(poses)),
+        )
+        found = solved[np.isfinite(solved).all(axis=1)]
+        return found[((found >= self._robot.q_min) & (found <= self._robot.q_max)).all(axis=1)]
+
+    # ------------------------------------------------------------------------------------ search
+
+    def connected(self, goals: Array) -> tuple[list[Array], str]:
+        """Joint positions from the start to a goal, free on the straight lines between them; and the planner."""
+        for goal in goals:
+            self._budget.check(inf)
+            line = self._line(self._start, goal)
+            if line is not None:
+                self._budget.reached += len(line)
+                return [self._start, *line], "straight"
+        name = "RRT-Connect" if self._cone is None else "CBiRRT"
+        one, other, is_swapped, nearest = _Tree(self._start[None]), _Tree(goals), False, inf
+        low = np.minimum(np.minimum(self._robot.q_min + _INSIDE, self._start), goals.min(axis=0))
+        high = np.maximum(np.maximum(self._robot.q_max - _INSIDE, self._start), goals.max(axis=0))
+        while True:
+            self._budget.check(nearest)
+            target = self._random.uniform(low, high)
+            new = self._extend(one, target, steps=1)
+            if new is not None:
+                near = other.nearest(one.at(new))
+                reached = self._extend(other, one.at(new), steps=1000)
+                near = near if reached is None else reached
+                gap = float(np.linalg.norm(other.at(near) - one.at(new)))
+                nearest = min(nearest, gap)
+                if gap < 1e-9:
+                    first, last = (other, near), (one, new)
+                    if not is_swapped:
+                        first, last = last, first
+                    return [*first[0].back(first[1])[::-1], *last[0].back(last[1])[1:]], name
+            one, other, is_swapped = other, one, not is_swapped
+
+    def _line(self, first: Array, last: Array) -> list[Array] | None:
+        """Joint positions behind the first on the way to the last: under a constraint several; None: it is not free."""
+        if self._cone is None:
+            return [last] if self._world.first_on(np.array([first, last])) is None else None
+        tree = _Tree(first[None])
+        end = self._extend(tree, last, steps=1000)
+        if end is None or np.linalg.norm(tree.at(end) - last) > 1e-9:
+            return None
+        return tree.back(end)[-2::-1]
+
+    def _extend(self, tree: _Tree, target: Array, *, steps: int) -> int | None:
+        """Grow a tree towards a target by at most so many steps; the index of what it reaches, None: nothing."""
+        index, result = tree.nearest(target), None
+        for _ in range(steps):
+            here = tree.at(index)
+            gap = target - here
+            length = float(np.linalg.norm(gap))
+            if length < 1e-9:
+                return index
+            there = target if length <= self._step else here + self._step / length * gap
+            if self._cone is not None:
+                obeying = self._projected(here, there, target)
+                if obeying is None:
+                    return result
+                there = obeying
+            if not self._is_free(here, there):
+                half = 0.5 * (here + there)  # nearer to the bodies in the way, but not against them
+                if self._cone is None and self._is_free(here, half):
+                    self._budget.reached += 1
+                    return tree.add(half, index)
+                return result
+            self._budget.reached += 1
+            index = result = tree.add(there, index)
+        return result
+
+    def _is_free(self, here: Array, there: Array) -> bool:
+        """Whether a step is free; its end is checked first, which is most often where it is not."""
+        world = self._world
+        if world.distances(there[None], below=world.margin)[0] < world.margin:
+            return False
+        return world.first_on(np.array([here, there])) is None
+
+    def _projected(self, here: Array, there: Array, target: Array) -> Array | None:
+        """A step that obeys the constraint; None: there is none that gets nearer."""
+        assert self._cone is not None
+        found = self._cone.projected(there)
+        if found is None or (found < self._robot.q_min).any() or (found > self._robot.q_max).any():
+            return None
+        step = float(np.linalg.norm(found - here))
+        is_away = np.linalg.norm(target - found) >= np.linalg.norm(target - here) - 1e-6
+        if is_away or step > 2.0 * self._step or self._cone.excess(0.5 * (here + found)) > 0.0:
+            return None
+        return found
+
+    # -------------------------------------------------------------------------- shorter, smoother
+
+    def shortened(self, points: list[Array]) -> list[Array]:
+        """Fewer and shorter lines: points are left out, and corners cut at random places."""
+        if len(points) < 3:
+            return points
+        kept = [points[0]]
+        index = 0
+        while index < len(points) - 1:  # as far as a straight line is free
+            for further in range(len(points) - 1, index, -1):
+                line = (
+                    [points[further]] if further == index + 1 else self._line(points[index], points[further])
+                )
+                if line is not None:
+                    kept += line
+                    index = further
+                    break
+        for _ in range(_SHORTCUTS):
+            if len(kept) < 3 or self._budget.is_late:
+                break
+            kept = self._cut(kept)
+        return kept
+
+    def _cut(self, points: list[Array]) -> list[Array]:
+        """Replace what is between two random places of a path by a straight line, if it is free and shorter."""
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        marks = np.concatenate([[0.0], np.cumsum(steps)])
+        low, high = np.sort(self._random.uniform(0.0, marks[-1], 2)).tolist()
+        first, last = (int(np.searchsorted(marks, place, side="right")) - 1 for place in (low, high))
+        if first == last:
+            return points
+        ends = []
+        for place, index in ((low, first), (high, min(last, len(steps) - 1))):
+            part = (place - marks[index]) / steps[index]
+            ends.append(points[index] + part * (points[index + 1] - points[index]))
+        if self._cone is not None and any(self._cone.excess(end) > 0.0 for end in ends):
+            return points
+        line = self._line(ends[0], ends[1])
+        if line is None:
+            return points
+        length = float(np.linalg.norm(np.diff([ends[0], *line], axis=0), axis=1).sum())
+        if length > 0.98 * (high - low):
+            return points
+        return [*points[: first + 1], ends[0], *line, *points[min(last, len(steps) - 1) + 1 :]]
+
+    def smoothed(self, points: list[Array], speed: float) -> _Spline:
+        """A joint spline along lines that is as free as they are: points are added where it is not.
+
+        Raises:
+            NoPath: it cannot be timed.
+        """
+        from heptarm.planning.motion import PlanError
+        from heptarm.planning.planner import plan
+        from heptarm.planning.seam import JointDynamics, JointSpline
+        from heptarm.planning.seam import Ptp as PlantPtp
+
+        for curve, through in self._curves(_apart(points)):
+            motion = JointSpline(
+                points=tuple(PlantPtp(q=tuple(one.tolist())) for one in through[1:]),
+                dynamics=JointDynamics(velocity=(speed,) * 7),
+            )
+            try:
+                planned = plan(self._robot, motion, through[0])
+            except PlanError:
+                continue  # it leaves the limits of the joints between two points
+            return _Spline(through, curve, 0.0 if planned.path is None else planned.duration)
+        raise NoPath(
+            "a path was found, but no smooth curve beside it is free and within the limits of the joints",
+            reason="not connected",
+            states=self._budget.reached,
+            parameter="goal",
+            hint="try another seed, or a smaller margin of the world",
+        )
+
+    def _curves(self, points: Array) -> Iterator[tuple[Array, Array]]:
+        """Curves that are free, and the points through which they go: more of them each time."""
+        for _ in range(_REFINEMENTS):
+            curve = _curve(self._robot, points)
+            wrong = self._wrong(curve)
+            if not len(wrong):
+                yield curve, points
+                wrong = np.arange(len(points) - 1)
+            near = np.unique(np.clip(np.concatenate([wrong - 1, wrong, wrong + 1]), 0, len(points) - 2))
+            middles = 0.5 * (points[near] + points[near + 1])
+            points = np.insert(points, near + 1, middles, axis=0)
+
+    def _wrong(self, curve: Array) -> npt.NDArray[np.int64]:
+        """Pieces between two points on which a curve is not free; the first ones, empty: it is free."""
+        outside = ((curve < self._robot.q_min) | (curve > self._robot.q_max)).any(axis=1)
+        if self._cone is not None:
+            outside |= self._cone.tilts(curve) > self._cone.keep.within
+        if outside.any():
+            return np.unique(np.maximum(np.flatnonzero(outside) - 1, 0) // _SAMPLES)
+        touch = self._world.first_on(curve)
+        if touch is None:
+            return np.zeros(0, np.int64)
+        moves = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(curve, axis=0)).max(axis=1))])
+        place = int(np.searchsorted(moves, touch.at * moves[-1])) - 1
+        return np.array([max(place, 0) // _SAMPLES])
+
+    def nearest_on(self, curve: Array) -> Clearance | None:
+        """The nearest two bodies on a curve; None: none are near."""
+        distances = self._world.distances(curve[:: _SAMPLES // 4], below=_REPORTED)
+        worst = curve[:: _SAMPLES // 4][int(distances.argmin())]
+        found = self._world.clearances(worst, below=_REPORTED) if np.isfinite(distances).any() else ()
+        allowed = [one for one in found if one.distance >= distances.min() - 1e-9]
+        return allowed[0] if allowed else None
+
+
+class _Cone:
+    """The constraint that an axis of the tool frame keeps its direction.
+
+    Args:
+        robot: the robot.
+        tcp: pose of the tool frame in the flange frame.
+        keep: the axis and its tolerance.
+        start: joint positions at which the axis has its direction, shape (7,) [rad].
+    """
+
+    def __init__(self, robot: RobotModel, tcp: Pose, keep: Upright, start: Array) -> None:
+        self.keep, self._robot = keep, robot
+        self._axis = tcp.rotation[:, keep.column]  # in the flange frame
+        self._up = forward(robot, start)[:3, :3] @ self._axis
+
+    def tilts(self, q: Array) -> Array:
+        """Angles of the axis from its direction at n joint positions, shape (n,) [rad]."""
+        axes = forward_batch(self._robot, q)[:, :3, :3] @ self._axis
+        return np.asarray(np.arctan2(np.linalg.norm(np.cross(axes, self._up), axis=1), axes @ self._up))
+
+    def tilt(self, q: Array) -> float:
+        """Angle of the axis from its direction [rad]."""
+        return float(self.tilts(q[None])[0])
+
+    def excess(self, q: Array) -> float:
+        """By how much the search would leave its part of the tolerance [rad]; not positive: it does not."""
+        return self.tilt(q) - self.keep.within * 0.5 * (1.0 + _USED)
+
+    def projected(self, q: Array) -> Array | None:
+        """Joint positions nearby that obey the constraint, by Newton's method; None: there are none.
+
+        The rotation that turns the axis back moves the joints by the pseudo-inverse of the Jacobian's part across it.
+        """
+        for _ in range(20):
+            axis = forward(self._robot, q)[:3, :3] @ self._axis
+            turn = np.cross(axis, self._up)
+            sine = float(np.linalg.norm(turn))
+            angle = float(np.arctan2(sine, axis @ self._up))
+            most = self.keep.within * _USED
+            if angle <= most:
+                return q
+            if sine < 1e-9:
+                return None
+            wanted = turn / sine * (angle - 0.9 * most)
+            rows = jacobian(self._robot, q)[3:]
+            across = np.eye(3) - np.outer(axis, axis)  # a turn about the axis itself does not count
+            q = q + np.linalg.pinv(across @ rows, rcond=1e-3) @ wanted
+        return None
+
+
+def _sampled(region: Region, random: np.random.Generator) -> list[Pose]:
+    """Poses of a region: its middle, and others at random."""
+    found = [region.pose]
+    for _ in range(_POSES):
+        place = random.uniform(-0.5, 0.5, 3) * region.box
+        # directions spread evenly over the cap of the cone
+        tilt = float(np.arccos(1.0 - random.uniform() * (1.0 - np.cos(region.cone))))
+        about, turn = random.uniform(0.0, 2.0 * np.pi), random.uniform(-region.turn, region.turn)
+        lean = (np.sin(tilt / 2) * np.cos(about), np.sin(tilt / 2) * np.sin(about), 0.0, np.cos(tilt / 2))
+        twist = Pose.of((0.0, 0.0, 0.0), (0.0, 0.0, np.sin(turn / 2), np.cos(turn / 2)))
+        found.append(region.pose @ Pose.of(place, lean) @ twist)
+    return found
+
+
+def _each(goal: object) -> list[Array | Pose | Region]:
+    """The goals that are given as one or as several.
+
+    Raises:
+        ShapeError: none, or something else.
+    """
+    if isinstance(goal, Pose | Region):
+        return [goal]
+    if (
+        isinstance(goal, Sequence)
+        and not isinstance(goal, str)
+        and goal
+        and not isinstance(goal[0], int | float)
+    ):
+        return [one for part in goal for one in _each(part)]
+    if isinstance(goal, np.ndarray) and goal.ndim == 2:
+        return [one for row in goal for one in _each(row)]
+    if isinstance(goal, np.ndarray | Sequence) and not isinstance(goal, str):
+        return [array(goal, 7, "goal")]
+    raise ShapeError(
+        f"goal must be joint positions, a Pose, a Region or a list of these, got {shown(goal)}",
+        parameter="goal",
+        value=goal,
+        hint="for example heptarm.deg(0, 30, 0, -90, 0, 60, 0)",
+    )
+
+
+def _apart(points: list[Array]) -> Array:
+    """Points without those that are where the one before is; a path that does not move keeps one."""
+    kept = [points[0]]
+    for one in points[1:]:
+        if np.abs(one - kept[-1]).max() > 1e-4:
+            kept.append(one)
+    if len(kept) == 1 or np.abs(kept[-1] - points[-1]).max() > 0.0:
+        kept = [*(kept if len(kept) == 1 else kept[:-1]), points[-1]]
+    return np.array(kept)
+
+
+def _curve(robot: RobotModel, points: Array) -> Array:
+    """Joint positions along the spline through points, as the controller lays it, shape (m, 7) [rad]."""
+    from heptarm.planning.spline import through
+
+    lengths = np.maximum(np.abs(np.diff(points, axis=0) / robot.dq_max).max(axis=1), 1e-9)
+    curve = through(points, lengths)
+    marks = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+    places = [np.linspace(low, high, _SAMPLES, endpoint=False) for low, high in pairwise(marks.tolist())]
+    return np.array([curve.at(s) for s in [*np.concatenate(places).tolist(), 1.0]])

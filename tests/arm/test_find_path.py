@@ -1,0 +1,120 @@
+"""Paths around bodies on an arm: found from where it rests, followed by the cabinet, checked again before that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import model, shapes
+from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import robot
+from tests.simulators import FASTER
+
+IIWA = robot("iiwa14")
+LEFT, RIGHT = deg(-40, 50, 0, -80, 0, 50, 0), deg(40, 50, 0, -80, 0, 50, 0)
+#: A path is followed so near to what was checked, in each joint [rad]: 1 mm at 0.8 m.
+NEAR = 1e-3 / 0.8
+
+
+@pytest.fixture(scope="module")
+def arm() -> Iterator[ha.Arm]:
+    with ha.connect(f"sim://iiwa14?speed={FASTER:g}", watchdog=5.0, timeout=30.0, state_rate=250) as arm:
+        yield arm
+
+
+@pytest.fixture(autouse=True)
+def at_left(arm: ha.Arm) -> Iterator[None]:
+    arm.speed, arm.collision_check = 1.0, None
+    arm.move(ha.ptp(LEFT))
+    yield
+
+
+@pytest.fixture
+def wall() -> ha.CollisionModel:
+    world = ha.CollisionModel("iiwa14")
+    world.add("wall", shapes.box(0.5, 0.02, 0.6), at=Pose.at(0.6, 0.0, 0.3))
+    return world
+
+
+def test_the_cabinet_follows_a_path_around_a_wall(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0, seed=2)
+    handle = arm.start(path)
+    states = list(handle.states())
+    result = handle.wait()
+    assert path.duration - 0.05 < result.duration  # it settles a while longer
+    assert np.abs(arm.state.q_cmd - RIGHT).max() < 1e-6
+    commanded = np.array([one.q_cmd for one in states])
+    off = np.abs(commanded[:, None] - path.curve[None]).max(axis=2).min(axis=1)
+    steps = np.abs(
+        np.diff(path.curve, axis=0)
+    ).max()  # the nearest place that was checked is half a step away
+    assert off.max() < NEAR + 0.5 * steps
+    assert wall.distances(commanded, below=0.05).min() > wall.margin - 1e-3
+
+
+def test_a_path_is_previewed_and_joins_a_program(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    program = [path, ha.lin_rel(z=0.05, frame="base"), ha.ptp(RIGHT)]
+    preview = arm.plan(program)
+    assert [one.name for one in preview.motions] == ["Path", "LinRel", "Ptp"]
+    assert preview.motions[0].duration == pytest.approx(path.duration, abs=1e-6)
+    assert preview.collisions == () and "Path" in str(preview)
+    arm.move(program)
+    assert np.abs(arm.state.q_cmd - RIGHT).max() < 1e-6
+
+
+def test_a_path_is_searched_with_what_is_attached(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    long = ha.Tool("long", tcp=Pose.at(0, 0, 0.2), shapes=[shapes.cylinder(0.02, 0.2, at=Pose.at(0, 0, 0.1))])
+    with arm.tool(long):
+        goal = Pose.of((0.5, 0.35, 0.3), (0.0, 1.0, 0.0, 0.0))
+        path = arm.find_path(goal, avoid=wall, timeout=60.0)
+        reached = Pose.from_matrix(model.forward(IIWA, path.end)) @ Pose.at(0, 0, 0.2)
+        assert np.linalg.norm(reached.xyz - goal.xyz) < 1e-6
+        assert wall.carrying(long).first_on(path.curve) is None
+        arm.move(path)
+
+
+def test_a_path_is_checked_again_when_the_world_has_changed(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    middle = path.curve[len(path.curve) // 2]
+    wall.add("crate", shapes.sphere(0.1), at=Pose.of(model.forward(IIWA, middle)[:3, 3]))
+    with pytest.raises(ha.CollisionForeseen, match=r"crate.* of the path") as error:
+        arm.move(path)
+    assert error.value.touch.clearance.second == "crate"
+    assert np.abs(arm.state.q_cmd - LEFT).max() < 1e-6  # nothing moved
+    assert arm.plan(path).collisions[0].clearance.second == "crate" and arm.plan(path).is_checked
+    around = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    assert wall.first_on(around.curve) is None
+    wall.remove("crate")
+    arm.move(path)
+
+
+def test_a_path_begins_where_the_arm_is(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    with pytest.raises(ha.CommandRejected, match=r"motions\[1\]: the path must begin where the arm is"):
+        arm.move([ha.ptp(RIGHT), path])
+    arm.move(ha.ptp(LEFT + 0.05))
+    with pytest.raises(ha.CommandRejected, match=r"got 0\.050 rad at A\d"):
+        arm.move(path)
+    arm.move([ha.ptp(path.start), path])
+
+
+def test_the_model_of_the_arm_is_avoided_unless_another_is_given(
+    arm: ha.Arm, wall: ha.CollisionModel
+) -> None:
+    with pytest.raises(ha.ShapeError, match="avoid must be a model of bodies, got None"):
+        arm.find_path(RIGHT)
+    arm.collision_check = wall
+    arm.speed = 0.5
+    path = arm.find_path(RIGHT, timeout=60.0)
+    slow, slower = path.duration, arm.find_path(RIGHT, speed=0.25, timeout=60.0).duration
+    assert path.world is wall and slow < 0.7 * slower
+    arm.speed = 1.0
+    assert arm.find_path(RIGHT, timeout=60.0).duration < 0.8 * slow
+    with pytest.raises(ha.CommandRejected, match="a model of this robot, the iiwa14, got one of the iiwa7"):
+        arm.find_path(RIGHT, avoid=ha.CollisionModel("iiwa7"))
+    with pytest.raises(ha.NoPath, match="goal is in collision"):
+        arm.find_path(deg(0, 60, 0, -80, 0, 50, 0))

@@ -1,0 +1,249 @@
+"""Paths around bodies: found, free between their points too, the same for the same seed; and why none was found."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import model, planning, shapes
+from heptarm.values.checks import Array
+from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import robot
+
+IIWA = robot("iiwa14")
+LEFT, RIGHT = deg(-40, 50, 0, -80, 0, 50, 0), deg(40, 50, 0, -80, 0, 50, 0)
+DOWN = (0.0, 1.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def wall() -> ha.CollisionModel:
+    """A wall of 20 mm between left and right."""
+    world = ha.CollisionModel("iiwa14")
+    world.add("wall", shapes.box(0.5, 0.02, 0.6), at=Pose.at(0.6, 0.0, 0.3))
+    return world
+
+
+def is_free(world: ha.CollisionModel, path: ha.Path) -> bool:
+    """Whether bodies keep apart by the margin at many places of the spline that the controller follows."""
+    from heptarm.planning import seam
+    from heptarm.planning.spline import plan_joint_spline
+
+    points = tuple(seam.Ptp(q=tuple(one.q.tolist())) for one in path.points)
+    planned = plan_joint_spline(IIWA, seam.JointSpline(points=points), path.start, Pose.at())
+    assert planned.path is not None
+    curve = np.array([planned.path.at(s, path.start) for s in np.linspace(0.0, 1.0, 1500).tolist()])
+    return float(world.distances(curve, below=world.margin).min()) >= world.margin - 1e-3
+
+
+def tool_at(q: Array, tcp: Pose) -> Pose:
+    return Pose.from_matrix(model.forward(IIWA, q)) @ tcp
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_path_goes_around_a_wall(wall: ha.CollisionModel, seed: int) -> None:
+    assert wall.first_on([LEFT, RIGHT]) is not None
+    path = planning.find_path(wall, start=LEFT, goal=RIGHT, seed=seed, timeout=60.0)
+    assert (path.start == LEFT).all() and (path.end == RIGHT).all()
+    assert is_free(wall, path)
+    assert path.clearance is not None and path.clearance.distance > wall.margin - 1e-3
+    assert 0.5 < path.duration < 4.0 and len(path.points) < 20
+    assert path.stats.planner == "RRT-Connect" and path.stats.seed == seed
+    assert path.stats.states > 1 and path.stats.checks > path.stats.states
+
+
+def test_the_same_seed_finds_the_same_path(wall: ha.CollisionModel) -> None:
+    first, second, other = (
+        planning.find_path(wall, start=LEFT, goal=RIGHT, seed=seed, timeout=60.0) for seed in (5, 5, 6)
+    )
+    assert first.points == second.points and first.curve.tobytes() == second.curve.tobytes()
+    assert first.points != other.points
+
+
+def test_a_path_in_one_line(wall: ha.CollisionModel) -> None:
+    free = planning.find_path(wall, start=LEFT, goal=LEFT + 0.1)
+    assert free.stats.planner == "straight" and len(free.points) == 1
+    text = str(free)
+    assert text.startswith(f"{free.duration:.2f} s, 1 waypoint, clearance ") and "(straight)" in text
+    assert "\n" not in text
+
+
+def test_a_path_to_where_the_arm_is_takes_no_time(wall: ha.CollisionModel) -> None:
+    path = planning.find_path(wall, start=LEFT, goal=LEFT)
+    assert path.duration == 0.0 and (path.end == LEFT).all()
+
+
+def test_a_slower_path_takes_longer(wall: ha.CollisionModel) -> None:
+    fast, slow = (planning.find_path(wall, start=LEFT, goal=RIGHT, speed=speed) for speed in (1.0, 0.2))
+    assert slow.duration > 2.0 * fast.duration
+
+
+def test_a_pose_is_reached_with_any_elbow(wall: ha.CollisionModel) -> None:
+    goal, tcp = Pose.of((0.55, 0.3, 0.3), DOWN), Pose.at(0.0, 0.05, 0.1)
+    path = planning.find_path(wall, start=LEFT, goal=goal, tcp=tcp, timeout=60.0)
+    reached = tool_at(path.end, tcp)
+    assert np.linalg.norm(reached.xyz - goal.xyz) < 1e-6 and reached.angle_to(goal) < 1e-6
+    assert is_free(wall, path)
+    world = ha.CollisionModel(
+        "iiwa14"
+    )  # a ball where that elbow would be: another elbow reaches the same pose
+    world.add("ball", shapes.sphere(0.06), at=Pose.of(model.forward(IIWA, path.end, link=4)[:3, 3]))
+    other = planning.find_path(world, start=LEFT, goal=goal, tcp=tcp, timeout=60.0)
+    assert tool_at(other.end, tcp).angle_to(goal) < 1e-6 and np.abs(other.end - path.end).max() > 0.1
+
+
+def test_one_of_several_goals_is_reached(wall: ha.CollisionModel) -> None:
+    inside, near = Pose.of((0.6, 0.0, 0.3), DOWN), Pose.of((0.5, -0.3, 0.4), DOWN)
+    path = planning.find_path(wall, start=LEFT, goal=[inside, near, RIGHT], timeout=60.0)
+    assert np.linalg.norm(tool_at(path.end, Pose.at()).xyz - near.xyz) < 1e-6
+    both = planning.find_path(wall, start=LEFT, goal=np.array([RIGHT, RIGHT]), timeout=60.0)
+    assert (both.end == RIGHT).all()
+
+
+def test_a_region_leaves_a_choice(wall: ha.CollisionModel) -> None:
+    middle = Pose.of((0.5, 0.3, 0.35), DOWN)
+    region = ha.Region.of(middle, box=(0.1, 0.2, 0.1), cone=0.3, turn=3.0)
+    for seed in range(3):
+        path = planning.find_path(wall, start=LEFT, goal=region, seed=seed, timeout=60.0)
+        reached = middle.inverse() @ tool_at(path.end, Pose.at())
+        assert (np.abs(reached.xyz) <= np.array([0.05, 0.1, 0.05]) + 1e-6).all()
+        assert np.arccos(min(1.0, reached.rotation[2, 2])) <= 0.3 + 1e-6
+
+
+def tilts(path: ha.Path) -> float:
+    """Largest angle of the flange's axis from its direction at the start [rad]."""
+    up = model.forward(IIWA, path.start)[:3, 2]
+    return max(np.arccos(min(1.0, float(model.forward(IIWA, q)[:3, 2] @ up))) for q in path.curve)
+
+
+def test_a_glass_stays_upright(wall: ha.CollisionModel) -> None:
+    keep = ha.Upright("z", within=0.2)
+    path = planning.find_path(wall, start=LEFT, goal=RIGHT, keep=keep, timeout=120.0)
+    assert tilts(path) <= 0.2 and is_free(wall, path)
+    assert (
+        tilts(planning.find_path(wall, start=LEFT, goal=RIGHT, timeout=60.0)) > 0.3
+    )  # it would tilt otherwise
+
+
+def test_a_start_in_slight_contact_is_left() -> None:
+    world = ha.CollisionModel("iiwa14", boxes=["0.6,0,0.1,0.4,0.8,0.2"])
+    start = model.solve(IIWA, Pose.of((0.6, 0.0, 0.198), DOWN), near=LEFT.tolist())
+    assert world.touching(start)[0].distance < 0.0
+    path = planning.find_path(world, start=start, goal=Pose.of((0.5, 0.2, 0.5), DOWN), timeout=60.0)
+    assert world.first_on(path.curve) is None
+    deep = model.solve(IIWA, Pose.of((0.6, 0.0, 0.15), DOWN), near=LEFT.tolist())
+    with pytest.raises(ha.NoPath, match=r"start is in collision: link_\d is \d+ mm inside box 0") as error:
+        planning.find_path(world, start=deep, goal=LEFT)
+    assert error.value.reason == "start" and error.value.clearance.second == "box 0"
+
+
+def test_what_is_held_is_carried_around(wall: ha.CollisionModel) -> None:
+    world = wall.carrying(None)
+    world.add("rod", shapes.cylinder(0.02, 0.1), at=Pose.at(0.0, 0.6, 0.5))
+    world.hold("rod", Pose.at(0.0, 0.0, 0.06))
+    path = planning.find_path(world, start=LEFT, goal=RIGHT, seed=1, timeout=60.0)
+    assert is_free(world, path)
+
+
+#: The tool's z axis forwards.
+FORWARDS = (0.0, np.sqrt(0.5), 0.0, np.sqrt(0.5))
+
+
+@pytest.mark.parametrize(
+    ("scene", "tip", "goals"),
+    [
+        ("shelf", 0.16, [(0.8, 0.05, 0.4), (0.8, -0.02, 0.74)]),
+        ("narrow-slot", 0.0, [(0.65, 0.0, 0.5)]),
+    ],
+)
+def test_paths_into_the_compartments_of_a_shelf_and_through_a_slot(
+    scene: str, tip: float, goals: list[tuple[float, float, float]]
+) -> None:
+    world, tcp = ha.CollisionModel("iiwa14", scene=scene), Pose.at(0, 0, tip)
+    here = deg(0, -20, 0, -110, 0, 0, 0)
+    for xyz in goals:
+        path = planning.find_path(world, start=here, goal=Pose.of(xyz, FORWARDS), tcp=tcp, timeout=120.0)
+        assert np.linalg.norm(tool_at(path.end, tcp).xyz - xyz) < 1e-6 and is_free(world, path)
+        here = path.end
+
+
+@pytest.mark.parametrize(
+    ("goal", "reason", "match"),
+    [
+        (Pose.of((0.6, 0.0, 0.3), DOWN), "goal", r"goal is in collision: link_\d is \d+ mm inside wall"),
+        (Pose.of((1.6, 0.0, 0.3), DOWN), "inverse kinematics", "out of reach"),
+        (deg(0, 60, 0, -80, 0, 50, 0), "goal", "goal is in collision"),
+    ],
+)
+def test_why_there_is_no_path(wall: ha.CollisionModel, goal: Any, reason: str, match: str) -> None:
+    with pytest.raises(ha.NoPath, match=match) as error:
+        planning.find_path(wall, start=LEFT, goal=goal)
+    assert error.value.reason == reason and error.value.hint
+
+
+def test_a_search_ends_by_its_states_its_time_or_a_call() -> None:
+    world = ha.CollisionModel("iiwa14")  # two walls up to a ceiling, with no way around
+    world.add("wall", shapes.box(2.4, 0.01, 3.0), at=Pose.at(1.35, 0.0, 1.5))
+    world.add("back", shapes.box(2.4, 0.01, 3.0), at=Pose.at(-1.35, 0.0, 1.5))
+    world.add("ceiling", shapes.box(2.4, 2.4, 0.01), at=Pose.at(0.0, 0.0, 1.1))
+    assert not world.touching(LEFT) and not world.touching(RIGHT)
+    nearest = []
+    for _ in range(2):
+        with pytest.raises(ha.NoPath, match=r"not connected: \d+ states, nearest \d\.\d\d rad") as error:
+            planning.find_path(world, start=LEFT, goal=RIGHT, states=60, timeout=600.0)
+        assert error.value.states >= 60 and error.value.reason == "not connected"
+        nearest.append(error.value.nearest)
+    assert nearest[0] == nearest[1] and 0.1 < nearest[0] < 20.0
+    with pytest.raises(ha.NoPath, match=r"not found in 0\.001 s"):
+        planning.find_path(world, start=LEFT, goal=RIGHT, timeout=0.001)
+    calls: list[int] = []
+    with pytest.raises(ha.NoPath, match="stopped"):
+        planning.find_path(
+            world, start=LEFT, goal=RIGHT, timeout=600.0, stop=lambda: bool(calls.append(1)) or len(calls) > 5
+        )
+    assert len(calls) == 6
+
+
+def test_a_goal_that_contradicts_the_constraint_is_refused(wall: ha.CollisionModel) -> None:
+    tilted = RIGHT + deg(0, 0, 0, 0, 0, 60, 0)
+    with pytest.raises(ha.NoPath, match=r"goal contradicts keep: .* turned by 1\.0\d+ rad") as error:
+        planning.find_path(wall, start=LEFT, goal=tilted, keep=ha.Upright("z", within=0.2))
+    assert error.value.reason == "constraint"
+
+
+@pytest.mark.parametrize(
+    ("keywords", "error", "match"),
+    [
+        ({"world": 3}, ha.ShapeError, "world must be a model of bodies, got 3"),
+        ({"start": [0.0] * 6}, ha.ShapeError, "start"),
+        ({"start": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
+        ({"goal": "home"}, ha.ShapeError, "goal must be joint positions, a Pose, a Region"),
+        ({"goal": []}, ha.ShapeError, "goal"),
+        ({"goal": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
+        ({"keep": "z"}, ha.ShapeError, "keep"),
+        ({"speed": 0.0}, ha.LimitError, "speed"),
+        ({"timeout": 0.0}, ha.LimitError, "timeout"),
+        ({"states": 1}, ha.LimitError, "states"),
+        ({"seed": -1}, ha.LimitError, "seed"),
+        ({"tcp": 1}, ha.ShapeError, "tcp"),
+    ],
+)
+def test_bad_arguments(wall: ha.CollisionModel, keywords: dict[str, Any], error: Any, match: str) -> None:
+    given: dict[str, Any] = {"world": wall, "start": LEFT, "goal": RIGHT} | keywords
+    with pytest.raises(error, match=match):
+        planning.find_path(given.pop("world"), **given)
+
+
+def test_constraints_and_regions_are_checked() -> None:
+    with pytest.raises(ha.ShapeError, match="axis"):
+        ha.Upright("w")  # type: ignore[arg-type]
+    with pytest.raises(ha.LimitError, match="within"):
+        ha.Upright("z", within=0.0)
+    with pytest.raises(ha.LimitError, match="cone"):
+        ha.Region.of(Pose.at(0.5, 0, 0.5), cone=4.0)
+    with pytest.raises(ha.LimitError, match=r"box\[1\]"):
+        ha.Region.of(Pose.at(0.5, 0, 0.5), box=(0.1, -0.1, 0.1))
+    with pytest.raises(ha.ShapeError, match="pose"):
+        ha.Region(0.5)  # type: ignore[arg-type]
