@@ -211,8 +211,8 @@ RIGHT = ("40", "50", "0", "-80", "0", "50", "0")
 def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> None:
     run("move", "ptp", "-40", *RIGHT[1:], "--deg", "--speed", "1", "--target", target)
     (before,) = objects("state", "--target", target)
-    words = ("plan", "to", *RIGHT, "--deg", "--box", "0.6,0,0.3,0.5,0.02,0.6")
-    words = (*words, "--timeout", "60", "--seed", "4", "--target", target)
+    goal = ("plan", "to", *RIGHT, "--deg", "--box", "0.6,0,0.3,0.5,0.02,0.6")
+    words = (*goal, "--timeout", "60", "--seed", "4", "--target", target)
     (found,) = objects(*words)
     assert found["end_q"] == pytest.approx(np.radians([40, 50, 0, -80, 0, 50, 0]), abs=1e-6)
     assert found["clearance_m"] > 0.004 and found["states"] >= 2 and len(found["points"]) >= 2
@@ -235,7 +235,7 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
         (("plan", "lin", *"000000", "--frame", "/Table"), ("one of base, got '/Table'",)),
         (("plan", "to", *"0000"), ("seven joint positions or the six numbers of a pose, got 4 numbers",)),
         (
-            ("plan", "to", "0.6", "0", "0.05", *"000", "--box", "0.6,0,0.1,0.6,0.8,0.2"),
+            ("plan", "to", "0.6", "0", "0.15", "180", "0", "180", "--deg", "--box", "0.6,0,0.1,0.6,0.8,0.2"),
             ("goal is in collision",),
         ),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),

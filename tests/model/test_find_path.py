@@ -96,7 +96,8 @@ def test_a_pose_is_reached_with_any_elbow(wall: ha.CollisionModel) -> None:
 
 def test_one_of_several_goals_is_reached(wall: ha.CollisionModel) -> None:
     inside, near = Pose.of((0.6, 0.0, 0.3), DOWN), Pose.of((0.5, -0.3, 0.4), DOWN)
-    path = planning.find_path(wall, start=LEFT, goal=[inside, near, RIGHT], timeout=60.0)
+    goals: list[ha.Pose | np.ndarray] = [inside, near, RIGHT]
+    path = planning.find_path(wall, start=LEFT, goal=goals, timeout=60.0)
     assert np.linalg.norm(tool_at(path.end, Pose.at()).xyz - near.xyz) < 1e-6
     both = planning.find_path(wall, start=LEFT, goal=np.array([RIGHT, RIGHT]), timeout=60.0)
     assert (both.end == RIGHT).all()
@@ -115,7 +116,7 @@ def test_a_region_leaves_a_choice(wall: ha.CollisionModel) -> None:
 def tilts(path: ha.Path) -> float:
     """Largest angle of the flange's axis from its direction at the start [rad]."""
     up = model.forward(IIWA, path.start)[:3, 2]
-    return max(np.arccos(min(1.0, float(model.forward(IIWA, q)[:3, 2] @ up))) for q in path.curve)
+    return max(float(np.arccos(min(1.0, float(model.forward(IIWA, q)[:3, 2] @ up)))) for q in path.curve)
 
 
 def test_a_glass_stays_upright(wall: ha.CollisionModel) -> None:

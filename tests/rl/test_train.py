@@ -52,7 +52,7 @@ def same(one: Policy, other: Policy) -> bool:
 
 
 def test_advantages_are_those_of_the_definition() -> None:
-    settings = ppo.PpoSettings(discount=0.9, trace=0.8)
+    settings = ppo.PpoSettings(gamma=0.9, gae_lambda=0.8)
     random = torch.Generator().manual_seed(0)
     reward, value, after = (torch.rand((5, 1), generator=random) for _ in range(3))
     done = torch.tensor([0.0, 0.0, 1.0, 0.0, 0.0])[:, None]

@@ -45,10 +45,10 @@ def test_twists_of_a_topic_follow_the_posture(cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(HOME), speed=1.0)
         start = arm.state
-        settings = {"timeout": 2.0, "options": configuration.servo}
+        servo = configuration.servo
         with pytest.raises(LimitError, match="A1 must be in"):
-            TargetStream(arm, posture=np.full(7, 3.0), **settings)
-        stream = TargetStream(arm, posture=configuration.posture, **settings)
+            TargetStream(arm, posture=np.full(7, 3.0), timeout=2.0, options=servo)
+        stream = TargetStream(arm, posture=configuration.posture, timeout=2.0, options=servo)
         deadline = time.monotonic() + 60.0
         while abs(arm.state.q[2] + 0.5) > 0.05 and time.monotonic() < deadline:
             stream.twist(np.zeros(6))

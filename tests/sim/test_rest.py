@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -204,7 +204,7 @@ def test_the_loop_lets_time_pass_and_ticks_on_when_the_rest_is_over() -> None:
             loop.stop()
 
     sleeper = Sleeper(shared)
-    loop = RealtimeLoop(shared, tick, rest=sleeper)
+    loop = RealtimeLoop(shared, tick, rest=cast(Rest, sleeper))
     roused: list[float] = []
 
     def rouse() -> None:

@@ -11,8 +11,8 @@ from heptarm.values.checks import array, finite, instance, scalar, within
 from heptarm.values.robot import RobotModel
 
 AXES = 7
-#: Fraction of acceleration and jerk with which an approach is planned; the rest corrects deviations;
-#: for `schema/native.py`, as the next.
+#: Fraction of acceleration and jerk with which an approach is planned; the rest corrects deviations. `schema/native.py`
+#: takes it, and the next, for the guard in C.
 PLANNED = 0.8
 #: A target is on track as long as its velocity changes by less than the largest jerk divided by this.
 ON_TRACK = 4.0

@@ -25,8 +25,8 @@ braking    comes to rest at full motion time, whatever the override is: on the p
            present direction off it (`RunningMotion.halt`), or by a follower. There is no way back to a motion.
 settling   the set-points have ended; it is closed when the measured joints have arrived, or rest.
 
-Why the command is over is no phase. `failure`, `cancelled` and `broken` say it from the moment when it is decided; the
-phase decides where the set-points come from, until the arm is at rest. A cancelled command usually brakes in the same
+Why the command is over is no phase. `failure`, `cancelled` and `broken` say it from the moment of the decision; the
+phase determines where the set-points come from, until the arm is at rest. A cancelled command usually brakes in that
 tick, but not while a safety stop brakes it already: it stays in its phase, and settles when the override rests, or
 brakes when the stop ends before that. A failure inside a tick brakes in this same tick (`_break_off`), since one tick
 of rest would be a jump.
