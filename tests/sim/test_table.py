@@ -101,7 +101,7 @@ def test_the_first_that_an_axis_cannot_follow_is_none_of_them() -> None:
     assert len(follow(planned, TICK, leap)[1]) == count
 
 
-def test_a_place_at_the_end_of_the_path_is_the_end(language: str) -> None:
+def test_a_place_at_the_end_of_the_path_is_the_end() -> None:
     pieces = np.array([[0.0, 0.0, 1.0, 0.0, 0.0]])  # s = t
     lines = np.array([[0.0, 1.0, *START, *np.full(7, 0.1)]])
     rows = SetPointRows(NO_LIMIT)
