@@ -69,8 +69,9 @@ lint: $(STAMPS)/venv  ## ruff (rules and format), mypy, import contract
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-logo
 
-check: $(STAMPS)/venv  ## the generated files agree with the schema
+check: $(STAMPS)/venv  ## the generated files agree with the schema, the diagrams with the sources
 	$(PY) schema/generate.py --check
+	$(PY) scripts/diagrams.py --check
 
 # Lint and what computes fill the time in which the others wait, and leave them the processor when they want it; then come
 # the ROS nodes. The one goes on when the other fails; both are shown at the end.
