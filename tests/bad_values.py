@@ -142,6 +142,13 @@ ARGUMENTS: dict[str, dict[str, object]] = {
         "states": 100,
         "stop": None,
     },
+    "Arm.find_path": {
+        "goal": HOME + 0.1,
+        "avoid": heptarm.CollisionModel("iiwa14"),
+        "timeout": 60.0,
+        "states": 100,
+        "stop": None,
+    },
     "Upright": {"axis": "z", "within": 0.1},
     "Region": {"pose": POSE, "box": (0.1, 0.1, 0.1)},
     "Region.of": {"pose": POSE, "box": (0.1, 0.1, 0.1)},
