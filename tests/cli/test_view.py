@@ -60,6 +60,7 @@ def _settled(browser: object, patience: float = 60.0) -> np.ndarray:
 
 
 @pytest.mark.browser
+@pytest.mark.long
 def test_the_view_shows_the_arm_and_follows_it(browser: Any, tmp_path: Path) -> None:
     own = Path(ha.__file__).parent / "sim" / "models" / "meshes"
     for part in [*(own / "lbr").iterdir(), *(own / "iiwa14").iterdir()]:
@@ -67,6 +68,7 @@ def test_the_view_shows_the_arm_and_follows_it(browser: Any, tmp_path: Path) -> 
     with sim("--view", "--view-port", "0", "--meshes", str(tmp_path)) as ready:
         browser.set_window_size(1280, 900)
         browser.get(ready["view"])
+        browser.switch_to.frame("view")
         first = _settled(browser)
         browser.save_screenshot(str(tmp_path / "view.png"))
         with ha.connect(ready["target"], watchdog=5.0, timeout=30.0) as arm:

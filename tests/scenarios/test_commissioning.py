@@ -101,6 +101,7 @@ def arm() -> Iterator[ha.Arm]:
         yield connected
 
 
+@pytest.mark.long
 def test_every_step_without_fri_agrees_on_the_virtual_cabinet(arm: ha.Arm) -> None:
     seen: list[int] = []
     gaps: list[str] = []
