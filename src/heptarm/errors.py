@@ -16,6 +16,7 @@
     │   │   └── OutsideWorkspace            a command leaves `arm.workspace`
     │   ├── ModeConflict                    conflicts with what is running
     │   ├── CollisionForeseen               a collision model found bodies that would touch
+    │   ├── NoPath                          no path was found around the bodies of a world
     │   ├── UnknownSetting (AttributeError) an object has no setting of that name
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result

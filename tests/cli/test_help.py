@@ -132,7 +132,7 @@ def test_older_spellings_of_sim_are_still_understood(older: str, current: str) -
 )
 def test_an_option_of_another_simulation_names_it(words: str, said: str) -> None:
     done = run(*words.split())
-    assert done.returncode == 1 and said in done.stderr, done.stderr
+    assert done.returncode == 2 and said in done.stderr, done.stderr
 
 
 def test_nothing_is_coloured_in_a_pipe(cabinet) -> None:  # type: ignore[no-untyped-def]

@@ -140,7 +140,7 @@ def test_a_virtual_cabinet_with_a_scene_serves_its_clients() -> None:
     ("options", "because"),
     [
         (("--scene", "nowhere"), "one of bins, narrow-slot, peg-in-hole, shelf, table"),
-        (("--scene", "table", "--fri", "1.15"), "--scene cannot be used with heptarm sim fri"),
+        (("--scene", "table", "--fri", "1.15"), "cannot be used with heptarm sim fri"),
     ],
 )
 def test_a_scene_that_cannot_be_is_refused(options: tuple[str, ...], because: str) -> None:

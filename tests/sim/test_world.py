@@ -46,7 +46,11 @@ def to(plant: Plant, x: float, y: float, z: float, speed: float = 0.2) -> None:
     run(plant, MotionCommand(1, motions.lin(numbers(target), velocity=speed), tcp=TIP))
 
 
-@pytest.mark.parametrize("name", names())
+#: Of a wall alone, which never moves, and in which this posture does not fit.
+STATIC = ("narrow-slot",)
+
+
+@pytest.mark.parametrize("name", [name for name in names() if name not in STATIC])
 def test_a_ready_scene_rests(name: str) -> None:
     plant = in_scene(name)
     before = {body: plant.body_pose(body) for body in free_bodies(plant)}

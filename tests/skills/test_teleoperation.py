@@ -157,7 +157,8 @@ def test_the_elbow_follows_a_posture(arm: ha.Arm) -> None:
         watchdog=2.0,
         duration=60.0,
     )
-    assert arm.state.q[2] < -0.4 and arm.state.pose.distance_to(start) < 1e-2
+    # a thread integrates the velocities by the clock of this machine, and the arm lives five times as fast
+    assert arm.state.q[2] < -0.4 and arm.state.pose.distance_to(start) < 3e-2
     with pytest.raises(ha.HeptarmError, match="elbow"):
         skills.teleoperate(arm, Person(lambda _: of(LEFT)), elbow="sideways")  # type: ignore[arg-type]
 

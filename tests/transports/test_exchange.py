@@ -25,7 +25,7 @@ from tests.wire.pairs import open_pair, pour
 
 KEYS = (None, b"k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj")
 HALF = SetOverride(value=0.5)
-PATIENCE = 0.02
+PATIENCE = 0.1
 
 
 @dataclass
