@@ -15,6 +15,7 @@ import http
 import ipaddress
 import secrets
 import socket
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any, TypeAlias
@@ -225,7 +226,7 @@ class PageGuard:
                 return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
             page = None if "Upgrade" in headers else pages.get(urlsplit(request.path).path)
             if page is not None:
-                status, kind, text = await asyncio.get_running_loop().run_in_executor(None, page)
+                status, kind, text = await _in_a_thread(page)
                 response = connection.respond(status, text)
                 del response.headers["Content-Type"]
                 response.headers["Content-Type"] = f"{kind}; charset=utf-8"
@@ -241,3 +242,21 @@ class PageGuard:
             return response
 
         return process
+
+
+async def _in_a_thread(page: Page) -> tuple[http.HTTPStatus, str, str]:
+    """An answer, made by a thread of its own: those of a pool may all be waiting for arms that do not answer."""
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[tuple[http.HTTPStatus, str, str]] = loop.create_future()
+
+    def hand_over(made: tuple[http.HTTPStatus, str, str]) -> None:
+        if not answer.done():  # the browser may have gone
+            answer.set_result(made)
+
+    def make() -> None:
+        made = page()
+        with contextlib.suppress(RuntimeError):  # the panel has ended meanwhile
+            loop.call_soon_threadsafe(hand_over, made)
+
+    threading.Thread(target=make, name="heptarm-panel-page", daemon=True).start()
+    return await answer

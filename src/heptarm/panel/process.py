@@ -201,13 +201,14 @@ class Panel:
         Returns:
             Why arms were not stopped, by their robots' names; empty: all were.
         """
-        failed: list[str] = []
+        # an arm counts as stopped only once that is known, whatever ends its thread
+        failed = dict.fromkeys(self._arms, "no answer")
         threads = [threading.Thread(target=_stop, args=(model, failed), daemon=True) for model in self._arms]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
-        return failed
+        return [f"{model.arm.robot.name}: {why}" for model, why in failed.items()]
 
     async def _forget(self, client: Any) -> None:
         """End what a page has started that was closed."""
@@ -270,12 +271,14 @@ class Panel:
             self.server.stop()
 
 
-def _stop(model: PanelArm, failed: list[str]) -> None:
+def _stop(model: PanelArm, failed: dict[PanelArm, str]) -> None:
     try:
         model.stop()
     except HeptarmError as error:
-        failed.append(f"{model.arm.robot.name}: {error}")
+        failed[model] = str(error)
         model.report(error)
+    else:
+        del failed[model]
 
 
 def halting(arm: Arm, host: str, port: int) -> Callable[[], None]:

@@ -7,7 +7,6 @@ arrive, and the cabinet's watchdog stops the arm.
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -43,8 +42,6 @@ from heptarm.wire import messages as wire
 _BELOW_CEILING = 0.95
 #: Longest time for which a velocity is integrated at once: a late thread is no reason for a jump [s].
 _LONGEST_STEP = 0.1
-#: Part of it for which joint velocities count as constant: the pose would drift where the elbow moves [s].
-_SUBSTEP = 0.005
 #: The path may be so far ahead of the arm: a distance [rad], and one that grows with the velocity [s]. From half of it
 #: on the arm is slowed down, so that a blocked or pushed arm does not have a far target, and a spring no large force.
 _AHEAD, _AHEAD_TIME = 0.1, 0.25
@@ -234,17 +231,13 @@ class JogServo(Servo):
         wanted = None
         if command is not None and (now - command[1]) * 1e-9 <= self.timeout:
             wanted = command[0]
-        parts = max(1, math.ceil(dt / _SUBSTEP))
-        dq, done = self._velocity(path, wanted, dt / parts)
+        dq, done = self._velocity(path, wanted, dt)
         before = path.q
         sample = self._connection.feed.newest
         state = None if sample is None else self._connection.build(sample)
         behind = lag(path, dq, state, now=now, rate=self._connection.real_time_factor)
         held = [one for one in (behind, self._obstacle(path, dq), self._wall(path, dq)) if one]
-        least = min((*done, path.advance(dq, dt / parts, held)), key=lambda one: one.factor)
-        for _ in range(parts - 1):
-            dq, done = self._velocity(path, wanted, dt / parts)
-            least = min((least, *done, path.advance(dq, dt / parts, held)), key=lambda one: one.factor)
+        least = min((*done, path.advance(dq, dt, held)), key=lambda one: one.factor)
         if self._leaves(path.q):
             path.stay_at(before)
             least = Slowdown("workspace", 0.0)

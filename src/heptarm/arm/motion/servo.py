@@ -887,7 +887,7 @@ class PoseServo(Servo):
         found = blockage(self._connection.robot, self._q, twist)
         if found.reason.startswith(
             "speed"
-        ):  # the target is far: what would stop the arm if it went there more slowly?
+        ):  # it is far: what would stop the arm if it went there more slowly?
             found = blockage(self._connection.robot, self._q, 0.99 * found.factor * twist)
         return found.reason
 
