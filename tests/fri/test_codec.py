@@ -6,13 +6,14 @@ import zlib
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol import version
 from heptarm.fri.protocol.protobuf import MalformedMessage, put_bytes, put_packed, put_unpacked, put_varint
 from heptarm.fri.protocol.version import Version
+from tests.long import longer
 from tests.oracles.fri import codec
 
 from . import strategies as some
@@ -54,6 +55,7 @@ def test_command_round_trip(wire: Version, data: st.DataObject) -> None:
 
 
 @every_version
+@settings(max_examples=longer(80, 200))
 @given(data=st.data(), raw=st.binary(max_size=200))
 def test_any_bytes_only_raise_malformed(wire: Version, data: st.DataObject, raw: bytes) -> None:
     good = bytearray(codec.encode_monitoring(data.draw(some.monitorings(wire)), wire))

@@ -76,7 +76,7 @@ def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
     return targets
 
 
-@settings(max_examples=longer(15, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=longer(40, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(targets=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
 def test_whatever_is_asked_the_limits_hold(
     targets: list[tuple[float, ...] | None], period: float, data: st.DataObject
@@ -91,7 +91,7 @@ def test_whatever_is_asked_the_limits_hold(
     assert np.abs(guard.v).max() < 1e-12, "and it can always be brought to a stop"
 
 
-@settings(max_examples=longer(50, 150), deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     v=st.floats(-1, 1),
     a=st.floats(-1, 1),

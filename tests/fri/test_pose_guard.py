@@ -131,7 +131,7 @@ targets = st.lists(
 
 
 @given(targets, st.sampled_from([1e-3, 5e-3]))
-@settings(max_examples=longer(15, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_whatever_is_asked_the_limits_are_kept(asked: list[tuple[object, int]], period: float) -> None:
     guard = begun(period=period)
     sent = run(guard, [wanted for wanted, count in asked for _ in range(count)])
@@ -151,7 +151,7 @@ def test_a_limit_that_is_none() -> None:
     targets=st.lists(st.floats(-3.0, 3.0) | st.just(NAN) | st.none(), min_size=1, max_size=20),
     speed=st.floats(-0.9, 0.9),
 )
-@settings(max_examples=longer(20, 60), deadline=None)
+@settings(max_examples=longer(40, 60), deadline=None)
 def test_the_elbow_keeps_its_limits_too(targets: list[float | None], speed: float) -> None:
     guard, begin = PoseGuard(LIMITS), 0.3
     guard.start(START, period=1e-3, e1=begin, e1_speed=speed * LIMITS.elbow_velocity)
