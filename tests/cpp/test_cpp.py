@@ -280,7 +280,12 @@ def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
             address = f"localhost:{stack.enter_context(sim())['port']}"
         done = retry(
             lambda: subprocess.run(
-                [str(program), address], capture_output=True, text=True, timeout=120, check=False, env=environment
+                [str(program), address],
+                capture_output=True,
+                text=True,
+                timeout=120,
+                check=False,
+                env=environment,
             ),
             late,
         )
