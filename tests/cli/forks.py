@@ -10,6 +10,7 @@ module `heptarm.cli.main` executed from its first line on.
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import json
 import os
@@ -24,8 +25,11 @@ from typing import IO, Any
 
 ROOT = Path(__file__).parents[2]
 #: What commands import.
-PACKAGES = ("cyclopts", "numpy", "rich.console", "heptarm", "heptarm.arm.arm", "heptarm.cli.options")
-PACKAGES += ("heptarm.cli.motion", "heptarm.cli.state", "heptarm.cli.sim.cabinet", "heptarm.planning.search")
+PACKAGES = (
+    *("cyclopts", "cyclopts.help", "docstring_parser", "rich.markdown", "rich.syntax", "numpy", "jpype"),
+    *("heptarm", "heptarm.arm.several", "heptarm.planning.search", "heptarm.panel.process", "heptarm.testing"),
+    *("heptarm.cli.doctor", "heptarm.cli.motion", "heptarm.cli.record", "heptarm.cli.sim.cabinet"),
+)
 
 
 class Forks:
@@ -123,8 +127,11 @@ def _become(asked: dict[str, Any]) -> None:
 
 def main(address: str) -> None:
     """Import the packages, and serve."""
+    gc.disable()
     for name in PACKAGES:
         importlib.import_module(name)
+    gc.freeze()  # a fork shares the memory of what is there, as long as it is not collected
+    gc.enable()
     _become(_serve(address))
     runpy.run_module("heptarm.cli.main", run_name="__main__", alter_sys=True)
 
