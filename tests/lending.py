@@ -238,7 +238,7 @@ class _Lent:
             self.cabinet.close()
 
 
-def _known(arm: ha.Arm) -> tuple[Any, Any, dict[str, object], str]:
+def _known(arm: ha.Arm) -> tuple[Any, Any, dict[str, bool | float], str]:
     """What a program can leave in a cabinet: tools, frames, signals, and the attached tool."""
     welcome = arm.connection.welcome
     return (welcome.tools, welcome.frames, {name: arm.io[name] for name in arm.io}, arm.state.tool)

@@ -27,7 +27,13 @@ ROOT = Path(__file__).parents[2]
 #: What commands import.
 PACKAGES = (
     *("cyclopts", "cyclopts.help", "docstring_parser", "rich.markdown", "rich.syntax", "numpy", "jpype"),
-    *("heptarm", "heptarm.arm.several", "heptarm.planning.search", "heptarm.panel.process", "heptarm.testing"),
+    *(
+        "heptarm",
+        "heptarm.arm.several",
+        "heptarm.planning.search",
+        "heptarm.panel.process",
+        "heptarm.testing",
+    ),
     *("heptarm.cli.doctor", "heptarm.cli.motion", "heptarm.cli.record", "heptarm.cli.sim.cabinet"),
 )
 
@@ -104,9 +110,10 @@ def _serve(address: str) -> dict[str, Any]:
 
 
 def _answer(lines: IO[str], command: int) -> None:
-    for answer in (lambda: command, lambda: os.waitstatus_to_exitcode(os.waitpid(command, 0)[1])):
-        lines.write(f"{answer()}\n")
-        lines.flush()
+    lines.write(f"{command}\n")
+    lines.flush()
+    lines.write(f"{os.waitstatus_to_exitcode(os.waitpid(command, 0)[1])}\n")
+    lines.flush()
     os._exit(0)
 
 
@@ -122,7 +129,6 @@ def _become(asked: dict[str, Any]) -> None:
         os.close(file)
     sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
     sys.stderr = open(2, "w", encoding="utf-8", closefd=False, buffering=1, errors="backslashreplace")  # noqa: SIM115
-    sys.__stdout__, sys.__stderr__ = sys.stdout, sys.stderr
 
 
 def main(address: str) -> None:
