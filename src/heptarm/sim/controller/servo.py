@@ -22,6 +22,7 @@ from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK
 from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
 from heptarm.planning.targets import goes_on
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
+from heptarm.sim.controller.setpoints import stoppable
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, is_half_turn, rotation, turn_between
 from heptarm.values.robot import RobotModel
@@ -548,19 +549,6 @@ class ServoLimits:
         )
 
 
-def _stoppable(room: Array, acceleration: Array) -> Array:
-    """Largest speeds for the next tick after which axes still come to rest within a distance, shape (7,) [rad/s].
-
-    The speed changes from tick to tick: that of m accelerations times a tick stops within 1 + ... + m of the steps that
-    one of them makes, and between two of these speeds the distance is linear.
-    """
-    step = acceleration * TICK
-    room = np.maximum(room, 0.0)
-    whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * room / (step * TICK)) - 1.0))
-    most: Array = 0.5 * whole * step + room / ((whole + 1.0) * TICK)
-    return most
-
-
 class _HardBrake:
     """Axes that brake with their acceleration at once.
 
@@ -744,14 +732,14 @@ class DirectFollower:
         if dt <= 0.0:
             return self._q, self._dq
         limits, distance = self._limits, self._target - self._q
-        ceiling = np.minimum(limits.velocity, _stoppable(np.abs(distance), limits.acceleration))
+        ceiling = np.minimum(limits.velocity, stoppable(np.abs(distance), limits.acceleration))
         # an axis that had to pass its target, since that came too near, stays within its range
         below = np.minimum(limits.lowest, self._target) - self._q
         above = np.maximum(limits.highest, self._target) - self._q
         velocity = np.clip(
             np.clip(distance / max(self._left, APPROACH), -ceiling, ceiling),
-            -_stoppable(-below, limits.acceleration),
-            _stoppable(above, limits.acceleration),
+            -stoppable(-below, limits.acceleration),
+            stoppable(above, limits.acceleration),
         )
         dq = self._dq + np.clip(velocity - self._dq, -limits.acceleration * dt, limits.acceleration * dt)
         return self._q + np.clip(dq * dt, np.minimum(below, 0.0), np.maximum(above, 0.0)), dq
