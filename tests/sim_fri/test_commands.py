@@ -52,7 +52,9 @@ def wave(time: float, amplitude: float) -> float:
 
 @pytest.mark.parametrize("version", Version)
 @pytest.mark.parametrize("receive", [(1, 1), (1, 2), (5, 1), (10, 1)])
-def test_the_arm_follows_a_law_one_and_a_half_receive_periods_behind(version: Version, receive: tuple[int, int]) -> None:
+def test_the_arm_follows_a_law_one_and_a_half_receive_periods_behind(
+    version: Version, receive: tuple[int, int]
+) -> None:
     rig = Rig(configuration=SessionConfiguration(version, *receive)).active()
     start = rig.now * 1e-9
     rig.client.law = sine(0.3, start)

@@ -24,9 +24,10 @@ _TOGETHER = 1e-9
 class CommandInterpolator:
     """Follows the commands of a client, one set-point per tick.
 
-    The reference goes straight from command to command in the client's time, and on beyond the last one for a while; its
-    mean over a receive period makes it smooth. So late answers do not hurry the arm, and the set-points accelerate no harder
-    than the commands. What is missing breaks the reference: the set-points then return to it within the limits of the axes.
+    The reference goes straight from command to command in the client's time, and on beyond the last one for a
+    while; its mean over a receive period makes it smooth. So late answers do not hurry the arm, and set-points
+    accelerate no harder than the commands. What is missing breaks the reference: the set-points then return to it
+    within the limits of the axes.
 
     Args:
         robot: its limits hold.
@@ -95,7 +96,11 @@ class CommandInterpolator:
         """The step to a target that moves with a speed, or as much of it as an axis can do."""
         step: Array = target - self.q
         lag = step - speed
-        if self._is_broken and np.abs(lag).max() < _TOGETHER and np.abs(speed - self._speed).max() < _TOGETHER:
+        if (
+            self._is_broken
+            and np.abs(lag).max() < _TOGETHER
+            and np.abs(speed - self._speed).max() < _TOGETHER
+        ):
             self._is_broken = self._knots[0].due < self._time
         if not self._is_broken:
             return np.clip(step, -self._leap, self._leap)
@@ -103,7 +108,7 @@ class CommandInterpolator:
         return self._bounded(speed + np.sign(lag) * np.minimum(np.abs(lag), closing))
 
     def _bounded(self, step: Array) -> Array:
-        """The step nearest to another one within the limits of velocity and acceleration, and before those of position."""
+        """The step nearest to another one within velocity and acceleration, that stops before the position limits."""
         fastest, change = self._fastest * TICK, self._acceleration * TICK * TICK
         step = np.clip(np.clip(step, -fastest, fastest), self._speed - change, self._speed + change)
         down = stoppable(self.q - self._low, self._acceleration) * TICK
