@@ -41,7 +41,7 @@ _ROUNDING, _AT_REST = 1.02, 1e-6
 _CHECKED = 12
 _TINY = 1e-12
 #: Margin of the fraction of a step, for the noise of the inverse kinematics.
-_EXACT = 1e-5
+_EXACT = 1e-4
 
 
 class RateProfile:
