@@ -52,9 +52,7 @@ def live(
         refuse_existing(save, overwrite=overwrite, name="save")
     with target.connect(control=False, state_rate=rate) as arm:
         arm.subscribe(rate=rate, groups=groups_for(arm.connection.welcome.groups))
-        with live_view(
-            arm, save=save, to=to, viewer=True if rerun else None, overwrite=overwrite
-        ) as view:
+        with live_view(arm, save=save, to=to, viewer=True if rerun else None, overwrite=overwrite) as view:
             if not as_json:
                 places = [str(save)] * (save is not None) + [to] * bool(to)
                 if rerun or not places:
