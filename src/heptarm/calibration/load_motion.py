@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
-from heptarm.calibration.load import (
+from heptarm.calibration.load_estimate import (
     LoadEstimate,
     LoadSamples,
     check_rating,
@@ -47,7 +47,7 @@ _OFFSETS = np.array(
 #: Room that is left to the limits of the joints [rad].
 _ROOM = math.radians(3.0)
 #: Default speed, a fraction of each axis' maximum, and time for which a rest is measured [s].
-SPEED, SECONDS = 0.1, 1.5
+SPEED, SECONDS = 0.1, 2.0
 #: Noise of an averaged torque that a plan counts on, as a fraction of the axis' highest torque.
 _NOISE = 5e-5
 #: Time after a motion in which the arm still settles [s].
