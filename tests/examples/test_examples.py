@@ -21,8 +21,8 @@ REAL_TIME = (
 )
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
-#: The same skills as in the cookbook, whose page runs in every test, and in the scenarios.
-IN_LONG_RUN = ("15_pick_and_place.py", "16_insertion.py", "17_polishing.py")
+#: The same skills as in the cookbook, whose page runs in every test, and in the scenarios; and as in tests/calibration.
+IN_LONG_RUN = ("15_pick_and_place.py", "16_insertion.py", "17_polishing.py", "26_calibrate.py")
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself
