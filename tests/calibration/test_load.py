@@ -31,7 +31,9 @@ STILL = np.zeros(7)
 STATES = 500
 
 
-def at_rest(seed: int | None, load: Body, declared: Body | None = None, postures: Array = RESTS) -> calibration.LoadSamples:
+def at_rest(
+    seed: int | None, load: Body, declared: Body | None = None, postures: Array = RESTS
+) -> calibration.LoadSamples:
     """What the sensors of a seed show in rests, averaged; None: ideal ones."""
     return in_motion(seed, load, declared, postures, np.zeros_like(postures), np.zeros_like(postures), STATES)
 
@@ -54,7 +56,11 @@ def swings(count: int) -> tuple[Array, Array, Array]:
     """Positions, velocities and accelerations of A4 to A7 that swing, moments in no order."""
     random = np.random.default_rng(0)
     offset, dq, ddq = (random.uniform(-1, 1, (count, 7)) for _ in range(3))
-    return HOME + offset * (0, 0, 0, 0.5, 1.2, 0.7, 1.5), dq * (0, 0, 0, 0.5, 1, 1, 1), ddq * (0, 0, 0, 4, 8, 8, 8)
+    return (
+        HOME + offset * (0, 0, 0, 0.5, 1.2, 0.7, 1.5),
+        dq * (0, 0, 0, 0.5, 1, 1, 1),
+        ddq * (0, 0, 0, 4, 8, 8, 8),
+    )
 
 
 def test_the_regressor_is_the_dynamics_of_heptarm() -> None:
@@ -72,7 +78,9 @@ def test_the_regressor_is_the_dynamics_of_heptarm() -> None:
         assert np.allclose(by @ parameters, loaded - bare, atol=1e-10)
 
 
-@pytest.mark.parametrize("declared", [None, Body(1.2, np.array([0.0, 0.0, 0.06])), Body(4.0, np.array([0.0, 0.0, 0.1]))])
+@pytest.mark.parametrize(
+    "declared", [None, Body(1.2, np.array([0.0, 0.0, 0.06])), Body(4.0, np.array([0.0, 0.0, 0.1]))]
+)
 def test_ideal_sensors_give_the_exact_load_whatever_is_declared(declared: Body | None) -> None:
     found = calibration.estimate_load(at_rest(None, LOAD, declared), robot="iiwa14", declared=declared)
     assert found.mass == pytest.approx(2.0, abs=2e-3)
@@ -115,7 +123,9 @@ def test_inertia_from_a_motion() -> None:
 
 
 def test_an_impossible_inertia_becomes_one_that_a_body_can_have() -> None:
-    thin = np.array([2.0, 0.02, -0.04, 0.16, 0.01, 0.02, 0.003, 0.0, 0.0, 0.0])  # much too little about the centre
+    thin = np.array(
+        [2.0, 0.02, -0.04, 0.16, 0.01, 0.02, 0.003, 0.0, 0.0, 0.0]
+    )  # much too little about the centre
     made = consistent(thin, np.diag([1e-2, 1e-3, 1e-3, 1e-3, *[3e-2] * 6]) ** 2)
     com = made[1:4] / made[0]
     about = np.array([[made[4], made[7], made[8]], [made[7], made[5], made[9]], [made[8], made[9], made[6]]])

@@ -58,7 +58,9 @@ def test_a_load_is_measured_and_compared(arm: ha.Arm) -> None:
     assert saved_targets()["lab1"].tools == (saved,) and saved.tcp == declared.tcp
 
 
-def test_a_load_beyond_the_rating_is_refused_before_it_moves(arm: ha.Arm, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_load_beyond_the_rating_is_refused_before_it_moves(
+    arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
     heavy = ha.Tool("heavy", mass=30.0)
     moved: list[object] = []
     monkeypatch.setattr(ha.Arm, "move", lambda *given, **more: moved.append(given))

@@ -70,7 +70,9 @@ def test_orientation_from_points_on_two_axes() -> None:
         angles.append(angle)
     assert inside >= 90
     assert np.quantile(angles, 0.95) < math.radians(0.1)
-    exact = calibration.tcp(about(POINT, TILTS), along={"z": reaching("z", 0.12, (10, 5, 170)), "-y": _minus_y()})
+    exact = calibration.tcp(
+        about(POINT, TILTS), along={"z": reaching("z", 0.12, (10, 5, 170)), "-y": _minus_y()}
+    )
     assert exact.pose.angle_to(TIP) < 1e-9
 
 
@@ -143,7 +145,9 @@ def test_axes_that_cannot_give_an_orientation_are_refused() -> None:
 
 def test_a_tip_becomes_a_frame_and_the_rest_of_the_tool_stays() -> None:
     found = calibration.tcp(about(POINT, TILTS))
-    old = Tool("gripper", mass=1.2, com=(0, 0, 0.06), tcp=Pose.at(0, 0, 0.1), frames={"pad": Pose.at(0, 0.04)})
+    old = Tool(
+        "gripper", mass=1.2, com=(0, 0, 0.06), tcp=Pose.at(0, 0, 0.1), frames={"pad": Pose.at(0, 0.04)}
+    )
     new = found.to_tool(old)
     assert new.frame_names == ("tcp", "pad") and new.tcp == found.pose and new.mass == 1.2
     assert found.to_tool(old, frame="needle").frame_names == ("needle", "tcp", "pad")

@@ -52,9 +52,9 @@ for name in sys.argv[1:]:
 
 
 @pytest.fixture(scope="module")
-def lender(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lender]:
-    """The virtual cabinets of all pages."""
-    with Lender(tmp_path_factory.mktemp("lender") / "socket", 1.0, FASTER) as lender:
+def lender(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lender]:
+    """The virtual cabinet of all pages of a speed."""
+    with Lender(tmp_path_factory.mktemp("lender") / "socket", request.param) as lender:
         yield lender
 
 
@@ -82,13 +82,18 @@ def test_snippets_compile(page: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page",
+    ("lender", "page"),
     [
-        pytest.param(page, marks=[pytest.mark.long] if page.name in IN_LONG_RUN else [])
-        for page in PAGES
+        pytest.param(
+            1.0 if page.name in REAL_TIME else FASTER,
+            page,
+            marks=[pytest.mark.long] if page.name in IN_LONG_RUN else [],
+            id=_id(page),
+        )
+        for page in sorted(PAGES, key=lambda page: page.name not in REAL_TIME)
         if any(run for *_, run in _blocks(page))
     ],
-    ids=_id,
+    indirect=["lender"],
 )
 def test_snippets_run(page: Path, tmp_path: Path, lender: Lender) -> None:
     files = []

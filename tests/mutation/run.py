@@ -116,6 +116,7 @@ class Copy:
             symlinks=True,
             ignore=lambda _, names: [name for name in names if name == "__pycache__"],
         )
+        (folder / "cabinet").symlink_to(ROOT / "cabinet")  # beside the sources, where the package looks for it
         compileall.compile_dir(folder / "src", quiet=2)
 
     def run(self, tests: tuple[str, ...], limit: float | None = None) -> Verdict:

@@ -16,6 +16,7 @@ from heptarm.sim.fri.controller_side import MIRRORED
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.pose import Pose
+from tests.long import longer
 from tests.sim_fri.rig import READY, Law, Rig, State, mirror
 
 TORQUE = MotionOverlay(m.CommandMode.TORQUE, m.ControlMode.JOINT_IMPEDANCE)
@@ -49,9 +50,17 @@ def wave(time: float, amplitude: float) -> float:
 
 # ------------------------------------------------------------------------------ what is carried out
 
+#: Receive period and multiplier; each with one version, and in the long run with each.
+RECEIVED = [(1, 1), (1, 2), (5, 1), (10, 1)]
 
-@pytest.mark.parametrize("version", Version)
-@pytest.mark.parametrize("receive", [(1, 1), (1, 2), (5, 1), (10, 1)])
+
+@pytest.mark.parametrize(
+    ("version", "receive"),
+    longer(
+        list(zip(Version, RECEIVED, strict=True)),
+        [(version, receive) for version in Version for receive in RECEIVED],
+    ),
+)
 def test_the_arm_follows_a_law_one_receive_period_behind(version: Version, receive: tuple[int, int]) -> None:
     rig = Rig(configuration=SessionConfiguration(version, *receive)).active()
     start = rig.now * 1e-9

@@ -176,6 +176,8 @@ def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
     newest = arm.connection.newest()
     mode = None if newest is None else newest.groups.mode
     arm.remember_tools(saved.tools)
-    is_measured = saved.tool in {tool.name for tool in saved.tools}  # its data may be newer than the cabinet's
+    is_measured = saved.tool in {
+        tool.name for tool in saved.tools
+    }  # its data may be newer than the cabinet's
     if control and saved.tool and (mode is None or mode.tool != saved.tool or is_measured):
         arm.attach_tool(saved.tool)

@@ -31,8 +31,8 @@ from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import load_check, program_request
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
-from heptarm.arm.motion.load_check import LoadCheck
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
+from heptarm.arm.motion.load_check import LoadCheck
 from heptarm.arm.motion.preview import ProgramPreview
 from heptarm.arm.motion.program_request import ProgramTerms
 from heptarm.arm.motion.recovery import RecoveryAttempts
@@ -1062,9 +1062,10 @@ class ArmVerbs(Sealed):
     def verify_load(self, *, refuse: float = load_check.REFUSE) -> LoadCheck:
         """Check the load data of a resting arm that nothing touches: call it before impedance control.
 
-        A compliant arm sinks under a weight that its load data lack. What the sensors' accuracy does not explain, 3 % of
-        the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion in an
-        impedance mode that begins in position control logs the same warning; none is refused, for it may begin in contact.
+        A compliant arm sinks under a weight that its load data lack. What the sensors' accuracy does not explain, 3 %
+        of the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion in an
+        impedance mode that begins in position control logs the same warning; none is refused, for it may begin in
+        contact.
 
         Args:
             refuse: fraction of the highest torque of an axis above which it is an error, (0, 1].

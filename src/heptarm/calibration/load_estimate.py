@@ -27,8 +27,8 @@ from heptarm.values.robot import Body, RobotModel, robot, symmetric
 from heptarm.values.text import lines
 from heptarm.values.tool import KnownTool, Tool, as_tool
 
-#: Prior standard deviations of a torque sensor's gain, and of its offset as a fraction of the highest torque: a third of
-#: the 2 % of KUKA's brochure, and less.
+#: Prior standard deviations of a torque sensor's gain, and of its offset as a fraction of the highest torque: a third
+#: of the 2 % of KUKA's brochure, and less.
 GAIN, OFFSET = 0.007, 0.005
 #: Prior standard deviation of an element of inertia, which means nothing [kg m²]; one that is known better is measured.
 _ANY_INERTIA, _MEASURED_INERTIA = 1.0, 0.02
@@ -45,6 +45,7 @@ _TOUCHED = 0.015
 #: Offsets and gains of the sensors that are not believed, in prior standard deviations.
 _IMPLAUSIBLE = 5.0
 _AXES = 7
+_AT_REST = frozen(np.zeros(_AXES))
 
 
 def _parameters(mass: float, com: npt.ArrayLike, inertia: Array) -> Array:
@@ -72,8 +73,8 @@ _TO_PARAMETERS = np.linalg.inv(np.array([_parameters_of(one) for one in _BASIS])
 def load_regressor(
     model: RobotModel,
     q: npt.ArrayLike,
-    dq: npt.ArrayLike = np.zeros(_AXES),
-    ddq: npt.ArrayLike = np.zeros(_AXES),
+    dq: npt.ArrayLike = _AT_REST,
+    ddq: npt.ArrayLike = _AT_REST,
     *,
     acceleration: npt.ArrayLike = GRAVITY,
 ) -> Array:
@@ -348,8 +349,8 @@ def _check_turned(model: RobotModel, samples: LoadSamples, acceleration: npt.Arr
     turned = float(np.arccos(np.clip(seen @ seen.T, -1.0, 1.0)).max())
     if turned < _TURNED:
         raise CommandRejected(
-            f"the samples must differ in their postures: gravity turns by {math.degrees(turned):.1f} deg in the flange's "
-            f"axes, and at least {math.degrees(_TURNED):.0f} deg are needed",
+            f"the samples must differ in their postures: gravity turns by {math.degrees(turned):.1f} deg in the "
+            f"flange's axes, and at least {math.degrees(_TURNED):.0f} deg are needed",
             parameter="samples",
             value=turned,
             hint="measure with A4 to A7 in several positions",
@@ -381,8 +382,8 @@ def _check_untouched(missed: Array, torque: Array, sensors: Array) -> None:
     if part[sample, axis] > _TOUCHED or np.abs(sensors).max() > _IMPLAUSIBLE:
         raise CommandRejected(
             f"the samples do not fit one load, sample {sample + 1} least: {abs(missed[sample, axis]):.1f} Nm of "
-            f"A{axis + 1} remain, and offsets or gains of the torque sensors would be {np.abs(sensors).max():.1f} times "
-            "what is usual",
+            f"A{axis + 1} remain, and offsets or gains of the torque sensors would be {np.abs(sensors).max():.1f} "
+            "times what is usual",
             parameter="samples",
             value=float(missed[sample, axis]),
             allowed=f"[0, {_TOUCHED * torque[axis]:.1f}] Nm, [0, {_IMPLAUSIBLE:g}] times",
@@ -398,8 +399,8 @@ def _estimate(
     sigma = np.sqrt(np.diagonal(covariance))
     if total[0] < 2.0 * sigma[0]:
         raise CommandRejected(
-            f"mass must be above 0 kg by two standard deviations, got {total[0]:.3f} ± {sigma[0]:.3f} kg: nothing is on "
-            "the flange, or the load data in use are too large",
+            f"mass must be above 0 kg by two standard deviations, got {total[0]:.3f} ± {sigma[0]:.3f} kg: nothing is "
+            "on the flange, or the load data in use are too large",
             parameter="mass",
             value=float(total[0]),
             hint="mount the tool; for an empty flange call arm.detach_tool()",
@@ -490,9 +491,7 @@ def consistent(parameters: Array, covariance: Array) -> Array:
         full = factor @ factor.T
         second = full[:3, :3]
         about = np.trace(second) * np.eye(3) - second
-        return np.concatenate(
-            [[full[3, 3]], full[:3, 3], about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]]
-        )
+        return np.concatenate([[full[3, 3]], full[:3, 3], about[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
 
     # begin with the nearest positive definite matrix, then Levenberg-Marquardt
     moments, axes = np.linalg.eigh(_pseudo_inertia(parameters))

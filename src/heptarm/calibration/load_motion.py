@@ -94,7 +94,8 @@ class LoadPlan(Value):
         off = np.degrees(self.postures - self.postures[0])
         moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(3, 7))
         box = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in zip("xyz", self.low, self.high, strict=True)
+            f"{axis} {low:.2f} to {high:.2f}"
+            for axis, low, high in zip("xyz", self.low, self.high, strict=True)
         )
         rows = {
             "moves": f"{moves} deg; A1 to A3 stay",
@@ -122,7 +123,8 @@ def load_plan(
 
     Raises:
         CommandRejected: this posture is not suited.
-        CollisionForeseen: `arm.collision_check` found bodies that would touch; OutsideWorkspace: it leaves `arm.workspace`.
+        CollisionForeseen: `arm.collision_check` found bodies that would touch.
+        OutsideWorkspace: it leaves `arm.workspace`.
         ModeConflict: a motion runs.
     """
     word(excitation, "excitation", EXCITATIONS)
@@ -158,10 +160,9 @@ def _postures(model: RobotModel, start: Array) -> Array:
     result = np.tile(start, (len(_OFFSETS), 1))
     for row, offsets in zip(result[1:], _OFFSETS[1:], strict=True):
         for axis, offset in zip(range(3, 7), deg(*offsets), strict=True):
-            if not low[axis] <= start[axis] + offset <= high[axis]:
-                room = (low[axis] - start[axis], high[axis] - start[axis])
-                offset = -offset if room[0] <= -offset <= room[1] else float(np.clip(offset, *room))
-            row[axis] = start[axis] + offset
+            down, up = low[axis] - start[axis], high[axis] - start[axis]
+            fitting = [one for one in (offset, -offset) if down <= one <= up]
+            row[axis] += fitting[0] if fitting else np.clip(offset, min(down, 0.0), max(up, 0.0))
     return result
 
 

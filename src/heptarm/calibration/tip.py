@@ -97,7 +97,11 @@ class TcpEstimate(Value):
         a, b, c = np.degrees(self.pose.abc)
         turned = f"a {a:.2f}  b {b:.2f}  c {c:.2f} deg"
         if math.isnan(self.sigma_angle):
-            return f"{turned} (not estimated from residuals)" if self.pose.quat[3] < 1.0 else "that of the flange"
+            return (
+                f"{turned} (not estimated from residuals)"
+                if self.pose.quat[3] < 1.0
+                else "that of the flange"
+            )
         return f"{turned} ± {math.degrees(self.sigma_angle):.2f} deg"
 
     def to_tool(self, tool: Tool | KnownTool | str, *, frame: str = "tcp") -> Tool:
@@ -140,8 +144,8 @@ def tcp(
 
     Args:
         poses: four or more, with the tip at the fixed point.
-        along: two more poses for the orientation, by an axis of the tool: in the first the fixed point touches that axis,
-            in the second the half-plane between that axis and the second one. For example `{"z": p, "x": q}`.
+        along: two more poses for the orientation, by an axis of the tool: in the first the fixed point touches that
+            axis, in the second the half-plane between that axis and the second one. For example `{"z": p, "x": q}`.
         aligned: instead of `along`: poses in which the tool's axes are those of `world`; their mean counts.
         world: orientation of the tool in the base in the poses of `aligned`; points down unless you say otherwise.
         tolerance: the most by which a pose may miss the fixed point [m].
@@ -204,7 +208,9 @@ def tcp(
 
 def _checked(poses: Sequence[Pose], name: str) -> list[Pose]:
     if isinstance(poses, Pose) or not isinstance(poses, Sequence):
-        raise ShapeError(f"{name} must be a sequence of poses, got {shown(poses)}", parameter=name, value=poses)
+        raise ShapeError(
+            f"{name} must be a sequence of poses, got {shown(poses)}", parameter=name, value=poses
+        )
     for index, one in enumerate(poses):
         check_pose(one, f"{name}[{index}]")
     return list(poses)
@@ -274,7 +280,7 @@ def _along(along: Mapping[str, Pose], tip: Array, point: Array, pointing: float)
             allowed=", ".join(_AXES),
             hint='for example {"z": pose, "x": pose}',
         )
-    (first, second), (one, other) = along, along.values()
+    first, second = along
     if first[-1] == second[-1]:
         raise ShapeError(
             f"along must have two different axes, got {first} and {second}", parameter="along", value=along
@@ -379,4 +385,6 @@ def _still_pose(arm: ArmVerbs, timeout: float) -> Pose:
         return len(rows) == _STATES and bool(np.ptp(np.array(list(rows.values())), axis=0).max() < _STILL)
 
     arm.wait_until(is_still, timeout=timeout)
-    return Pose.from_matrix(forward(instance(arm, ArmVerbs, "arm").robot, np.mean(list(rows.values()), axis=0)))
+    return Pose.from_matrix(
+        forward(instance(arm, ArmVerbs, "arm").robot, np.mean(list(rows.values()), axis=0))
+    )

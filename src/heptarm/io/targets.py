@@ -139,7 +139,9 @@ def _read(name: str, table: Any) -> SavedTarget:
     values = {key: table[key] for key in _KEYS if key in table}
     tools = table.get(_TOOLS, {})
     if not isinstance(tools, dict):
-        raise CommandRejected(f"{where}: tools must be tables", parameter=name, hint=f"write [{name}.tools.NAME]")
+        raise CommandRejected(
+            f"{where}: tools must be tables", parameter=name, hint=f"write [{name}.tools.NAME]"
+        )
     values[_TOOLS] = tuple(_read_tool(one, content, where) for one, content in tools.items())
     if isinstance(values.get("flange"), float):  # a height may be a number
         values["flange"] = f"{values['flange']:g}"
@@ -267,8 +269,8 @@ def save_tool(target: str, tool: Tool) -> None:
         tomllib.loads(text)
     except ValueError:  # such as one that a person has written as an inline table
         raise CommandRejected(
-            f"the tool {tool.name} of the target {target} in {targets_file()} cannot be replaced: it has no table of its "
-            "own",
+            f"the tool {tool.name} of the target {target} in {targets_file()} cannot be replaced: it has no table of "
+            "its own",
             parameter="tool",
             hint=f"remove it with an editor, or write it as [{target}.{_TOOLS}.{tool.name}]",
         ) from None
@@ -279,7 +281,8 @@ def _tool_lines(target: str, tool: Tool) -> list[str]:
     """A tool as lines of the file; its shapes are left out."""
     table = ".".join(map(_text, (target, _TOOLS, tool.name)))
     numbers = {"mass": tool.mass, "com": tool.com.tolist(), "inertia": tool.inertia.tolist()}
-    return [f"[{table}]", *(f"{key} = {value}" for key, value in numbers.items())] + [f"frames.{_text(name)} = {pose.array.tolist()}" for name, pose in tool.frames]
+    numbers |= {f"frames.{_text(name)}": pose.array.tolist() for name, pose in tool.frames}
+    return [f"[{table}]", *(f"{key} = {value}" for key, value in numbers.items())]
 
 
 def _joined(text: str, lines: list[str]) -> str:

@@ -33,8 +33,8 @@ class LoadCheck(Value):
         residual: mean external torque of each axis, shape (7,) [Nm].
         axis: the one with the largest part of its highest torque, 1 to 7.
         fraction: that part.
-        mass: mass at the flange that would explain the torques [kg]: what the load data lack, if nothing touches the arm;
-            negative: they have too much.
+        mass: mass at the flange that would explain the torques [kg]: what the load data lack, if nothing touches the
+            arm; negative: they have too much.
     """
 
     robot: RobotModel
@@ -61,8 +61,8 @@ class LoadCheck(Value):
         """One line: the axis, its torque, and the mass that would explain it."""
         torque = float(self.residual[self.axis - 1])
         return (
-            f"the load data leave {abs(torque):.1f} Nm of A{self.axis}, {self.fraction:.1%} of its highest torque, as if "
-            f"{self.mass:+.2f} kg were at the flange"
+            f"the load data leave {abs(torque):.1f} Nm of A{self.axis}, {self.fraction:.1%} of its highest torque, as "
+            f"if {self.mass:+.2f} kg were at the flange"
         )
 
 
