@@ -151,7 +151,7 @@ def _read(name: str, table: Any) -> SavedTarget:
 def _refuse_unknown(table: dict[str, Any], allowed: tuple[str, ...], where: str, name: str) -> None:
     if unknown := sorted(set(table) - set(allowed)):
         raise CommandRejected(
-            f"{where} has {', '.join(unknown)}, which it must not have",
+            f"{where} has {', '.join(unknown)}, which no such entry has",
             parameter=name,
             allowed=", ".join(allowed),
             hint=f"it may have {', '.join(allowed)}",
