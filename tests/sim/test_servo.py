@@ -9,6 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from heptarm.planning.motion import ServoMotion
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
@@ -199,7 +200,13 @@ def test_wild_targets_bring_no_axis_beyond_its_limits(
 ) -> None:
     """Joint targets beyond the limits, poses out of reach, velocities that no axis has, at any intervals."""
     random, plant, ear = np.random.default_rng(seed), Plant("iiwa14", q=tuple(CORNER.tolist())), Ear()
-    motion = {"servo": motions.servo, "direct": motions.direct, "straight": motions.straight}[kind]()
+    motion: ServoMotion = (
+        motions.straight()
+        if kind == "straight"
+        else motions.direct()
+        if kind == "direct"
+        else motions.servo()
+    )
     plant.submit(MotionCommand(7, motion, listener=ear))
     plant.step(2)
     path, ticks = [np.array([CORNER] * 3)], 0
