@@ -24,8 +24,11 @@ REAL_TIME = (
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
 #: The same skills as in the cookbook, whose page runs in every test, and in the scenarios; what the page about several
-#: arms does.
-IN_LONG_RUN = ("15_pick_and_place.py", "16_insertion.py", "17_polishing.py", "20_two_arms.py")
+#: arms does; and what tests/calibration do.
+IN_LONG_RUN = tuple(
+    f"{one}.py" for one in ("15_pick_and_place", "16_insertion", "17_polishing", "20_two_arms")
+)
+IN_LONG_RUN += ("26_calibrate.py",)
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself

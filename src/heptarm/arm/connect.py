@@ -172,5 +172,9 @@ def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
         arm.speed = saved.speed
     newest = arm.connection.newest()
     mode = None if newest is None else newest.groups.mode
-    if control and saved.tool and (mode is None or mode.tool != saved.tool):
+    arm.remember_tools(saved.tools)
+    is_measured = saved.tool in {
+        tool.name for tool in saved.tools
+    }  # its data may be newer than the cabinet's
+    if control and saved.tool and (mode is None or mode.tool != saved.tool or is_measured):
         arm.attach_tool(saved.tool)

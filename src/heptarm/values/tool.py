@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.checks import Array, Value, array, frozen, shown, within
+from heptarm.values.checks import Array, Value, array, frozen, instance, shown, within
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
@@ -172,6 +172,27 @@ class KnownTool(Value):
     def frame_names(self) -> tuple[str, ...]:
         """Names of its frames."""
         return tuple(name for name, _ in self.frames)
+
+
+def as_tool(tool: Tool | KnownTool | str) -> Tool:
+    """The tool itself; one of a known tool; of a name a new one, which weighs nothing.
+
+    Raises:
+        ShapeError: it is none of these.
+    """
+    if isinstance(tool, Tool):
+        return tool
+    if isinstance(tool, str):
+        return Tool(tool)
+    known = instance(tool, KnownTool, "tool", hint="a Tool, one of arm.tools, or the name of a new one")
+    return Tool(
+        known.name,
+        mass=known.mass,
+        com=known.com,
+        inertia=known.inertia,
+        frames=dict(known.frames),
+        shapes=known.shapes,
+    )
 
 
 def _text(tool: _Carried | KnownTool) -> str:
