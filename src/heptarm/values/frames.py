@@ -43,13 +43,18 @@ def check_name(
     return check_printable(value, parameter)
 
 
-def check_printable(value: str, parameter: str) -> str:
+def check_printable(value: str, parameter: str, *, lines: bool = False) -> str:
     """Refuse a text that could control a terminal, or that no file or message can carry; returns the text.
+
+    Args:
+        value: the text.
+        parameter: its name, for the error.
+        lines: it may have line breaks.
 
     Raises:
         ShapeError: it has control characters, NUL among them, invisible ones or half of a surrogate pair.
     """
-    if value != printable(value):
+    if value != printable(value, lines=lines):
         raise ShapeError(
             f"{parameter} must have printable characters only, got {value[:100]!a}",
             code=3,
