@@ -1,4 +1,4 @@
-"""Measuring the load on the flange: which postures the arm takes, what it says before it moves, and what it records."""
+"""Measuring the load on the flange: the postures of the arm, the plan that it shows before it moves, its recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.calibration.load_estimate import (
-    LoadEstimate,
+    IdentifiedLoad,
     LoadSamples,
     check_rating,
     estimate_load,
@@ -189,7 +189,7 @@ def load(
     plan: LoadPlan | None = None,
     declared: Body | None = None,
     confirm: Callable[[LoadPlan], bool] | None = None,
-) -> LoadEstimate:
+) -> IdentifiedLoad:
     """Measure mass, centre of mass and, if planned, inertia of what is on the flange. The arm moves, and returns.
 
     What moves is logged, and shown to `confirm`, before it moves. The load data in use stay: the estimate is compared
