@@ -47,7 +47,6 @@ from heptarm.arm.motion.servo import (
     documented,
 )
 from heptarm.arm.translate.conditions import condition_message
-from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.planning.search import STATES, TIMEOUT, Goal
 from heptarm.record.camera import CameraFeed, CameraSubject
@@ -70,7 +69,7 @@ from heptarm.values.robot import Body, RobotModel
 from heptarm.values.sealed import Sealed
 from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
-from heptarm.values.text import lines
+from heptarm.values.text import lines, printable
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.values.workspace import Workspace
 from heptarm.wire import messages as wire

@@ -133,7 +133,7 @@ def main() -> None:
     except CycloptsError as error:
         _fail(f"{_misplaced(error) or ' '.join(str(error).split())} ({_help()})", code=_USAGE)
     except HeptarmError as error:
-        from heptarm.arm.translate.text import printable
+        from heptarm.values.text import printable
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.checks import Array, Value, array, frozen, instance, shown, within
-from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
+from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
 from heptarm.values.shape import Shape, checked_shapes
@@ -254,14 +254,7 @@ def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose
 
 
 def _checked(name: str, parameter: str, longest: int) -> str:
-    if not isinstance(name, str) or not 1 <= len(name.encode()) <= longest:
-        raise ShapeError(
-            f"{parameter} must be a name of 1 to {longest} bytes, got {shown(name)}",
-            code=3,
-            parameter=parameter,
-            value=name,
-        )
-    if SEPARATOR in name:
+    if SEPARATOR in check_name(name, parameter, longest=longest, hint=""):
         raise LimitError(
             f'{parameter} must not contain "{SEPARATOR}", got {shown(name)}',
             code=2,
