@@ -82,6 +82,7 @@ def test_verify_load_warns_and_refuses(arm: ha.Arm, caplog: pytest.LogCaptureFix
         assert arm.verify_load().is_fine and abs(arm.verify_load().mass) < 0.3
         arm.move(ha.hold(0.05), mode=modes.JointImpedance(500.0))
         assert "sinks" not in caplog.text
+    arm.wait_until(lambda state: isinstance(state.mode, modes.Position) and state.tau_ext[1] > 8.0)
     arm.move(ha.hold(0.05), mode=modes.JointImpedance(500.0))
     assert "a compliant arm sinks under a load that it does not know" in caplog.text
 

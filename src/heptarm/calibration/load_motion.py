@@ -67,7 +67,8 @@ class LoadPlan(Value):
     Attributes:
         robot: the robot.
         excitation: "rests" or "short".
-        postures: commanded joint positions of the rests, the present ones first, shape (n, 7) [rad]; A1 to A3 do not move.
+        postures: commanded joint positions of the rests, the present ones first, shape (n, 7) [rad]; A1 to A3 do not
+            move.
         speed: fraction of each axis' maximum.
         seconds: time of each rest [s].
         duration: of the whole [s]; NaN: the planner is not installed.
