@@ -46,7 +46,7 @@ def in_motion(
     true = np.array([model.inverse_dynamics(IIWA, *row, load=load) for row in zip(q, dq, ddq, strict=True)])
     expected = [model.inverse_dynamics(IIWA, *row, load=declared) for row in zip(q, dq, ddq, strict=True)]
     shown = true
-    if errors is not None:  # the mean of many readings, drawn at once
+    if seed is not None and errors is not None:  # the mean of many readings, drawn at once
         random = np.random.default_rng(len(q) + seed)
         shown = true + errors._gain * true + errors._offset + noise * random.standard_normal(noise.shape)
     return calibration.LoadSamples(q, shown, np.array(expected) - shown, noise, dq, ddq)

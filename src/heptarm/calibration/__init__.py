@@ -4,12 +4,12 @@ Poses, joint positions and torques come in; an estimate goes out, with the stand
 is changed by measuring: an estimate becomes a `Tool` by `to_tool`, and a tool of a saved target by `save`.
 """
 
-from heptarm.calibration.load_estimate import LoadEstimate, LoadSamples, estimate_load
+from heptarm.calibration.load_estimate import IdentifiedLoad, LoadSamples, estimate_load
 from heptarm.calibration.load_motion import LoadPlan, load, load_plan
 from heptarm.calibration.tip import TcpEstimate, record_poses, tcp
 
 __all__ = [
-    "LoadEstimate",
+    "IdentifiedLoad",
     "LoadPlan",
     "LoadSamples",
     "TcpEstimate",

@@ -138,7 +138,7 @@ class LoadSamples(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LoadEstimate(Value):
+class IdentifiedLoad(Value):
     """A load that was measured, in the flange frame.
 
     Attributes:
@@ -241,7 +241,7 @@ def estimate_load(
     robot: RobotModel | str,
     declared: Body | None = None,
     acceleration: npt.ArrayLike = GRAVITY,
-) -> LoadEstimate:
+) -> IdentifiedLoad:
     """Compute the load on the flange from measured torques. Nothing moves; `heptarm.calibration.load` measures them.
 
     Args:
@@ -393,7 +393,7 @@ def _check_untouched(missed: Array, torque: Array, sensors: Array) -> None:
 
 def _estimate(
     model: RobotModel, total: Array, covariance: Array, declared: Body, *, residual: Array, offset: Array
-) -> LoadEstimate:
+) -> IdentifiedLoad:
     """The load of ten parameters, checked."""
     of_load = covariance[:10, :10]
     sigma = np.sqrt(np.diagonal(covariance))
@@ -416,7 +416,7 @@ def _estimate(
     mass, com = float(total[0]), total[1:4] / total[0]
     by = np.concatenate([-com[:, None] / mass, np.eye(3) / mass], axis=1)
     sigma_com = np.sqrt(np.diagonal(by @ of_load[:4, :4] @ by.T))
-    return LoadEstimate(
+    return IdentifiedLoad(
         model,
         mass,
         frozen(com),

@@ -1,4 +1,4 @@
-"""Measuring the load on the flange: which postures the arm takes, what it says before it moves, and what it records."""
+"""Measuring the load on the flange: the postures of the arm, the plan that it shows before it moves, its recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.calibration.load_estimate import (
-    LoadEstimate,
+    IdentifiedLoad,
     LoadSamples,
     check_rating,
     estimate_load,
@@ -67,7 +67,8 @@ class LoadPlan(Value):
     Attributes:
         robot: the robot.
         excitation: "rests" or "short".
-        postures: joint positions of the rests, the present ones first, shape (n, 7) [rad]; A1 to A3 do not move.
+        postures: commanded joint positions of the rests, the present ones first, shape (n, 7) [rad]; A1 to A3 do not
+            move.
         speed: fraction of each axis' maximum.
         seconds: time of each rest [s].
         duration: of the whole [s]; NaN: the planner is not installed.
@@ -130,7 +131,8 @@ def load_plan(
     word(excitation, "excitation", EXCITATIONS)
     limit = min(within(speed, "speed", 0.0, 1.0, above=True), arm.speed)
     pause = within(seconds, "seconds", 0.1, 60.0, unit="s")
-    postures = _postures(arm.robot, arm.state.q)
+    # the commanded position: an elastic arm that returned to the measured one would have sunk by its deflection
+    postures = _postures(arm.robot, arm.state.q_cmd)
     sigma = np.sqrt(np.diagonal(predicted_sigma(arm.robot, postures, noise=_NOISE)))
     if sigma[0] > _MASS or sigma[1:4].max() > _MOMENT:
         raise CommandRejected(
@@ -189,7 +191,7 @@ def load(
     plan: LoadPlan | None = None,
     declared: Body | None = None,
     confirm: Callable[[LoadPlan], bool] | None = None,
-) -> LoadEstimate:
+) -> IdentifiedLoad:
     """Measure mass, centre of mass and, if planned, inertia of what is on the flange. The arm moves, and returns.
 
     What moves is logged, and shown to `confirm`, before it moves. The load data in use stay: the estimate is compared
@@ -210,7 +212,7 @@ def load(
     _check_groups(arm)
     arm.wait_for_rest()
     made = load_plan(arm) if plan is None else instance(plan, LoadPlan, "plan")
-    if np.abs(arm.state.q - made.postures[0]).max() > math.radians(1.0):
+    if np.abs(arm.state.q_cmd - made.postures[0]).max() > math.radians(1.0):
         raise CommandRejected(
             "the plan begins where the arm does not rest any more",
             parameter="plan",

@@ -188,7 +188,7 @@ def tcp(
     covariance = spread**2 * np.linalg.inv(matrix.T @ matrix)
     sigma = np.sqrt(np.diagonal(covariance)) * _student(3 * len(given) - 6)
     tip, point = found[:3], found[3:]
-    quat, sigma_angle = (0.0, 0.0, 0.0, 1.0), math.nan
+    quat, sigma_angle = np.array([0.0, 0.0, 0.0, 1.0]), math.nan
     if along is not None:
         pointing = math.hypot(spread * _student(3 * len(given) - 6), *sigma)
         quat, sigma_angle = _along(along, tip, point, pointing)

@@ -100,16 +100,16 @@ def tcp(
     if points is not None:
         taught = _taught(points, robot(model))
         found = calibration.tcp(taught, tolerance=tolerance)
-        old: Tool | KnownTool | str = save
+        saved = saved_target(place) if place else None
+        named = {one.name: one for one in saved.tools} if saved is not None else {}
+        old: Tool | KnownTool | str = named.get(save, save)
     else:
         with target.connect(control=guide != "none") as arm, _guiding(arm, guide) as confirm:
             about = calibration.record_poses(arm, count=poses, confirm=confirm)
             extra = {}
             for axis in axes:
                 what = f"let the fixed point touch the {axis} axis of the tool"
-                (extra[axis],) = calibration.record_poses(
-                    arm, count=1, confirm=lambda text, what=what: confirm(f"{what}, not its tip")
-                )
+                (extra[axis],) = calibration.record_poses(arm, count=1, confirm=_asking(confirm, what))
             old = arm.tools.get(save, save)
         found = calibration.tcp(about, along=extra or None, tolerance=tolerance)
     if place:
@@ -232,6 +232,11 @@ def _guiding(arm: Arm, guide: str) -> Iterator[Callable[[str], bool]]:
             arm.wait_for_rest()
 
     yield confirm
+
+
+def _asking(confirm: Callable[[str], bool], what: str) -> Callable[[str], bool]:
+    """What asks for something else than a pose about the tip."""
+    return lambda _: confirm(f"{what}, not its tip")
 
 
 def _ask(text: str) -> bool:
