@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.io.plan_box import PlanOutline, hand_over
-from heptarm.record.plot.chart import Band, Chart, Line, Mark, Row, Style
+from heptarm.record.plot.chart import Band, Chart, Line, Mark, ChartRow, Style
 from heptarm.record.plot.signals import path_line, path_row
 from heptarm.values.checks import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision
@@ -197,7 +197,7 @@ class ProgramPreview(Value):
             lines = (
                 Line(self.t, fractions[:, joint], label=f"A{joint + 1}", colour=joint) for joint in range(7)
             )
-            rows.append(Row(LIMITS[limit][0], "fraction of limit", tuple(lines), edges=(-1.0, 1.0)))
+            rows.append(ChartRow(LIMITS[limit][0], "fraction of limit", tuple(lines), edges=(-1.0, 1.0)))
         touched = [int(np.abs(self.t - found.t).argmin()) for found in self.collisions]
         path = self.tcp[:, :3]
         rows.append(path_row("tool frame", (path_line(path, "path"),), path[touched] * 1e3))

@@ -50,7 +50,7 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class ChartRow:
     """One pair of axes.
 
     Attributes:
@@ -125,7 +125,7 @@ class Chart:
     """
 
     title: str
-    rows: tuple[Row, ...]
+    rows: tuple[ChartRow, ...]
     bands: tuple[Band, ...] = ()
     marks: tuple[Mark, ...] = ()
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from heptarm.errors import require
-from heptarm.record.plot.chart import LONGEST, Chart, Mark, Row, Style, thinned, with_room
+from heptarm.record.plot.chart import LONGEST, Chart, Mark, ChartRow, Style, thinned, with_room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,7 +112,7 @@ def _widened(first: float, last: float) -> tuple[float, float]:
     return first - room, last + room
 
 
-def _draw_row(axes: Axes, row: Row, look: _Look) -> None:
+def _draw_row(axes: Axes, row: ChartRow, look: _Look) -> None:
     for line in row.lines:
         few = line if row.is_log else thinned(line, _POINTS)
         axes.plot(
@@ -192,7 +192,7 @@ def _apart(marks: Sequence[Mark], distance: float) -> list[Mark]:
     return found
 
 
-def _draw_path(axes: Any, row: Row, look: _Look) -> None:
+def _draw_path(axes: Any, row: ChartRow, look: _Look) -> None:
     """A path in space with equal scales in all directions."""
     for line in row.lines:
         points = np.stack([line.x, line.y, np.empty(0) if line.z is None else line.z])

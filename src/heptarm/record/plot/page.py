@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import require
-from heptarm.record.plot.chart import LONGEST, Chart, Line, Row, thinned, with_room
+from heptarm.record.plot.chart import LONGEST, Chart, Line, ChartRow, thinned, with_room
 
 #: Points of a line that a page has at most: enough to zoom in tenfold.
 _POINTS = 20_000
@@ -118,7 +118,7 @@ def _numbers(values: npt.NDArray[np.float64], kind: str) -> dict[str, str]:
     return {"dtype": kind, "bdata": base64.b64encode(values.astype(f"<{kind}").tobytes()).decode()}
 
 
-def _trace(line: Line, row: Row, x: str, y: str, *, is_first: bool) -> dict[str, Any]:
+def _trace(line: Line, row: ChartRow, x: str, y: str, *, is_first: bool) -> dict[str, Any]:
     few = line if row.is_log else thinned(line, _POINTS)
     return {
         "type": "scattergl" if len(few.x) > 5000 else "scatter",
@@ -155,7 +155,7 @@ def _path(line: Line, scene: str) -> dict[str, Any]:
     )
 
 
-def _points(row: Row, scene: str) -> list[dict[str, Any]]:
+def _points(row: ChartRow, scene: str) -> list[dict[str, Any]]:
     """Begins, ends and crosses of paths."""
     lines = [(line, line.z) for line in row.lines if line.z is not None and len(line.x)]
     begins = [[line.x[0], line.y[0], z[0]] for line, z in lines]
@@ -177,7 +177,7 @@ def _points(row: Row, scene: str) -> list[dict[str, Any]]:
     ]
 
 
-def _scene(row: Row, domain: list[float]) -> dict[str, Any]:
+def _scene(row: ChartRow, domain: list[float]) -> dict[str, Any]:
     """Axes in space with equal scales."""
     low, high = (edge.tolist() for edge in row.box)
     sizes = np.subtract(high, low)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.record.journal import NOTE
-from heptarm.record.plot.chart import Band, Chart, Line, Mark, Row, extremes
+from heptarm.record.plot.chart import Band, Chart, Line, Mark, ChartRow, extremes
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.record.samples import labels
 from heptarm.values.checks import shown, word
@@ -192,7 +192,7 @@ def _zero(recording: RecordedData, at: str) -> float:
     )
 
 
-def _row(name: str, recordings: Sequence[RecordedData], zeros: Sequence[float], kind: Kind) -> Row:
+def _row(name: str, recordings: Sequence[RecordedData], zeros: Sequence[float], kind: Kind) -> ChartRow:
     if name == PATH:
         lines = tuple(path_line(one["xyz"], one.path.name, index) for index, one in enumerate(recordings))
         return path_row("motion frame", lines)
@@ -219,15 +219,17 @@ def _row(name: str, recordings: Sequence[RecordedData], zeros: Sequence[float], 
 
     if kind == "time":
         lines = lines_of(lambda run, column: (times[run], columns[run][:, column]))
-        return Row(quantity.title, unit, lines, least=least, edges=() if by_limit is None else (-1.0, 1.0))
+        return ChartRow(
+            quantity.title, unit, lines, least=least, edges=() if by_limit is None else (-1.0, 1.0)
+        )
     if kind == "histogram":
         low, high = extremes(columns)
         room = max(0.0, least - (high - low)) / 2 or (0.5 if high == low else 0.0)
         bins = np.linspace(low - room, high + room, _BINS + 1)
         lines = lines_of(lambda run, column: _histogram(columns[run][:, column], bins))
-        return Row("samples", "%", lines, f"{quantity.title} [{unit}]", is_time=False)
+        return ChartRow("samples", "%", lines, f"{quantity.title} [{unit}]", is_time=False)
     lines = lines_of(lambda run, column: _spectrum(name, times[run], columns[run][:, column], least))
-    return Row(quantity.title, f"{unit}/√Hz", lines, "frequency [Hz]", is_time=False, is_log=True)
+    return ChartRow(quantity.title, f"{unit}/√Hz", lines, "frequency [Hz]", is_time=False, is_log=True)
 
 
 def path_line(xyz: npt.NDArray[np.float64], label: str, index: int = 0) -> Line:
@@ -236,9 +238,9 @@ def path_line(xyz: npt.NDArray[np.float64], label: str, index: int = 0) -> Line:
     return Line(*known.T, label=label, colour=index, dash=index)
 
 
-def path_row(frame: str, lines: tuple[Line, ...], crosses: npt.NDArray[np.float64] | None = None) -> Row:
+def path_row(frame: str, lines: tuple[Line, ...], crosses: npt.NDArray[np.float64] | None = None) -> ChartRow:
     """A row with paths of that frame."""
-    return Row(
+    return ChartRow(
         f"path of the {frame} (circle: begin, square: end)",
         "mm",
         lines,
