@@ -36,7 +36,7 @@ from .test_native import Twins
 
 ARM = robot("iiwa14")
 #: Hostile datagrams for each version.
-HOSTILE = longer(20_000, 200_000)
+HOSTILE = longer(8_000, 200_000)
 
 
 def check_limits(answer: bytes | None, wire: Version) -> None:

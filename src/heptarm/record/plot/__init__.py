@@ -4,7 +4,7 @@
 Matplotlib and `page` as an interactive page with plotly. No part of it reads a file or asks an arm.
 """
 
-from heptarm.record.plot.chart import Band, Chart, Line, Mark, ChartRow
+from heptarm.record.plot.chart import Band, Chart, ChartRow, Line, Mark
 from heptarm.record.plot.signals import KINDS, chart_of, compare
 
-__all__ = ["KINDS", "Band", "Chart", "Line", "Mark", "ChartRow", "chart_of", "compare"]
+__all__ = ["KINDS", "Band", "Chart", "ChartRow", "Line", "Mark", "chart_of", "compare"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from heptarm.errors import require
-from heptarm.record.plot.chart import LONGEST, Chart, Mark, ChartRow, Style, thinned, with_room
+from heptarm.record.plot.chart import LONGEST, Chart, ChartRow, Mark, Style, thinned, with_room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import require
-from heptarm.record.plot.chart import LONGEST, Chart, Line, ChartRow, thinned, with_room
+from heptarm.record.plot.chart import LONGEST, Chart, ChartRow, Line, thinned, with_room
 
 #: Points of a line that a page has at most: enough to zoom in tenfold.
 _POINTS = 20_000

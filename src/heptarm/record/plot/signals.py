@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.record.journal import NOTE
-from heptarm.record.plot.chart import Band, Chart, Line, Mark, ChartRow, extremes
+from heptarm.record.plot.chart import Band, Chart, ChartRow, Line, Mark, extremes
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.record.samples import labels
 from heptarm.values.checks import shown, word
