@@ -130,7 +130,7 @@ def test_names_of_sixty_notes_do_not_overlap() -> None:
     assert 10 < len(names) < 60 and "SafetyChanged" in [text.get_text() for text in names]
     low, high = axes.get_xlim()
     inches = np.diff(places) * axes.figure.get_size_inches()[0] * 0.85 / (high - low)
-    assert inches.min() > names[0].get_fontsize() / 72  # wider apart than the type is high
+    assert inches.min() > float(names[0].get_fontsize()) / 72  # wider apart than the type is high
     assert len(axes.lines) == 7 + 61  # each event keeps its line
 
 

@@ -148,7 +148,8 @@ class Chart:
         """
         from heptarm.record.plot.figure import draw  # needs Matplotlib: an extra
 
-        return draw(self, word(style, "style", STYLES))
+        word(style, "style", STYLES)
+        return draw(self, style)
 
     def save(self, out: str | Path, *, style: Style = "screen", overwrite: bool = False) -> Path:
         """Write it.

@@ -85,7 +85,8 @@ def chart_of(recording: RecordedData, *, signals: Sequence[str] = (), kind: Kind
         CommandRejected: no such signal, nothing to draw, a histogram or a spectrum of the path, or a spectrum of fewer
             than 16 samples.
     """
-    names = _chosen((recording,), signals, word(kind, "kind", KINDS))
+    word(kind, "kind", KINDS)
+    names = _chosen((recording,), signals, kind)
     rows = tuple(_row(name, (recording,), (0.0,), kind) for name in names)
     is_time = kind == "time"
     chart = Chart(_title(recording), rows, marks=_marks(recording) if is_time else ())
@@ -114,7 +115,8 @@ def compare(
             value=len(recordings),
             allowed=f"2 to {_MOST_COMPARED}",
         )
-    names = _chosen(recordings, signals, word(kind, "kind", KINDS))
+    word(kind, "kind", KINDS)
+    names = _chosen(recordings, signals, kind)
     zeros = [_zero(recording, at) for recording in recordings]
     rows = tuple(_row(name, recordings, zeros, kind) for name in names)
     patterns = ("solid", "dashed", "dotted", "dash-dotted")
@@ -235,7 +237,8 @@ def _row(name: str, recordings: Sequence[RecordedData], zeros: Sequence[float], 
 def path_line(xyz: npt.NDArray[np.float64], label: str, index: int = 0) -> Line:
     """A path in space, shape (n, 3) [m], as the line of that number."""
     known = xyz[~np.isnan(xyz).any(axis=1)] * 1e3
-    return Line(*known.T, label=label, colour=index, dash=index)
+    x, y, z = known.T
+    return Line(x, y, z, label, index, index)
 
 
 def path_row(frame: str, lines: tuple[Line, ...], crosses: npt.NDArray[np.float64] | None = None) -> ChartRow:
@@ -287,7 +290,7 @@ def _spectrum(
     density = 2.0 * (np.abs(parts) ** 2).mean(axis=0) * period / float((window**2).sum())
     amplitude = np.sqrt(density[1:])
     amplitude[amplitude < _FLOOR * (least or 1.0)] = np.nan
-    return np.fft.rfftfreq(size, period)[1:], amplitude
+    return np.asarray(np.fft.rfftfreq(size, period)[1:], np.float64), amplitude
 
 
 def _bands(recording: RecordedData, first: float, last: float) -> tuple[Band, ...]:
