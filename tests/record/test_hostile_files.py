@@ -214,13 +214,12 @@ def test_arrays_claim_no_memory_that_they_have_no_bytes_for(tmp_path: Path) -> N
 
 def test_writers_refuse_to_replace(tmp_path: Path) -> None:
     run = ha.load(written(tmp_path / "run.mcap", 200))
-    from heptarm.record import plot
     from heptarm.record.convert import convert
 
     writers: dict[str, Callable[[Path, bool], object]] = {
         "a.npz": lambda path, over: TRAJECTORY.save(path, overwrite=over),
         "b.csv": lambda path, over: convert(run, path, overwrite=over),
-        "c.png": lambda path, over: plot.save(run.plot("q"), path, overwrite=over),
+        "c.png": lambda path, over: run.chart("q").save(path, overwrite=over),
         "d.jsonl": lambda path, over: devices.recording(
             devices.synthetic(lambda _: None), path, overwrite=over
         ).close(),
