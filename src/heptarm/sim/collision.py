@@ -352,6 +352,16 @@ class CollisionModel(Sealed):
         return self._distances.place_of(body)
 
     @_alone
+    def held(self, body: str) -> Pose | None:
+        """Pose in the flange frame of a free body that the arm holds; None: the arm does not hold it.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._held.get(body)
+
+    @_alone
     def shapes(self, body: str) -> tuple[Shape, ...]:
         """Shapes of a free body, or of one that was added, in its frame; meshes are left out.
 

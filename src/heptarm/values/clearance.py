@@ -128,6 +128,7 @@ class ChangingWorld(PlanningWorld, Protocol):
         """Wait up to `timeout` [s] until the world has changed since a revision; the revision now."""
 
 
+@runtime_checkable
 class GraspWorld(PlanningWorld, Protocol):
     """What picking and placing need; `heptarm.CollisionModel` is one."""
 
@@ -137,6 +138,9 @@ class GraspWorld(PlanningWorld, Protocol):
 
     def pose(self, body: str) -> Pose:
         """Pose of a free body in the base."""
+
+    def held(self, body: str) -> Pose | None:
+        """Pose in the flange frame of a free body that the arm holds; None: the arm does not hold it."""
 
     def shapes(self, body: str) -> tuple[Shape, ...]:
         """Shapes of a free body in its frame."""
