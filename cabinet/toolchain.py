@@ -40,7 +40,9 @@ class Jdk:
     def version(self) -> int:
         """Feature release, 17 for example."""
         try:
-            said = (self.home / "release").read_text(encoding="utf-8")  # a hundred times faster than to ask javac
+            said = (self.home / "release").read_text(
+                encoding="utf-8"
+            )  # a hundred times faster than to ask javac
         except OSError:
             done = subprocess.run([self.javac, "-version"], capture_output=True, text=True, check=True)
             said = done.stdout + done.stderr

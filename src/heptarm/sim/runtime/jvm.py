@@ -92,7 +92,9 @@ def _home_on_path() -> str | None:
         return None
     home = Path(java).resolve().parent.parent
     try:
-        seen = (home / "release").read_text(encoding="utf-8")  # to ask Java itself takes longer than all else here
+        seen = (home / "release").read_text(
+            encoding="utf-8"
+        )  # to ask Java itself takes longer than all else here
         match = re.search(r'JAVA_VERSION="(\d+)', seen)
     except OSError:
         seen = subprocess.run(
