@@ -1,10 +1,11 @@
 """The realtime loop: ticks in real time, or N times faster, and measures its own lateness.
 
 The loop sleeps until a tick is due. After a late wake-up it catches up, since a tick costs a tenth of a millisecond;
-after more than 20 missed ticks it re-bases its schedule and counts that. Faster than real time it sleeps until all ticks
-of a millisecond are due, unless somebody waits for one before: to wake up costs as much as a tick. With an FRI session open it leaves
-`answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
-that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
+after more than 20 missed ticks it re-bases its schedule and counts that. Faster than real time it sleeps until all
+ticks of a millisecond are due, unless somebody waits for one before: to wake up costs as much as a tick. With an FRI
+session open it leaves `answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no
+client could answer ticks that follow each other without a pause, and a machine that was suspended kept its client
+from answering as well.
 A sensor's reading is there at once, a simulated one has to be computed: so a tick whose state somebody waits for begins
 early, by about as long as it takes and as its readers take to wake; they see its state when it is due. With an FRI
 session open it begins when it is due, since the answer to the state before is one of its inputs.
