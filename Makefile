@@ -45,6 +45,8 @@ $(STAMPS)/browser: scripts/setup_browser.sh
 # Tests mostly wait for arms that move, and measure times: one processor is left for everything else.
 WORKERS ?= $(shell n=$$(nproc 2>/dev/null || echo 2); if [ $$n -gt 7 ]; then echo 6; elif [ $$n -gt 3 ]; then expr $$n - 1; else echo 2; fi)
 LONGEST := --durations=15 --durations-min=3
+# To import all tests for those few takes twelve seconds.
+ALONE = $(shell grep -rl 'mark\.alone' tests --include='test_*.py')
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 ROS2_PACKAGES := $(shell find ros2/interfaces ros2/heptarm_msgs -type f)
@@ -90,7 +92,7 @@ test: prepared  ## everything; what takes long begins first
 	$(PY) -m pytest $(PARALLEL) $(LONGEST) -m "not computing and not alone"; failed=$$?; \
 	$(MAKE) --no-print-directory test-ros ROS_JOBS=2 || failed=1; \
 	wait $$beside || failed=1; cat build/test-beside.log; exit $$failed
-	$(PY) -m pytest $(LONGEST) -m alone
+	$(PY) -m pytest $(LONGEST) -m alone $(ALONE)
 
 # Folders with tests that need no simulator; those in them that do are skipped as soon as they reach for it.
 FAST := tests/values tests/wire tests/model tests/fri tests/arm tests/record tests/ros tests/schema tests/transports tests/devices \
@@ -112,7 +114,7 @@ test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, parts of both 
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
 	LONG=1 $(PY) -m pytest $(PARALLEL) --timeout 3600 $(LONGEST) -m "not alone"
-	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone
+	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone $(ALONE)
 	scripts/setup_rviz.sh
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance
