@@ -88,7 +88,7 @@ prepared: $(STAMPS)/demo
 # Lint and what computes fill the time in which the others wait, and leave them the processor when they want it, to the
 # end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are shown at the end.
 test: prepared  ## everything; what takes long begins first
-	@nice -n 10 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
 	$(PY) -m pytest $(PARALLEL) $(LONGEST) -m "not computing and not alone"; failed=$$?; \
 	$(MAKE) --no-print-directory test-ros ROS_JOBS=2 || failed=1; \
 	wait $$beside || failed=1; cat build/test-beside.log; exit $$failed
