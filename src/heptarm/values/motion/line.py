@@ -150,8 +150,8 @@ def lin_rel(
         a: rotation Rz(a) Ry(b) Rx(c) [rad], as b and c.
         b: see a.
         c: see a.
-        frame: the frame whose axes these are: "tool" (the motion frame), "base", the name of a frame, or the pose of any
-            frame in the base.
+        frame: the frame whose axes these are: "tool" (the motion frame), "base", the name of a frame, or the pose of
+            any frame in the base.
         moving: the motion frame, see `lin`.
         orientation: see `lin`.
         reference: see `lin`.
