@@ -1,18 +1,23 @@
 """Distances between the bodies of a compiled model at joint positions, and how far a movement of the joints moves them.
 
-MuJoCo computes them. Bodies of the world do not meet each other here, so that what lies on a table costs nothing.
+MuJoCo computes them; `native/collision.c` asks it for those of near pairs only, in many postures at once. Bodies of the world do not meet each other here, so that what lies on a table costs nothing.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Collection
+from functools import cache
+from itertools import combinations
 from math import inf
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from heptarm._library import Unavailable, library
 from heptarm.sim.plant.carried import plain
+from heptarm.sim.plant.native import mujoco_library
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 
@@ -24,6 +29,47 @@ _MEETS[_WORLD, _WORLD] = _MEETS[_TOOL, _HELD] = _MEETS[_HELD, _TOOL] = False
 #: Bits of a contact type that can be moved apart: MuJoCo has 32 of them, for three domains.
 _BITS = 10
 _JOINTS = 7
+_POINTER, _WORD, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+#: MuJoCo's functions that are called in C.
+_CALLED = {"mj_kinematics": "kinematics", "mj_geomDistance": "distance"}
+
+
+class _Checks(ctypes.Structure):
+    """`struct checks` of native/collision.c."""
+
+    _fields_ = [  # noqa: RUF012  the type that ctypes asks for
+        *[(name, _POINTER) for name in "model data kinematics distance positions places turns".split()],
+        *[(name, _POINTER) for name in "flange_place flange_turn hulls pairs".split()],
+        ("count", _WORD),
+        ("grips", _POINTER),
+        ("held", _WORD),
+    ]
+
+
+#: `struct grip`.
+_GRIP = np.dtype([("address", np.int64), ("place", np.float64, 3), ("quat", np.float64, 4)])
+
+
+@cache
+def _functions() -> ctypes.CDLL:
+    """The functions of native/collision.c.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing, or does not fit.
+    """
+    made = library()
+    made.hc_nearest.restype = None
+    made.hc_nearest.argtypes = (_POINTER, _WORD, _POINTER, _REAL, _POINTER)
+    made.hc_advance.restype = _WORD
+    made.hc_advance.argtypes = (
+        *(_POINTER, _POINTER, _POINTER),
+        *(_REAL, _REAL, _REAL, _REAL, ctypes.c_int),
+        *(_POINTER, _POINTER),
+    )
+    made.hc_size.restype = _WORD
+    if made.hc_size() != ctypes.sizeof(_Checks):
+        raise Unavailable(f"`struct checks` must have {ctypes.sizeof(_Checks)} bytes, got {made.hc_size()}")
+    return made
 
 
 class Distances:
@@ -70,6 +116,7 @@ class Distances:
         self._forbidden = ~may_touch[np.ix_(labels, labels)] if may_touch.any() else None
         self._types = model.geom_contype.copy(), model.geom_conaffinity.copy()
         self._below = -1.0
+        self._hulls, self._candidates = _hulls(model), _candidates(model)
         self._flange = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange"))
         self._measure()
         self._held: dict[str, Pose] = {}
@@ -111,6 +158,30 @@ class Distances:
         if held:
             found = [self._lever(self._in_flange(geom), geom) for geom in np.flatnonzero(is_held).tolist()]
             self._levers = np.vstack([self._own_levers, *found])
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """What the functions in C need to know: pairs of shapes that count, and what the flange carries."""
+        model, data, memory = self._model, self._data, _Checks()
+        first, second = self._candidates.T
+        counts = _MEETS[self._group[first], self._group[second]] & self.counts(self._candidates)
+        pairs = np.ascontiguousarray(self._candidates[counts])
+        grips = np.array(
+            [(self._free_at[name], pose.xyz, pose.quat) for name, pose in self._held.items()], _GRIP
+        )
+        place, turn = data.site_xpos[self._flange], data.site_xmat[self._flange]
+        self._kept = (pairs, grips, _functions())
+        memory.model, memory.data = model._address, data._address
+        shown = mujoco_library(_CALLED)
+        for name, member in _CALLED.items():
+            setattr(memory, member, ctypes.cast(getattr(shown, name), _POINTER).value)
+        memory.positions, memory.places = data.qpos.ctypes.data, data.geom_xpos.ctypes.data
+        memory.turns = data.geom_xmat.ctypes.data
+        memory.flange_place, memory.flange_turn = place.ctypes.data, turn.ctypes.data
+        memory.hulls = self._hulls.ctypes.data
+        memory.pairs, memory.count = pairs.ctypes.data, len(pairs)
+        memory.grips, memory.held = grips.ctypes.data, len(grips)
+        self._memory = memory
 
     def _in_flange(self, geom: int) -> Array:
         """Where a shape of a held body is in the base at the posture of the levers, shape (3,) [m]."""
@@ -173,12 +244,52 @@ class Distances:
         counted: npt.NDArray[np.bool_] = self._forbidden[geoms[:, 0], geoms[:, 1]]
         return counted
 
-    def nearest(self, q: Array, below: float) -> float:
-        """Distance of the nearest two bodies that may not touch [m]; infinite: none are nearer than `below`."""
-        geoms, distances = self.pairs(q, below)
-        if len(distances) and self._forbidden is not None:
-            distances = distances[self.counts(geoms)]
-        return float(distances.min()) if len(distances) else inf
+    def nearest(self, q: Array, below: float) -> Array:
+        """Distance of the nearest two bodies that may not touch, in n postures, shape (n,) [m].
+
+        Args:
+            q: joint positions, shape (n, 7) [rad].
+            below: largest distance that is computed [m]; where none are nearer it is infinite.
+        """
+        given, result = np.ascontiguousarray(q, float), np.empty(len(q))
+        _functions().hc_nearest(
+            ctypes.byref(self._memory), len(given), given.ctypes.data, below, result.ctypes.data
+        )
+        self.checks += len(given)
+        return result
+
+    def advance(
+        self,
+        first: Array,
+        change: Array,
+        *,
+        start: tuple[float, float],
+        margin: float,
+        least: float,
+        far: float,
+        is_single: bool,
+    ) -> tuple[float, float]:
+        """Move on along a straight path until two bodies are nearer than a margin, or to its end.
+
+        Args:
+            first: joint positions at its beginning, shape (7,) [rad].
+            change: of the joints along it, shape (7,) [rad].
+            start: fraction of the path from which it moves on, and the distance there [m].
+            margin: nearer bodies touch [m].
+            least: what a point may move beyond the distance in a step [m].
+            far: bodies are looked for so far [m].
+            is_single: move by one step only.
+
+        Returns:
+            The fraction at which it ends, and the distance there [m]; infinite: none are near.
+        """
+        begin, along = np.ascontiguousarray(first, float), np.ascontiguousarray(change, float)
+        at, distance = _REAL(start[0]), _REAL(start[1])
+        self.checks += _functions().hc_advance(
+            *(ctypes.byref(self._memory), begin.ctypes.data, along.ctypes.data, self.moved(along)),
+            *(margin, least, far, is_single, ctypes.byref(at), ctypes.byref(distance)),
+        )
+        return at.value, distance.value
 
     def named(self, first: int, second: int) -> tuple[str, str]:
         """Names of the bodies of two shapes, that of the arm first; both of the arm: in the order of the alphabet."""
@@ -257,3 +368,39 @@ def _quaternion(matrix: Array) -> Array:
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, matrix)
     return np.roll(quat, -1)
+
+
+def _hulls(model: mujoco.MjModel) -> Array:
+    """`struct hull` of each shape, shape (n, 9): a box with rounded edges around it."""
+    kinds = mujoco.mjtGeom
+    result = np.zeros((model.ngeom, 9))
+    result[:, 3:6], result[:, :3] = model.geom_aabb[:, :3], model.geom_aabb[:, 3:]
+    result[:, 7] = model.geom_rbound
+    for geom, kind in enumerate(model.geom_type.tolist()):
+        radius, length = model.geom_size[geom, :2].tolist()
+        if kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
+            half = 0.0 if kind == kinds.mjGEOM_SPHERE else length
+            result[geom, :7] = 0.0, 0.0, half, 0.0, 0.0, 0.0, radius
+        elif kind not in (kinds.mjGEOM_CYLINDER, kinds.mjGEOM_BOX, kinds.mjGEOM_MESH, kinds.mjGEOM_ELLIPSOID):
+            result[geom, 7] = inf  # a plane, or a kind for which no bound is known
+            result[geom, 8] = kind == kinds.mjGEOM_PLANE
+    return result
+
+
+def _candidates(model: mujoco.MjModel) -> npt.NDArray[np.int32]:
+    """Pairs of shapes that MuJoCo lets meet by the rules of the model, shape (n, 2)."""
+    welded, above = model.body_weldid, model.body_weldid[model.body_parentid]
+    excluded = set(model.exclude_signature.tolist())
+    keeps_parents = not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+    found = {tuple(sorted(pair)) for pair in zip(model.pair_geom1.tolist(), model.pair_geom2.tolist())}
+    for pair in combinations(range(model.ngeom), 2):
+        kinds, meets, bodies = model.geom_contype[[*pair]], model.geom_conaffinity[[*pair]], model.geom_bodyid[[*pair]]
+        if not (kinds & meets[::-1]).any():
+            continue
+        if {int(bodies[0]) << 16 | int(bodies[1]), int(bodies[1]) << 16 | int(bodies[0])} & excluded:
+            continue
+        one, other = (int(welded[body]) for body in bodies)
+        is_parent = one and other and (one == above[other] or other == above[one])
+        if one != other and not (keeps_parents and is_parent):
+            found.add(pair)
+    return np.array(sorted(found), np.int32).reshape(-1, 2)
