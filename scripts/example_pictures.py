@@ -60,6 +60,7 @@ PLOTS = {
     "22": ("front", "speed"),
     "23": ("front", "height"),
     "24": ("height", "force"),
+    "26": ("joints", "torques"),
 }
 DEFAULT = ("joints", "height")
 #: Runs an example with the first connection recorded.

@@ -25,7 +25,7 @@ HERE, THERE = ha.deg(-50, 30, -20, -75, 10, 52, -60), ha.deg(50, 45, 20, -40, -3
 #: Motions of a block, of the whole stack and of the plant alone.
 MOTIONS, ALONE = 60, 40
 #: Limits of simulated time per time.
-STACK_LIMIT, PLANT_LIMIT = 30.0, 60.0
+STACK_LIMIT, PLANT_LIMIT = 60.0, 60.0
 
 
 @benchmark("unpaced")

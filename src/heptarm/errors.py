@@ -349,7 +349,7 @@ EXTRAS = {
     "sim": ("mujoco", "ruckig", "jpype"),
     "viz": ("viser", "matplotlib", "trimesh"),
     "rl": ("torch", "gymnasium", "PIL"),
-    "record": ("mcap", "pandas", "pyarrow"),
+    "record": ("mcap", "pandas", "pyarrow", "plotly"),
     "devices": ("evdev", "pyspacemouse"),
     "rerun": ("rerun",),
 }

@@ -132,6 +132,7 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
     assert any("A7: velocity limited" in line for line in rt.limited)
 
 
+@pytest.mark.long  # every run has it with the benchmark of test_fri_hold, and without the stack in tests/sim_fri
 @patient
 def test_torques_bend_the_springs_of_joint_impedance(arm: ha.Arm) -> None:
     with arm.fri("torque", period_ms=5, mode=JointImpedance(100.0), law=push, params={"torque": 2.0}) as rt:
@@ -141,6 +142,7 @@ def test_torques_bend_the_springs_of_joint_impedance(arm: ha.Arm) -> None:
     assert 0.015 < bent[6] < 0.025 and np.abs(bent[:6]).max() < 0.01
 
 
+@pytest.mark.long  # as that
 @patient
 def test_a_wrench_bends_those_of_cartesian_impedance(arm: ha.Arm) -> None:
     before = arm.state.pose.xyz

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import heptarm as ha
+from heptarm.errors import ShapeError
 from heptarm.wire import messages as wire
 from tests.arm.peer import Peer
 
@@ -35,3 +36,12 @@ def test_a_lost_connection_ends_the_wait(peer: Peer) -> None:
         arm.pad.ask("Ready?", "Yes")
     assert arm.connection.events.dialog_listeners == []
     arm.close()
+
+
+@pytest.mark.parametrize("text", ["\ud800", "a\0b"])
+def test_a_text_that_no_pad_can_show_is_refused(peer: Peer, text: str) -> None:
+    with peer.arm() as arm:
+        with pytest.raises(ShapeError, match="text must have printable characters only"):
+            arm.pad.show(text)
+        with pytest.raises(ShapeError, match="text must have printable characters only"):
+            arm.pad.ask(text, "Yes")

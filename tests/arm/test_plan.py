@@ -281,7 +281,7 @@ def test_it_is_shown_in_an_open_panel_or_in_the_browser(
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     preview = arm.plan(PROGRAMS["blended"])
     page = preview.show()
-    assert page is not None and "svg" in page.read_text() and opened == [page.as_uri()]
+    assert page is not None and "Plotly.newPlot" in page.read_text() and opened == [page.as_uri()]
     box = PlanBox(["iiwa14"])
     box.take()
     assert preview.show() is None and len(opened) == 1

@@ -9,9 +9,9 @@ import pytest
 import heptarm as ha
 from heptarm.arm.arm import Arm
 from heptarm.arm.link.connection import Connection, Options
-from heptarm.arm.translate.text import printable
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
+from heptarm.values.text import printable
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer

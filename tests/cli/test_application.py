@@ -12,6 +12,7 @@ import pytest
 
 from heptarm.errors import CommandRejected
 from heptarm.sim.runtime.application import background, compile_application, find
+from tests.cli.running import run
 from tests.sim.station_setup import setup
 
 ROOT = Path(__file__).parents[2]
@@ -55,18 +56,7 @@ PROJECT = """
 
 
 def sim(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    command = [
-        sys.executable,
-        "-m",
-        "heptarm.cli.main",
-        "sim",
-        "--app",
-        str(folder),
-        "--speed",
-        "5",
-        *options,
-    ]
-    return subprocess.run(command, input="", capture_output=True, text=True, timeout=120, check=False)
+    return run("sim", "--app", str(folder), "--speed", "5", *options)
 
 
 @pytest.fixture
@@ -400,8 +390,7 @@ def test_an_option_of_those_who_look_on_needs_them(lab: Path, options: tuple[str
     "options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0"), ("--map", "a=b")]
 )
 def test_an_option_of_an_application_needs_one(options: tuple[str, ...]) -> None:
-    command = [sys.executable, "-m", "heptarm.cli.main", "sim", *options]
-    done = subprocess.run(command, input="", capture_output=True, text=True, timeout=60, check=False)
+    done = run("sim", *options)
     assert done.returncode != 0
     assert f"{options[0]} needs heptarm sim app FOLDER" in done.stderr
 

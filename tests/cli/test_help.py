@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from cyclopts import App
@@ -101,6 +102,16 @@ def test_completion_knows_commands_and_options(shell: str) -> None:
         assert word in script
     if shell == "bash":
         subprocess.run(["bash", "-n"], input=script, text=True, check=True, timeout=60)
+
+
+def test_completion_is_installed_by_one_command(tmp_path: Path) -> None:
+    home = {"HOME": str(tmp_path), "SHELL": "/bin/bash", "XDG_DATA_HOME": ""}
+    done = run("completion", "bash", "--install", **home)
+    (script,) = tmp_path.rglob("heptarm")
+    assert done.returncode == 0 and str(script) in done.stdout and "lin-rel" in script.read_text()
+    assert str(script) in (tmp_path / ".bashrc").read_text()
+    done = run("completion", **home)
+    assert done.returncode == 1 and "bash, zsh, fish" in done.stderr
 
 
 @pytest.mark.parametrize(

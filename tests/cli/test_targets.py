@@ -44,14 +44,63 @@ def test_the_file_of_a_person_is_kept_but_for_what_was_asked(config: Path) -> No
         targets.remove_target("old")
 
 
+def test_a_measured_tool_is_kept_with_its_target(config: Path) -> None:
+    config.mkdir(parents=True)
+    file = config / "targets.toml"
+    others = '# ours\n[lab1]  # by the door\naddress = "10.0.0.1"\n\n[lab2]\naddress = "10.0.0.2"\n'
+    file.write_text(others)
+    first = ha.Tool("my gripper", mass=1.2, com=(0, 0, 0.06), tcp=ha.Pose.at(0, 0, 0.15))
+    targets.save_tool("lab1", first)
+    targets.save_tool("lab1", ha.Tool("pen", frames={"a tip": ha.Pose.xyz_abc(0, 0, 0.1, 0.2, 0.1, 3.0)}))
+    assert file.read_text().startswith(others)
+    better = ha.Tool("my gripper", mass=1.3, com=(0, 0, 0.061), inertia=(1e-3, 1e-3, 1e-3, 0, 0, 0))
+    targets.save_tool("lab1", better)
+    saved = targets.saved_targets()
+    assert {one.name: one for one in saved["lab1"].tools}["my gripper"] == better
+    assert len(saved["lab1"].tools) == 2 and saved["lab2"].tools == ()
+    targets.add_target(SavedTarget("lab1", "10.0.0.3"), replace=True)  # measured tools stay
+    assert set(targets.saved_targets()["lab1"].tools) == set(saved["lab1"].tools)
+    targets.remove_target("lab1")
+    assert targets.saved_targets() == {"lab2": SavedTarget("lab2", "10.0.0.2")}
+    with pytest.raises(CommandRejected, match="there is no target lab1"):
+        targets.save_tool("lab1", first)
+
+
+def test_a_tool_that_cannot_be_replaced_stays(config: Path) -> None:
+    config.mkdir(parents=True)
+    file = config / "targets.toml"
+    text = '[lab1]\naddress = "10.0.0.1"\ntools = { pen = { mass = 1.0 } }\n'
+    file.write_text(text)
+    with pytest.raises(CommandRejected, match="has no table of its own"):
+        targets.save_tool("lab1", ha.Tool("pen", mass=2.0))
+    assert file.read_text() == text and targets.saved_targets()["lab1"].tools == (ha.Tool("pen", mass=1.0),)
+
+
+def test_a_measured_tool_is_attached_by_its_name(cabinet) -> None:  # type: ignore[no-untyped-def]
+    targets.add_target(SavedTarget("bench", cabinet.target, tool="pen"))
+    targets.save_tool("bench", ha.Tool("pen", mass=0.4, tcp=ha.Pose.at(0, 0, 0.2)))
+    with ha.connect("bench") as arm:
+        assert arm.state.tool == "pen" and arm.tools["pen"].mass == 0.4
+        assert arm.load is not None and arm.load.mass == 0.4
+        assert arm.pose("tool").distance_to(arm.pose("flange")) == pytest.approx(0.2, abs=1e-6)
+        arm.detach_tool()
+        arm.attach_tool("pen")
+        assert arm.state.tool == "pen"
+        arm.detach_tool()
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("lab1 = 3", "must have an address"),
         ("[lab1]\naddress = 7", "must have an address"),
         ('[lab1]\naddress = "a"\nspeed = 0', "speed must be in (0, 1], got 0"),
-        ('[lab1]\naddress = "a"\nspeeed = 1', "has speeed, which no target has"),
+        ('[lab1]\naddress = "a"\nspeeed = 1', "has speeed, which no such entry has"),
         ("[lab1", "cannot be read"),
+        ('[lab1]\naddress = "a"\n[lab1.tools.pen]\nweight = 1', "has weight, which no such entry has"),
+        ('[lab1]\naddress = "a"\n[lab1.tools.pen]\nmass = -1', "mass must be in"),
+        ('[lab1]\naddress = "a"\n[lab1.tools.pen]\nframes.tip = [1, 2]', "a frame is x y z qx qy qz qw"),
+        ('[lab1]\naddress = "a"\ntools = 3', "tools must be tables"),
         ('["lab 1"]\naddress = "a"', "must begin with a letter"),
     ],
 )

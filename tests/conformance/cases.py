@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 
 from tests.conformance.case import CASES, UNFIT
+from tests.long import longer
 
 __all__ = ["CASES", "UNFIT", "part"]
 
@@ -33,6 +34,9 @@ for _topic in (
 
 
 def part(number: int) -> list[str]:
-    """The cases that a node runs where not all of them have to: every third one, from this number on."""
-    names = list(CASES)
-    return [name for index, name in enumerate(names) if index % 3 == number or name in _EVERYWHERE]
+    """The cases that a node runs where not all of them have to: every sixth one, from this number on.
+
+    The long run has every third one. All of them run against the runner alone, in tests/ros/test_conformance.py.
+    """
+    names, step = list(CASES), longer(6, 3)
+    return [name for index, name in enumerate(names) if index % step == number or name in _EVERYWHERE]

@@ -271,13 +271,16 @@ def test_nobody_there(probe: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "cpp" / "examples").glob("*.cpp")))
-def test_example_runs(name: str, tmp_path: Path) -> None:
-    program = compiled(ROOT / "cpp" / "examples" / f"{name}.cpp", tmp_path)
+def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
+    # the probe uses the same header, optimised: what only the optimiser warns of is found there
+    program = compiled(ROOT / "cpp" / "examples" / f"{name}.cpp", tmp_path, "-O0")
     environment = {one: value for one, value in os.environ.items() if one != "HEPTARM_KEY"}
-    with sim() as ready:
+    with contextlib.ExitStack() as stack:
+        if name == "servo":  # a stream in real time
+            address = f"localhost:{stack.enter_context(sim())['port']}"
         done = retry(
             lambda: subprocess.run(
-                [str(program), f"localhost:{ready['port']}"],
+                [str(program), address],
                 capture_output=True,
                 text=True,
                 timeout=120,
@@ -298,8 +301,8 @@ def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     parts = [block for block in blocks if "int main" not in block]
     assert len(whole) == 1 and len(parts) > 5
     head = "#include <cstdlib>\n#include <iostream>\n#include <heptarm/heptarm.hpp>\n"
-    body = "void page() {\n    using namespace heptarm;\n" + "".join(parts) + "}\nint main() {}\n"
-    for name, text in (("program", whole[0]), ("page", head + body)):
-        source = tmp_path / f"{name}.cpp"
-        source.write_text(text)
-        compiled(source, tmp_path, "-O0", "-c")  # the examples are linked and run
+    body = "void page() {\n    using namespace heptarm;\n" + "".join(parts) + "}\n"
+    source = tmp_path / "page.cpp"
+    source.write_text(whole[0] + head + body)  # the program first, with no headers but its own
+    # the header is read once for both; the examples are compiled to the end, linked and run
+    compiled(source, tmp_path, "-fsyntax-only")

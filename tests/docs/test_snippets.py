@@ -52,9 +52,9 @@ for name in sys.argv[1:]:
 
 
 @pytest.fixture(scope="module")
-def lender(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lender]:
-    """The virtual cabinets of all pages."""
-    with Lender(tmp_path_factory.mktemp("lender") / "socket", 1.0, FASTER) as lender:
+def lender(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lender]:
+    """The virtual cabinet of all pages of a speed."""
+    with Lender(tmp_path_factory.mktemp("lender") / "socket", request.param) as lender:
         yield lender
 
 
@@ -80,17 +80,32 @@ def test_snippets_compile(page: Path) -> None:
         compile(source, f"{_id(page)}:{line}", "exec")
 
 
+#: Pages with a block that runs.
+RUNNING = [page for page in PAGES if any(run for *_, run in _blocks(page))]
+
+
+def _params(pages: list[Path]) -> list[object]:
+    return [
+        pytest.param(page, id=_id(page), marks=[pytest.mark.long] if page.name in IN_LONG_RUN else [])
+        for page in pages
+    ]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param(page, marks=[pytest.mark.long] if page.name in IN_LONG_RUN else [])
-        for page in PAGES
-        if any(run for *_, run in _blocks(page))
-    ],
-    ids=_id,
-)
+@pytest.mark.parametrize("page", _params([page for page in RUNNING if page.name in REAL_TIME]))
+@pytest.mark.parametrize("lender", [1.0], indirect=True)
+def test_snippets_run_in_real_time(page: Path, tmp_path: Path, lender: Lender) -> None:
+    _run(page, tmp_path, lender)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", _params([page for page in RUNNING if page.name not in REAL_TIME]))
+@pytest.mark.parametrize("lender", [FASTER], indirect=True)
 def test_snippets_run(page: Path, tmp_path: Path, lender: Lender) -> None:
+    _run(page, tmp_path, lender)
+
+
+def _run(page: Path, tmp_path: Path, lender: Lender) -> None:
     files = []
     for line, source, run in _blocks(page):
         if run:

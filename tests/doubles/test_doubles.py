@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -64,11 +67,28 @@ PROJECT = """
 """
 
 
+def _javac(out: Path, *sources: Path) -> None:
+    classpath = ":".join(str(jar) for jar in _resources.jars())
+    subprocess.run([*JAVAC, "-cp", classpath, "-d", str(out), *map(str, sources)], check=True)
+
+
+@functools.cache
+def _samples() -> Path:
+    """Classes of all samples: to compile all of them takes as long as to compile two."""
+    out = tempfile.mkdtemp(prefix="heptarm-samples-")
+    atexit.register(shutil.rmtree, out, ignore_errors=True)
+    _javac(Path(out), *(HERE / "java").glob("*.java"))
+    return Path(out)
+
+
 def _compile(source: Path, out: Path) -> None:
+    """Put the classes of a source into a folder; of a sample, with those of all samples."""
     if shutil.which("javac") is None:
         pytest.skip("no javac here")
-    classpath = ":".join(str(jar) for jar in _resources.jars())
-    subprocess.run([*JAVAC, "-cp", classpath, "-d", str(out), str(source)], check=True)
+    if source.parent == HERE / "java":
+        shutil.copytree(_samples(), out, dirs_exist_ok=True)
+    else:
+        _javac(out, source)
 
 
 def _command(application: str, classes: Path, *data: str, speed: float = SPEED) -> list[str]:

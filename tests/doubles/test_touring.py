@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import time
 from pathlib import Path
 
 import pytest
 
-from heptarm import _resources
 from heptarm.sim.runtime import project as templates
-from tests.doubles.test_doubles import HERE, JAVAC, _command
-
-SOURCES = ("Touring", "Counting", "Waiting", "ICounter", "Pen")
+from tests.doubles.test_doubles import HERE, _command, _compile
 
 SAID = (
     "a marked method was called",
@@ -119,11 +115,7 @@ def _do(words: str, process: subprocess.Popen[str]) -> str:
 
 
 def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
-    if shutil.which("javac") is None:
-        pytest.skip("no javac here")
-    path = ":".join(str(jar) for jar in _resources.jars())
-    sources = [str(HERE / "java" / f"{name}.java") for name in SOURCES]
-    subprocess.run([*JAVAC, "-cp", path, "-d", str(tmp_path), *sources], check=True)
+    _compile(HERE / "java" / "Touring.java", tmp_path)
     said = tmp_path / "said.txt"
     command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}", speed=1.0)
     command += ["--project", str(project), "--parent-pipe"]

@@ -5,24 +5,30 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.lending import Lender
 from tests.retry import busy, retry
 from tests.simulators import FASTER, PATIENT, PATIENT_AND_FASTER
 
 #: Of the virtual cabinet shared by the examples.
 SPEED = FASTER
-#: These have one of their own in real time: they look at the clock of this machine, or answer FRI.
+#: These borrow another one, in real time: they look at the clock of this machine, or answer FRI.
 REAL_TIME = (
     *("03_async_cancel.py", "06_servo.py", "07_fri.py", "10_recovery.py", "12_straight_servo.py"),
     *("13_hand_guiding.py", "18_teleoperation.py", "21_laws.py"),
 )
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
-#: The same skills as in the cookbook, whose page runs in every test, and in the scenarios.
-IN_LONG_RUN = ("15_pick_and_place.py", "16_insertion.py", "17_polishing.py")
+#: The same skills as in the cookbook, whose page runs in every test, and in the scenarios; what the page about several
+#: arms does; and what tests/calibration do.
+IN_LONG_RUN = tuple(
+    f"{one}.py" for one in ("15_pick_and_place", "16_insertion", "17_polishing", "20_two_arms")
+)
+IN_LONG_RUN += ("26_calibrate.py",)
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself
@@ -34,6 +40,13 @@ EXAMPLES = sorted(
 )  # those in real time before the shared one is there, which takes its part of the machine
 
 
+@pytest.fixture(scope="module")
+def lender(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lender]:
+    """A virtual cabinet in real time, for one example after the other."""
+    with Lender(tmp_path_factory.mktemp("lender") / "socket", 1.0) as lender:
+        yield lender
+
+
 @pytest.mark.parametrize(
     "example",
     [pytest.param(one, marks=[pytest.mark.long] if one.name in IN_LONG_RUN else []) for one in EXAMPLES],
@@ -41,7 +54,7 @@ EXAMPLES = sorted(
 )
 def test_example(example: Path, request: pytest.FixtureRequest) -> None:
     if example.name in REAL_TIME:
-        target, before = "sim://iiwa14", PATIENT
+        target, before = "sim://iiwa14", request.getfixturevalue("lender").prelude + PATIENT
     elif example.name in OWN_SIMULATOR:
         target, before = "", PATIENT_AND_FASTER
     else:

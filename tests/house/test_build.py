@@ -25,41 +25,52 @@ def jdk() -> toolchain.Jdk:
     return toolchain.find_jdk()
 
 
-def _verdict(jdk: toolchain.Jdk, folder: Path, body: str, *, ecj: bool = False) -> list[str]:
-    """Compiles a class with the JDK's own library and lists the findings of the check."""
-    source = folder / "Probe.java"
-    source.write_text(f"class Probe {{ {body} }}")
-    command = (
-        [*toolchain.find_ecj(jdk), "-source", "1.6", "-target", "1.6", "-nowarn"] if ecj else [jdk.javac]
-    )
-    subprocess.run([*command, "-proc:none", "-d", str(folder), str(source)], check=True, capture_output=True)
-    return list(REFUSALS.of(classfile.read((folder / "Probe.class").read_bytes())))
-
-
-@pytest.mark.parametrize(
-    ("body", "named"),
-    [
-        ("int f(long a) { return Long.compare(a, 1L); }", "java.lang.Long.compare(JJ)I"),
-        ("int f(int a) { return Integer.compare(a, 1); }", "java.lang.Integer.compare(II)I"),
-        ("Object f(Object a) { return java.util.Objects.toString(a); }", "java.util.Objects"),
-        (
-            "Object f() { return java.nio.charset.StandardCharsets.UTF_8; }",
-            "java.nio.charset.StandardCharsets",
-        ),
-        ("Object f(java.io.File a) { return a.toPath(); }", "java.nio.file.Path"),
-        ("void f(java.io.IOException a) { a.addSuppressed(a); }", "java.io.IOException.addSuppressed"),
-        ("void f(Object a) throws Exception { ((AutoCloseable) a).close(); }", "java.lang.AutoCloseable"),
-        ("java.nio.file.Path[] field;", "java.nio.file.Path"),
-        ("Object f() { return java.net.InetAddress.getLoopbackAddress(); }", "getLoopbackAddress"),
-        ("Object f() { return new AssertionError(null, null); }", "java.lang.AssertionError.<init>"),
-        ("java.io.Closeable f() { return new java.net.Socket(); }", "java.io.Closeable"),
-    ],
+#: Bodies of classes that need Java 7, and what of it they use.
+NEWER = (
+    ("int f(long a) { return Long.compare(a, 1L); }", "java.lang.Long.compare(JJ)I"),
+    ("int f(int a) { return Integer.compare(a, 1); }", "java.lang.Integer.compare(II)I"),
+    ("Object f(Object a) { return java.util.Objects.toString(a); }", "java.util.Objects"),
+    (
+        "Object f() { return java.nio.charset.StandardCharsets.UTF_8; }",
+        "java.nio.charset.StandardCharsets",
+    ),
+    ("Object f(java.io.File a) { return a.toPath(); }", "java.nio.file.Path"),
+    ("void f(java.io.IOException a) { a.addSuppressed(a); }", "java.io.IOException.addSuppressed"),
+    ("void f(Object a) throws Exception { ((AutoCloseable) a).close(); }", "java.lang.AutoCloseable"),
+    ("java.nio.file.Path[] field;", "java.nio.file.Path"),
+    ("Object f() { return java.net.InetAddress.getLoopbackAddress(); }", "getLoopbackAddress"),
+    ("Object f() { return new AssertionError(null, null); }", "java.lang.AssertionError.<init>"),
+    ("java.io.Closeable f() { return new java.net.Socket(); }", "java.io.Closeable"),
 )
+
+
+def _compiled(command: list[str], folder: Path, *bodies: str) -> list[list[str]]:
+    """Compiles a class for each body with the JDK's own library and lists the findings of the check."""
+    sources = [folder / f"Probe{number}.java" for number in range(len(bodies))]
+    for source, body in zip(sources, bodies, strict=True):
+        source.write_text(f"class {source.stem} {{ {body} }}")
+    words = [*command, "-proc:none", "-d", str(folder), *map(str, sources)]
+    subprocess.run(words, check=True, capture_output=True)
+    classes = (source.with_suffix(".class") for source in sources)
+    return [list(REFUSALS.of(classfile.read(one.read_bytes()))) for one in classes]
+
+
+def _ecj(jdk: toolchain.Jdk) -> list[str]:
+    return [*toolchain.find_ecj(jdk), "-source", "1.6", "-target", "1.6", "-nowarn"]
+
+
+@pytest.fixture(scope="module")
+def verdicts(jdk: toolchain.Jdk, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    """The findings for each body of `NEWER`, compiled at once."""
+    bodies = [body for body, _ in NEWER]
+    return dict(zip(bodies, _compiled(_ecj(jdk), tmp_path_factory.mktemp("newer"), *bodies), strict=True))
+
+
+@pytest.mark.parametrize(("body", "named"), NEWER)
 def test_newer_library_members_are_refused_by_name(
-    jdk: toolchain.Jdk, tmp_path: Path, body: str, named: str
+    verdicts: dict[str, list[str]], body: str, named: str
 ) -> None:
-    verdict = _verdict(jdk, tmp_path, body, ecj=True)
-    assert any(named in line for line in verdict), verdict
+    assert any(named in line for line in verdicts[body]), verdicts[body]
 
 
 def test_older_members_of_the_same_name_pass(jdk: toolchain.Jdk, tmp_path: Path) -> None:
@@ -68,11 +79,12 @@ def test_older_members_of_the_same_name_pass(jdk: toolchain.Jdk, tmp_path: Path)
         Object g() { return new AssertionError("text"); }
         Object h(java.util.regex.Matcher m) { return m.group(1) + m.group(); }
         Object i() { return java.nio.charset.Charset.forName("UTF-8"); }"""
-    assert _verdict(jdk, tmp_path, body, ecj=True) == []
+    assert _compiled(_ecj(jdk), tmp_path, body) == [[]]
 
 
 def test_newer_class_version_is_refused(jdk: toolchain.Jdk, tmp_path: Path) -> None:
-    assert any("class version" in line for line in _verdict(jdk, tmp_path, "int x;"))
+    (verdict,) = _compiled([str(jdk.javac)], tmp_path, "int x;")
+    assert any("class version" in line for line in verdict)
 
 
 def test_compiling_against_java_7_keeps_newer_descriptors_out(jdk: toolchain.Jdk, tmp_path: Path) -> None:

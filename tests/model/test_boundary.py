@@ -37,6 +37,15 @@ def test_the_box_lies_in_its_frame_and_bounds_the_tool() -> None:
     np.testing.assert_allclose(above, [-0.05, 0.2, 0.41], atol=1e-9)
 
 
+def test_the_excess_is_that_of_the_tool_or_of_the_joints() -> None:
+    tool = FRAME.inverse() @ Pose.at(*boundary().tool(HOME))
+    half = float(np.abs(tool.xyz).max())
+    assert boundary(half - 0.01).excess(HOME) == pytest.approx(0.01)
+    assert boundary(half + 0.01).excess(HOME) == 0.0
+    joints = boundary(half + 0.01, joints=(HOME - 0.1, HOME + 0.1))
+    assert joints.excess(HOME + 0.3 * np.eye(7)[6]) == pytest.approx(0.2)
+
+
 def test_joint_targets_are_clamped_on_the_way_to_them() -> None:
     one = boundary(joints=(HOME - 0.5, HOME + 0.5))
     rng = np.random.default_rng(1)

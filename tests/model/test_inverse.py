@@ -390,3 +390,12 @@ def test_what_is_not_given_may_be_said(robot: RobotModel) -> None:
         model.solve(robot, wanted, status=8)
     with pytest.raises(ShapeError, match="near must have shape"):
         model.solve(robot, wanted, near=[0.0] * 6)
+
+
+def test_a_pose_out_of_reach_is_refused_with_the_distance_of_its_wrist() -> None:
+    arm = ROBOTS["iiwa14"]
+    turned = Pose.xyz_abc(1.2, 0.4, arm.d_bs + 0.3, 0.7, -0.4, 0.2)
+    wrist = turned.xyz - arm.d_wf * turned.rotation[:, 2] - (0.0, 0.0, arm.d_bs)
+    with pytest.raises(Unreachable, match=rf"the wrist would be {np.linalg.norm(wrist):.3f} m") as error:
+        model.solve(arm, turned, near=np.zeros(7))
+    assert f"to {arm.d_se + arm.d_ew:.3f} m" in str(error.value)

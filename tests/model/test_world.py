@@ -67,12 +67,6 @@ def test_bodies_of_every_shape_are_where_they_were_added(world: ha.CollisionMode
     assert not any(one.second == "crate" for one in world.clearances(q, below=0.5))
 
 
-def test_a_height_map_has_columns_where_its_table_has_them() -> None:
-    columns = shapes.height_map([[0.1, 0.1, 0.0], [0.0, 0.0, 0.2]], cell=0.1)
-    assert [tuple(one.size.round(9)) for one in columns] == [(0.2, 0.1, 0.1), (0.1, 0.1, 0.2)]
-    assert [tuple(one.pose.xyz.round(9)) for one in columns] == [(-0.05, -0.05, 0.05), (0.1, 0.05, 0.1)]
-
-
 def test_a_mesh_of_parts_leaves_the_room_between_them_free(tmp_path: Path, world: ha.CollisionModel) -> None:
     corners = [line for line in CUBE.splitlines() if line.startswith("v")]
     shifted = [f"v {float(x) + 0.4} {y} {z}" for _, x, y, z in (line.split() for line in corners)]

@@ -201,8 +201,8 @@ class Fri:
 
     @property
     def is_compliant(self) -> bool:
-        """Whether the arm is compliant, or its set-points are the client's, unknown to the judge of motions."""
-        return True
+        """Whether the arm is compliant: under torques and wrenches. The guard limits positions."""
+        return self.kind != "position"
 
     def run(self, arm: ha.Arm) -> None:
         """Answer the messages."""

@@ -28,7 +28,7 @@ HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 #: Simulated seconds per second: streams of this machine's clock have gaps, which is part of the test.
 SPEED = 10
 #: Simulated time and wall time after which no more programs are tried [s]: an hour in the long run, else what fits.
-SIMULATED, PATIENCE = longer(600.0, 3600.0), longer(45.0, 4 * 3600.0)
+SIMULATED, PATIENCE = longer(200.0, 3600.0), longer(15.0, 4 * 3600.0)
 EXAMPLES = longer(300, 20_000)
 #: How often a busy machine may lose the connection on the way home.
 _ATTEMPTS = 4

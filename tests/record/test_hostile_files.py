@@ -214,13 +214,12 @@ def test_arrays_claim_no_memory_that_they_have_no_bytes_for(tmp_path: Path) -> N
 
 def test_writers_refuse_to_replace(tmp_path: Path) -> None:
     run = ha.load(written(tmp_path / "run.mcap", 200))
-    from heptarm.record import plot
     from heptarm.record.convert import convert
 
     writers: dict[str, Callable[[Path, bool], object]] = {
         "a.npz": lambda path, over: TRAJECTORY.save(path, overwrite=over),
         "b.csv": lambda path, over: convert(run, path, overwrite=over),
-        "c.png": lambda path, over: plot.save(run.plot("q"), path, overwrite=over),
+        "c.png": lambda path, over: run.chart("q").save(path, overwrite=over),
         "d.jsonl": lambda path, over: devices.recording(
             devices.synthetic(lambda _: None), path, overwrite=over
         ).close(),
@@ -256,8 +255,8 @@ def test_a_pipe_is_no_file(tmp_path: Path) -> None:
 
 
 def test_names_that_no_file_can_have(tmp_path: Path) -> None:
-    for name in ("a\0b", "x" * 300, ""):
-        for read in (Trajectory.load, ha.load, devices.recorded):
+    for name in ("a\0b", "x" * 300, "", "a\ud800"):
+        for read in (Trajectory.load, ha.load, devices.recorded, lambda name: read_key_file(Path(name))):
             with pytest.raises(CommandRejected):
                 read(name)
         with pytest.raises(CommandRejected):
@@ -267,7 +266,17 @@ def test_names_that_no_file_can_have(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "target", ["a" * 300, "a\0b", "1.2.3.4\0", f"{'a' * 70}.example.com", "sim://" + "a" * 300]
+    "target",
+    [
+        "a" * 300,
+        "a\0b",
+        "1.2.3.4\0",
+        f"{'a' * 70}.example.com",
+        "sim://" + "a" * 300,
+        "sim://iiwa14?project=a\0b",
+        "sim://iiwa14?scene=a%00b",
+        "sim://iiwa14?project=\ud800",
+    ],
 )
 def test_targets_that_no_host_has(target: str) -> None:
     with pytest.raises(HeptarmError) as error:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError
+from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, ShapeError
 from heptarm.fri import Client
 from heptarm.record import recorder as recording
 from heptarm.record.mcap_file import RecordingFile
@@ -78,8 +78,13 @@ def test_a_recorder_is_used_once_and_checks_its_notes(peer: Peer, tmp_path: Path
     with peer.arm() as arm:
         rec = arm.record(tmp_path / "run.mcap")
         assert "not begun" in repr(rec)
-        with rec, pytest.raises(CommandRejected, match="1 to 1000 characters"):
-            rec.note("")
+        with rec:
+            with pytest.raises(CommandRejected, match="1 to 1000 characters"):
+                rec.note("")
+            for text in ("\ud800", "a\0b", "\x1b[2J"):  # the first one ended the recording
+                with pytest.raises(ShapeError, match="printable characters only"):
+                    rec.note(text)
+            rec.note("two\nlines,\ta tab")
         rec.close()
         with pytest.raises(LocalProtocolError, match="once"):
             rec.start()

@@ -139,5 +139,9 @@ def test_film_and_row_of_pictures(reached: EpisodeReport, tmp_path: Path) -> Non
     gif = film(reached, tmp_path / "reach.gif", episodes=1, every=20)
     assert gif.read_bytes()[:6] in (b"GIF87a", b"GIF89a")
     assert film(reached, tmp_path / "reach.png").read_bytes()[:4] == b"\x89PNG"
+    gif.write_text("mine")
+    with pytest.raises(ha.CommandRejected, match=r"reach\.gif exists .*overwrite=True"):
+        film(reached, gif)
+    assert gif.read_text() == "mine"
     with pytest.raises(ha.CommandRejected, match="gif"):
         film(reached, tmp_path / "reach.mp4")

@@ -117,6 +117,7 @@ def test_stable_baselines_gets_the_last_observation_of_an_episode() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_its_ppo_learns_on_the_same_simulator() -> None:
     task = ReachTask(feature="kinematic")
     vec = vector(256, task)

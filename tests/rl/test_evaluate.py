@@ -89,6 +89,11 @@ def test_a_report_in_files(tmp_path: Path) -> None:
     assert again.facts == report.facts
     picture = report.plot(tmp_path / "reach.png")
     assert picture.read_bytes()[:4] == b"\x89PNG"
+    picture.write_text("mine")
+    with pytest.raises(CommandRejected, match=r"reach\.png exists .*overwrite=True"):
+        report.plot(picture)
+    assert picture.read_text() == "mine"
+    assert report.plot(picture, overwrite=True).read_bytes()[:4] == b"\x89PNG"
     with pytest.raises(CommandRejected, match=r"\.json"):
         report.save(tmp_path / "reach.txt")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.conformance import parts
+from tests.conformance import logs, parts
 from tests.conformance.stage import Stage
 
 if TYPE_CHECKING:
@@ -32,6 +32,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             # rospy leaves sockets of ended connections to the garbage collector; other leaks fail a test
             unclosed = "ignore:Exception ignored in. <socket.socket:pytest.PytestUnraisableExceptionWarning"
             item.add_marker(pytest.mark.filterwarnings(unclosed))
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    """Delete the logs of nodes."""
+    logs.delete(exitstatus)
 
 
 @pytest.fixture(scope="session")

@@ -30,6 +30,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal
 from heptarm.ros.trajectory.trajectory import KinematicState
+from tests.conformance import logs
 from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import ROOT, Stage
 
@@ -126,7 +127,7 @@ class NodeProcess:
     """The node as a process of its own."""
 
     def __init__(self, target: str, name: str = "heptarm", *, ns: str = "/", **values: object) -> None:
-        self.log = Path(tempfile.mkstemp(prefix="heptarm-node-", suffix=".log")[1])
+        self.log = logs.new()
         forget_parameters(f"{ns.rstrip('/')}/{name}")  # of a node before it: the master would keep them
         command = [sys.executable, str(NODE), f"__name:={name}", f"__ns:={ns}"]
         for key, value in ({"target": target} | PATIENT | values).items():

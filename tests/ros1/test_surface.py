@@ -108,9 +108,23 @@ def probe(ros: None, arena: Stage) -> Iterator[Client]:
 
 
 CASES = surface.CASES | hands.CASES
+#: What takes longest: every run has it with the node of ROS 2.
+IN_LONG_RUN = {
+    "a_collision_guard_stops_motions_and_makes_compliant",
+    "a_trajectory_is_taught_and_replayed",
+    "an_fri_session_is_opened_commanded_and_closed",
+    "forward_controllers_are_followed",
+    "modes_with_all_their_parameters",
+    "signals_are_listed_written_and_published",
+    "splines_and_programs",
+    "the_arm_touches_once_and_twice",
+}
+assert CASES.keys() >= IN_LONG_RUN
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(one, marks=[pytest.mark.long] if one in IN_LONG_RUN else []) for one in CASES]
+)
 def test_surface(probe: Client, arena: Stage, case: str) -> None:
     CASES[case](probe, arena)
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import importlib.util
 import os
 import socket
-import tempfile
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.conformance import parts
+from tests.conformance import logs, parts
 from tests.conformance.stage import Stage
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ _domain, _held = free_domain(os.getpid())
 os.environ["ROS_DOMAIN_ID"] = str(_domain)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"  # killed processes leave no shared memory behind
-os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="ros-log-")
+os.environ["ROS_LOG_DIR"] = str(logs.folder())
 os.environ.pop("HEPTARM_TARGET", None)
 
 
@@ -50,6 +49,11 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the tests of the other parts, where the environment selects one."""
     parts.select(config, items)
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    """Delete the logs of nodes."""
+    logs.delete(exitstatus)
 
 
 def pytest_unconfigure() -> None:

@@ -6,12 +6,11 @@ import copy
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import uuid
 from collections.abc import Callable, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -36,6 +35,7 @@ from unique_identifier_msgs.msg import UUID
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal
 from heptarm.ros.trajectory.trajectory import KinematicState
+from tests.conformance import logs
 from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import Stage
 
@@ -83,7 +83,7 @@ class NodeProcess:
         words: Sequence[str] = (),
         **values: object,
     ) -> None:
-        self.log = Path(tempfile.mkstemp(prefix="node-", suffix=".log")[1])
+        self.log = logs.new()
         command = [sys.executable, "-m", "heptarm_ros2.main"]
         command += words or ["--ros-args", "-r", f"__node:={name}", "-r", f"__ns:={space}"]
         if not words:
@@ -113,12 +113,10 @@ class NodeProcess:
             return self.process.wait()
 
     def finish(self) -> None:
-        """End it and check its exit code; the log is kept if it failed."""
+        """End it and check its exit code."""
         code = self.end()
-        said = self.said
-        print(said)
-        assert code == 0, said
-        self.log.unlink()
+        print(self.said)
+        assert code == 0, self.said
 
 
 class Ros:

@@ -38,6 +38,7 @@ from tests.conformance.case import (
 )
 from tests.conformance.stage import Stage
 from tests.conformance.streams import streamed
+from tests.long import longer
 from tests.ros2.peer import PATIENCE, Client, NodeProcess, Ros, fresh, parameter, until
 
 Start = Callable[..., NodeProcess]
@@ -86,7 +87,7 @@ def test_it_waits_for_a_cabinet_and_starts_by_itself(ros: Ros, spare: Stage, nod
     client.ready()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM])
 def test_asked_to_end_in_mid_air_it_leaves_the_arm_at_rest(
     ros: Ros, spare: Stage, nodes: Start, number: int
 ) -> None:
@@ -138,9 +139,14 @@ def test_an_integer_is_a_number_as_users_write_it(ros: Ros, spare: Stage, nodes:
     ("values", "words"),
     [
         ({"state_rate": 1000}, "state_rate must be in [1, 500], got 1000"),
-        ({"state_rate": "fast"}, "state_rate must be a number, got 'fast'"),
-        ({"execution": "magic"}, "execution must be one of 'servo', 'spline', 'fri', got 'magic'"),
-        ({"joint_names": "A"}, "joint_names must be a list of strings, got 'A'"),
+        *longer(
+            [],
+            [
+                ({"state_rate": "fast"}, "state_rate must be a number, got 'fast'"),
+                ({"execution": "magic"}, "execution must be one of 'servo', 'spline', 'fri', got 'magic'"),
+                ({"joint_names": "A"}, "joint_names must be a list of strings, got 'A'"),
+            ],
+        ),
     ],
 )
 def test_a_parameter_that_cannot_be_ends_the_node_with_one_line(
@@ -150,7 +156,6 @@ def test_a_parameter_that_cannot_be_ends_the_node_with_one_line(
     assert node.process.wait(PATIENCE) == 1
     assert words in node.said and "Traceback" not in node.said
     assert len(node.said.strip().splitlines()) == 1, node.said
-    node.log.unlink()
 
 
 def test_parameters_that_count_later_are_refused_while_connected(client: Client) -> None:

@@ -98,7 +98,6 @@ def test_a_node_that_is_killed_in_mid_goal_and_its_successor(ros: Ros, spare: St
         succeeds(heir, step(heir))
     finally:
         node.end(signal.SIGKILL)
-        node.log.unlink()
         if successor is not None:
             successor.finish()
 

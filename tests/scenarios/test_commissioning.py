@@ -211,15 +211,14 @@ def test_what_a_person_reads_is_compared(arm: ha.Arm) -> None:
 
 
 def test_a_robot_outside_t1_is_refused_and_yes_is_for_simulators_only(
-    monkeypatch: pytest.MonkeyPatch,
+    arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("heptarm.testing.commissioning.run.has_operator", lambda _: False)
-    with ha.connect(testing.stage(speed=2), timeout=30.0, watchdog=5.0) as real:
-        with pytest.raises(ModeConflict, match=r"must be T1 .*, got AUT"):
-            commissioning.commission(real, Answering())
-        monkeypatch.setattr(type(real), "is_virtual", property(lambda _: False))
-        with pytest.raises(CommandRejected, match="--yes is refused"):
-            command.person(real, yes=True, console=None)  # type: ignore[arg-type]
+    with pytest.raises(ModeConflict, match=r"must be T1 .*, got AUT"):
+        commissioning.commission(arm, Answering())
+    monkeypatch.setattr(type(arm), "is_virtual", property(lambda _: False))
+    with pytest.raises(CommandRejected, match="--yes is refused"):
+        command.person(arm, yes=True, console=None)  # type: ignore[arg-type]
 
 
 def test_a_step_that_does_not_exist_is_refused(arm: ha.Arm) -> None:

@@ -38,37 +38,26 @@ IN_REAL_TIME = [
 ]
 #: All others: the cabinet runs faster than time.
 FAST = [one.name for one in testing.scenarios() if one.name not in IN_REAL_TIME]
-#: What every run shows with ideal sensors as well, since their thresholds decide when the arm touches something: noise
-#: may neither break them nor be needed. The long run shows everything with both.
+#: What every run shows with noisy sensors as well, since their thresholds decide when the arm touches something: noise
+#: may neither break them nor be needed. The long run shows everything with both: an arm with noisy sensors is never at
+#: rest, which costs five times the processor time.
 TOUCHING = [one.name for one in testing.scenarios() if LONG or one.risk is Risk.CONTACT]
 
-
-def connected(speed: float, sensors: str = "ideal") -> ha.Arm:
-    return ha.connect(testing.stage(speed=speed, sensors=sensors), watchdog=10.0, timeout=30.0)
-
-
-@pytest.fixture(scope="module")
-def arm() -> Iterator[ha.Arm]:
-    with connected(SPEED) as arm:
-        yield arm
+#: Speeds and sensors of the arms; each arm is closed before the next is connected.
+IDEAL, NOISY = (SPEED, "ideal"), (SPEED, f"noisy:{SEED}")
+IDEAL_IN_REAL_TIME, NOISY_IN_REAL_TIME = (1.0, "ideal"), (1.0, f"noisy:{SEED}")
 
 
 @pytest.fixture(scope="module")
-def noisy_arm() -> Iterator[ha.Arm]:
-    with connected(SPEED, f"noisy:{SEED}") as arm:
+def arm(request: pytest.FixtureRequest) -> Iterator[ha.Arm]:
+    speed, sensors = request.param
+    with ha.connect(testing.stage(speed=speed, sensors=sensors), watchdog=10.0, timeout=30.0) as arm:
         yield arm
 
 
-@pytest.fixture(scope="module")
-def noisy_slower_arm() -> Iterator[ha.Arm]:
-    with connected(1.0, f"noisy:{SEED}") as arm:
-        yield arm
-
-
-@pytest.fixture(scope="module")
-def slower_arm() -> Iterator[ha.Arm]:
-    with connected(1.0) as arm:
-        yield arm
+def on(stage: tuple[float, str]) -> pytest.MarkDecorator:
+    """Run a test with this arm."""
+    return pytest.mark.parametrize("arm", [stage], indirect=True, ids=[f"{stage[1]}-{stage[0]:g}"])
 
 
 def shows(arm: ha.Arm, name: str) -> None:
@@ -111,26 +100,28 @@ def _check(report: Report, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", IN_REAL_TIME)
-def test_the_virtual_cabinet_shows_with_noisy_sensors_in_real_time(
-    noisy_slower_arm: ha.Arm, name: str
-) -> None:
-    shows_in_real_time(noisy_slower_arm, name)
-
-
-@pytest.mark.parametrize("name", FAST)
-def test_the_virtual_cabinet_shows_with_noisy_sensors(noisy_arm: ha.Arm, name: str) -> None:
-    shows(noisy_arm, name)
-
-
-@pytest.mark.parametrize("name", [name for name in FAST if name in TOUCHING])
-def test_the_virtual_cabinet_shows(arm: ha.Arm, name: str) -> None:
-    shows(arm, name)
+@on(NOISY_IN_REAL_TIME)
+def test_the_virtual_cabinet_shows_with_noisy_sensors_in_real_time(arm: ha.Arm, name: str) -> None:
+    shows_in_real_time(arm, name)
 
 
 @pytest.mark.parametrize("name", IN_REAL_TIME)
+@on(IDEAL_IN_REAL_TIME)
 @pytest.mark.long
-def test_the_virtual_cabinet_shows_in_real_time(slower_arm: ha.Arm, name: str) -> None:
-    shows_in_real_time(slower_arm, name)
+def test_the_virtual_cabinet_shows_in_real_time(arm: ha.Arm, name: str) -> None:
+    shows_in_real_time(arm, name)
+
+
+@pytest.mark.parametrize("name", [name for name in FAST if name in TOUCHING])
+@on(NOISY)
+def test_the_virtual_cabinet_shows_with_noisy_sensors(arm: ha.Arm, name: str) -> None:
+    shows(arm, name)
+
+
+@pytest.mark.parametrize("name", FAST)
+@on(IDEAL)
+def test_the_virtual_cabinet_shows(arm: ha.Arm, name: str) -> None:
+    shows(arm, name)
 
 
 def test_each_line_has_a_scenario_and_each_scenario_a_title() -> None:
@@ -156,6 +147,7 @@ class Real:
         setattr(self._arm, name, value)
 
 
+@on(IDEAL)
 def test_a_robot_is_asked_for_and_slow(arm: ha.Arm) -> None:
     real: Any = Real(arm)
     tidy(arm, home=True)
@@ -191,6 +183,7 @@ def test_a_robot_is_asked_for_and_slow(arm: ha.Arm) -> None:
     assert nobody.outcomes[0].verdict is Verdict.LEFT_OUT and not nobody.ok
 
 
+@on(IDEAL)
 def test_what_fails_is_reported_with_what_was_measured(arm: ha.Arm) -> None:
     def show(_: ha.Arm) -> None:
         from heptarm.testing.measure import near
@@ -219,6 +212,7 @@ def test_scenarios_are_found_by_name_group_and_pattern() -> None:
     assert any(one.risk is Risk.STILL for one in testing.find())
 
 
+@on(IDEAL)
 def test_the_command_names_runs_and_reports(
     capsys: pytest.CaptureFixture[str], tmp_path: Any, arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
 ) -> None:

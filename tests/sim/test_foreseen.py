@@ -14,6 +14,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
+from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY
 
@@ -94,7 +95,7 @@ def test_many_at_once_save_calls() -> None:
     assert calls < 60
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=longer(10, 25), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(st.integers(1, 1200), st.sampled_from(sorted(EVENTS))), max_size=5))
 def test_whatever_happens_is_seen_by_the_next_tick(happening: list[tuple[int, str]]) -> None:
     records = []

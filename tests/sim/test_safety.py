@@ -13,6 +13,7 @@ from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
+from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready, run
 from tests.sim.ideal import KINDS, LINE, begin, stopping_time
@@ -275,7 +276,7 @@ def test_the_manual_override_slows_down_on_top_of_the_applications() -> None:
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_a_stop_at_any_instant_ends_in_time(kind: str, how: str) -> None:
     random = np.random.default_rng(len(kind) * 10 + len(how))
-    for instant in random.integers(1, 700, 8).tolist():  # the benchmark takes 200
+    for instant in random.integers(1, 700, longer(5, 8)).tolist():  # the benchmark takes 200
         plant = begin(kind, seed=instant)
         for _ in range(instant):
             plant.tick()

@@ -6,15 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from heptarm.planning.motion import ServoMotion
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
+from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready
 
@@ -184,6 +186,46 @@ def test_a_stop_on_the_way_to_the_limits_leaves_none(kind: str, how: str, after:
     within_limits(plant, np.vstack([path, commands(plant, 700)]))
 
 
+@settings(max_examples=longer(5, 200), deadline=None)
+@given(
+    kind=st.sampled_from((*KINDS, "straight")),
+    seed=st.integers(0, 10_000),
+    longest=st.sampled_from((30, 300, 900)),
+    wild=st.sampled_from((1.0, 1.3, 10.0, 1e8)),
+)
+@example(kind="direct", seed=3, longest=900, wild=1.3)  # 820 times the acceleration, and a drive error
+@example(kind="servo", seed=0, longest=300, wild=1e8)  # Ruckig's result -101 ended the plant
+def test_wild_targets_bring_no_axis_beyond_its_limits(
+    kind: str, seed: int, longest: int, wild: float
+) -> None:
+    """Joint targets beyond the limits, poses out of reach, velocities that no axis has, at any intervals."""
+    random, plant, ear = np.random.default_rng(seed), Plant("iiwa14", q=tuple(CORNER.tolist())), Ear()
+    motion: ServoMotion = (
+        motions.straight()
+        if kind == "straight"
+        else motions.direct()
+        if kind == "direct"
+        else motions.servo()
+    )
+    plant.submit(MotionCommand(7, motion, listener=ear))
+    plant.step(2)
+    path, ticks = [np.array([CORNER] * 3)], 0
+    while ticks < 1500:
+        target = random.uniform(-wild, wild, 7)
+        dq = None
+        if kind == "straight":
+            target[3:] = random.normal(0, 1.0, 4)
+            target[3:] /= np.linalg.norm(target[3:])
+        else:
+            target *= plant.robot.q_max
+            dq = random.normal(0, 2.0, 7) if kind == "servo" and random.random() < 0.5 else None
+        plant.shared.post(7, target, dq)
+        path.append(commands(plant, int(random.integers(1, longest))))
+        ticks += len(path[-1])
+    within_limits(plant, np.vstack(path))
+    assert ear.causes == ["started"]
+
+
 def test_a_direct_motion_whose_target_comes_too_near_passes_it_and_not_the_limit() -> None:
     plant, _ = towards_the_limits("direct")
     path = np.vstack([[CORNER] * 3, commands(plant, 120)])
@@ -313,7 +355,7 @@ def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -
 @pytest.mark.parametrize("fast", [False, True], ids=["path", "fast"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_client_that_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
-    for lag in (*range(0, 16, 3), 17, 18, 19, 25, 60):
+    for lag in longer((0, 6, 12, 18, 25), (*range(0, 16, 3), 17, 18, 19, 25, 60)):
         plant, ear = serving(kind, joint_velocity=(0.2,) * 7, joint_acceleration=(0.2,) * 7)
         plant.shared.post(7, HERE + 0.5)
         plant.step(600)
@@ -332,7 +374,7 @@ def test_a_client_that_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kin
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_safety_stop_lets_no_axis_gain_speed_and_the_target_is_reached_afterwards(kind: str) -> None:
-    for seed in range(12):
+    for seed in range(longer(4, 12)):
         random = np.random.default_rng(seed)
         plant, _ = serving(kind)
         target = HERE + random.uniform(-0.4, 0.4, 7)

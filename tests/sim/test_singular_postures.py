@@ -16,6 +16,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
+from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, numbers, run
 
@@ -83,8 +84,16 @@ def test_a_lin_without_e1_keeps_a3() -> None:
     assert np.abs(np.array(track.q_cmd)[:, 2] - a3).max() < 1e-4
 
 
-@pytest.mark.parametrize("a7", [-150, -60, 60, 150])
-@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+half_turns = pytest.mark.parametrize(
+    ("a7", "noise"),
+    longer(
+        [(-150, 0.0), (-60, 1e-9), (60, -1e-9), (150, 0.0)],
+        [(a7, noise) for a7 in (-150, -60, 60, 150) for noise in (0.0, 1e-9, -1e-9)],
+    ),
+)
+
+
+@half_turns
 def test_half_a_turn_goes_where_the_arm_can_follow(a7: float, noise: float) -> None:
     """A LIN by exactly 180 degrees about A7 was refused or not, by noise."""
     start = deg(0, 30, 0, -90, 0, 60, a7)
@@ -95,8 +104,7 @@ def test_half_a_turn_goes_where_the_arm_can_follow(a7: float, noise: float) -> N
     assert turned == pytest.approx(180 if a7 < 0 else -180, abs=0.01)
 
 
-@pytest.mark.parametrize("a7", [-150, -60, 60, 150])
-@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+@half_turns
 def test_half_a_turn_in_a_spline_goes_where_the_arm_can_follow(a7: float, noise: float) -> None:
     start = deg(0, 30, 0, -90, 0, 60, a7)
     plant = ready(q=start)

@@ -230,8 +230,13 @@ def test_a_change_of_the_override_keeps_every_axis_within_its_acceleration(seed:
     assert ear.causes == ["started"] and np.abs(q[-1] - q[0]).max() > 0.0
 
 
-@pytest.mark.parametrize("a7", [-150, -60, 60, 150])
-@pytest.mark.parametrize("noise", [0.0, 1e-9, -1e-9])
+@pytest.mark.parametrize(
+    ("a7", "noise"),
+    longer(
+        [(-150, 0.0), (-60, 0.0), (60, 0.0), (150, 0.0), (-60, 1e-9), (60, -1e-9)],
+        [(a7, noise) for a7 in (-150, -60, 60, 150) for noise in (0.0, 1e-9, -1e-9)],
+    ),
+)
 def test_half_a_turn_goes_where_the_arm_can_follow(a7: float, noise: float) -> None:
     plant, ear, start = at(0, 30, 0, -90, 0, 60, a7)
     goal = start @ Pose.xyz_abc(a=np.pi + noise)
@@ -308,7 +313,7 @@ def test_at_the_end_of_its_reach_it_rests_on_its_line(every: str) -> None:
 
 
 @pytest.mark.parametrize("degrees", [HOME, (0, 45, 0, -90, 5, 2, 0), (20, 5, 10, -40, 0, 30, 0)])
-@pytest.mark.parametrize("seed", range(longer(2, 40)))
+@pytest.mark.parametrize("seed", range(longer(1, 40)))
 def test_whatever_targets_come_no_axis_leaves_its_limits(degrees: tuple[float, ...], seed: int) -> None:
     random = np.random.default_rng(seed)
     plant, ear, start = at(*degrees)

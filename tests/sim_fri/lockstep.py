@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,8 @@ from tests.sim_fri.rig import READY, State
 
 #: The client's clock begins here [ns].
 EPOCH = 10**12
+#: How many ticks late the next datagram arrives; None: never.
+Line = Callable[[], int | None]
 
 
 class Lockstep:
@@ -42,6 +44,8 @@ class Lockstep:
     Attributes:
         track: the plant after each tick since commands became effective.
         ends: of overlays.
+        there: the line of messages.
+        back: that of answers.
     """
 
     def __init__(
@@ -65,7 +69,11 @@ class Lockstep:
         self.ends: list[OverlayEnded] = []
         self._arm = PlantArm(self.plant)
         self._controller = Controller(SessionConfiguration(Version.V1_15, period_ms), self.plant.robot)
-        self._answer: bytes | None = None
+        self.there: Line = lambda: 0
+        self.back: Line = lambda: 0
+        self._messages: list[tuple[int, bytes]] = []  # with the tick at which each arrives
+        self._answers: list[tuple[int, bytes]] = []
+        self._ticks = 0
         self._held: list[bytes] | None = None
         self._controller.open()
         self._until(State.MONITORING_READY)
@@ -133,9 +141,9 @@ class Lockstep:
 
     def _tick(self) -> None:
         plant, controller, now = self.plant, self._controller, self.plant.time_ns
-        if self._answer is not None:
-            controller.receive(self._answer, now - TICK_NS // 2)
-            self._answer = None
+        self._ticks += 1
+        for answer in _arrived(self._answers, self._ticks):
+            controller.receive(answer, now - TICK_NS // 2)
         datagram = controller.tick(self._arm.reading(), now)
         self._arm.overlay(controller.superposition)
         for event in controller.events():
@@ -147,5 +155,21 @@ class Lockstep:
         if datagram is not None and self._held is not None:
             self._held.append(datagram)
         elif datagram is not None:
-            self._answer = self.cycle.turn(datagram, EPOCH + now)
+            _send(self._messages, datagram, self._ticks, self.there())
+        for message in _arrived(self._messages, self._ticks):
+            answer_now = self.cycle.turn(message, EPOCH + now)
             self.cycle.finish(EPOCH + now + TICK_NS // 20)
+            if answer_now is not None:
+                _send(self._answers, answer_now, self._ticks + 1, self.back())
+
+
+def _send(line: list[tuple[int, bytes]], datagram: bytes, tick: int, late: int | None) -> None:
+    if late is not None:
+        line.append((tick + late, datagram))
+
+
+def _arrived(line: list[tuple[int, bytes]], tick: int) -> list[bytes]:
+    """Take what has arrived, in the order of its arrival."""
+    here = sorted((one for one in line if one[0] <= tick), key=lambda one: one[0])
+    line[:] = [one for one in line if one[0] > tick]
+    return [datagram for _, datagram in here]

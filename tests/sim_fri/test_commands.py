@@ -16,6 +16,7 @@ from heptarm.sim.fri.controller_side import MIRRORED
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.pose import Pose
+from tests.long import longer
 from tests.sim_fri.rig import READY, Law, Rig, State, mirror
 
 TORQUE = MotionOverlay(m.CommandMode.TORQUE, m.ControlMode.JOINT_IMPEDANCE)
@@ -49,18 +50,29 @@ def wave(time: float, amplitude: float) -> float:
 
 # ------------------------------------------------------------------------------ what is carried out
 
+#: Receive period and multiplier; each with one version, and in the long run with each.
+RECEIVED = [(1, 1), (1, 2), (5, 1), (10, 1)]
 
-@pytest.mark.parametrize("version", Version)
-@pytest.mark.parametrize("receive", [(1, 1), (1, 2), (5, 1), (10, 1)])
-def test_the_arm_follows_a_law_one_receive_period_behind(version: Version, receive: tuple[int, int]) -> None:
+
+@pytest.mark.parametrize(
+    ("version", "receive"),
+    longer(
+        list(zip(Version, RECEIVED, strict=True)),
+        [(version, receive) for version in Version for receive in RECEIVED],
+    ),
+)
+def test_the_arm_follows_a_law_one_and_a_half_receive_periods_behind(
+    version: Version, receive: tuple[int, int]
+) -> None:
     rig = Rig(configuration=SessionConfiguration(version, *receive)).active()
     start = rig.now * 1e-9
     rig.client.law = sine(0.3, start)
     first = len(rig.arm.track)
     rig.run(2000)
     assert rig.controller.state is State.COMMANDING_ACTIVE, rig.reported
-    # a message, its answer in the next tick, one receive period of transfer: the delay in ticks
-    delay = receive[0] * receive[1] + (0 if receive[0] * receive[1] == 1 else 1)
+    # a message, its answer in the next tick, one receive period of transfer, the mean over one: the delay in ticks
+    period = receive[0] * receive[1]
+    delay = period + (0 if period == 1 else 1) + 0.5 * (period - 1)
     ticks = np.arange(500, 2000)
     expected = np.array([wave((tick + 1 - delay) * 1e-3, 0.3) for tick in ticks])
     got = np.array(rig.arm.track)[first + ticks, 3]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from heptarm.fri.guard.joint_guard import Limits
+from tests.long import longer
 from tests.sim_fri.lockstep import Lockstep
 
 #: A6 is this far from where it is turned to; it then passes 0.5 to 2.5 rad/s on its way to the limit at 120°.
@@ -14,8 +15,13 @@ START = (0.0, 0.4, 0.0, -1.2, 0.0, 0.6, 0.0)
 TARGET = np.array((1.5, 0.4, 1.5, -1.2, 2.5, 4.0, -2.5))
 
 
-@pytest.mark.parametrize("period", [1, 5, 10])
-@pytest.mark.parametrize("manner", ["leave", "stop", "close", "silence"])
+@pytest.mark.parametrize(
+    ("manner", "period"),
+    longer(
+        [("leave", 1), ("stop", 5), ("close", 10), ("silence", 1), ("silence", 10)],
+        [(manner, period) for manner in ("leave", "stop", "close", "silence") for period in (1, 5, 10)],
+    ),
+)
 def test_the_end_of_a_session_passes_no_limit(manner: str, period: int) -> None:
     for moment in (0.25, 0.5, 0.7):  # while it accelerates, at full speed, while it brakes before the limit
         session = Lockstep(q=START, period_ms=period)

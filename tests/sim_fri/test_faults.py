@@ -16,6 +16,7 @@ from heptarm.planning.seam import TICK_NS
 from heptarm.sim.fri.faults import NONE, FaultScenario, FaultyLink, LinkFaultCounts, LinkFaults
 from heptarm.sim.fri.overlay import MotionOverlay
 from heptarm.sim.fri.settings import OverlayEnded
+from tests.long import longer
 from tests.oracles.fri.codec import decode_monitoring
 from tests.sim_fri.rig import Arm, Rig, State
 
@@ -156,7 +157,7 @@ def test_a_good_line_keeps_commanding() -> None:
     assert trial.causes == [] and trial.rig.controller.quality is m.Quality.EXCELLENT
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(longer(1, 3)))
 @pytest.mark.parametrize(
     ("faults", "least"),
     [
@@ -173,7 +174,7 @@ def test_small_faults_keep_commanding(faults: LinkFaults, least: m.Quality, seed
     assert trial.causes == [] and trial.rig.controller.quality >= least
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(longer(1, 3)))
 @pytest.mark.parametrize("version", [Version.V1_11, Version.V2_7])
 @pytest.mark.parametrize(
     "faults",

@@ -21,6 +21,7 @@ from heptarm.values.motion.motion import Hold, Motion, hold
 from heptarm.values.motion.ptp import Ptp, PtpPose, ptp, ptp_home, ptp_transport
 from heptarm.values.motion.spline import spl, spline_joints
 from heptarm.values.pose import Pose, Redundancy, deg
+from heptarm.values.robot import robot
 
 Q = deg(0, 30, 0, -90, 0, 60, 0)
 POSE = Pose.xyz_abc(0.5, 0.0, 0.3, *deg(180, 0, 180))
@@ -264,3 +265,13 @@ def test_a_percentage_is_distinguished_from_a_fraction() -> None:
         LimitError, match=r"speed must be in \(0, 1\], got 50 \(it is a fraction: did you mean 0.5\?"
     ):
         ptp(Q, speed=50)
+
+
+def test_the_longest_time_of_a_motion_is_a_whole_range_of_each_joint_with_its_ramps() -> None:
+    iiwa = robot("iiwa14")
+    ranges, faster, harder = iiwa.q_max - iiwa.q_min, iiwa.dq_max / iiwa.ddq_max, iiwa.ddq_max / iiwa.dddq_max
+    whole = ranges / iiwa.dq_max + faster + harder
+    assert Dynamics().turn_time(iiwa) == pytest.approx(whole.max())
+    slow = Dynamics(joint_speed=0.5, joint_acceleration=0.5, joint_jerk=0.25)
+    longest = ranges / (0.5 * iiwa.dq_max) + faster + 4.0 * harder
+    assert slow.turn_time(iiwa) == pytest.approx(longest.max())

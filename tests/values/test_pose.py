@@ -201,6 +201,8 @@ def test_rotation_vector_and_roll_pitch_yaw() -> None:
     assert float(np.linalg.norm(Pose.xyz_abc(c=math.pi).rotvec)) == pytest.approx(math.pi)
     again = Pose.from_rotvec(pose.xyz, pose.rotvec)
     assert again.angle_to(pose) < 1e-12
+    opposite = Pose(pose.xyz, -pose.quat)  # the same rotation
+    np.testing.assert_allclose(opposite.rotvec, pose.rotvec, atol=1e-12)
 
 
 def test_interpolation_turns_at_constant_speed_on_the_shortest_rotation() -> None:

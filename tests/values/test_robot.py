@@ -26,6 +26,16 @@ def test_table(model: RobotModel) -> None:
     model.check(model.q_max)
 
 
+@pytest.mark.parametrize(("arm", "med", "ratio"), [("iiwa7", "med7", 0.9639), ("iiwa14", "med14", 1.05707)])
+def test_the_links_of_a_med_are_those_of_its_sister_of_another_density(
+    arm: str, med: str, ratio: float
+) -> None:
+    one, other = robot(arm).links, robot(med).links
+    np.testing.assert_allclose(other.mass / one.mass, ratio, rtol=3e-5)
+    np.testing.assert_allclose(other.com, one.com, atol=1e-5)
+    np.testing.assert_allclose(other.inertia, ratio * one.inertia, rtol=5e-3, atol=3e-6)
+
+
 def test_check_names_axis_value_and_range() -> None:
     with pytest.raises(
         LimitError, match=r"A4 must be in \[-120, 120\] deg on the LBR iiwa 14 R820, got 125.00 deg"

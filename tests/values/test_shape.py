@@ -67,3 +67,9 @@ def test_a_tool_has_shapes_and_shows_them() -> None:
     tool = ha.Tool("pen", shapes=[shapes.sphere(0.01, at=UP)])
     assert tool.shapes == (shapes.sphere(0.01, at=UP),) and "sphere, radius 10.0 mm" in str(tool)
     assert tool != ha.Tool("pen") and ha.Tool("pen").shapes == ()
+
+
+def test_a_height_map_has_columns_where_its_table_has_them() -> None:
+    columns = shapes.height_map([[0.1, 0.1, 0.0], [0.0, 0.0, 0.2]], cell=0.1)
+    assert [tuple(one.size.round(9)) for one in columns] == [(0.2, 0.1, 0.1), (0.1, 0.1, 0.2)]
+    assert [tuple(one.pose.xyz.round(9)) for one in columns] == [(-0.05, -0.05, 0.05), (0.1, 0.05, 0.1)]

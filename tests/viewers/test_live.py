@@ -109,6 +109,24 @@ def test_without_rerun_the_command_that_installs_it(peer: Peer, monkeypatch: pyt
     assert raised.value.hint == "pip install 'heptarm[rerun]'"
 
 
+def test_a_file_that_exists_is_kept(peer: Peer, tmp_path: Path) -> None:
+    file = tmp_path / "mine.rrd"
+    file.write_text("mine")
+    with peer.arm() as arm:
+        with pytest.raises(CommandRejected, match=r"mine\.rrd exists .*overwrite=True"):
+            ha.live(arm, save=file)
+        assert file.read_text() == "mine"
+
+
+def test_a_file_is_replaced_when_asked(peer: Peer, tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    file = tmp_path / "mine.rrd"
+    file.write_text("mine")
+    with peer.arm() as arm, ha.live(arm, save=file, overwrite=True):
+        pass
+    assert file.read_bytes() != b"mine"
+
+
 def test_what_cannot_be_shown_is_refused(peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("rerun")
     monkeypatch.delenv("DISPLAY", raising=False)

@@ -15,7 +15,6 @@ from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, Connection, Options
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS, groups_of
 from heptarm.arm.link.target import parse_target, target_from_env
-from heptarm.arm.translate.text import printable
 from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import ConnectFailed, ShapeError
 from heptarm.io import tcp
@@ -24,8 +23,10 @@ from heptarm.io.keys import find_key
 from heptarm.io.targets import SavedTarget
 from heptarm.io.transport import Transport
 from heptarm.values.checks import finite, flag, instance, within, word
+from heptarm.values.frames import check_printable
 from heptarm.values.robot import FLANGES, ROBOTS, robot
 from heptarm.values.robot import flange as flange_of
+from heptarm.values.text import printable
 from heptarm.wire import messages as wire
 
 _log = logging.getLogger("heptarm.arm")
@@ -104,17 +105,13 @@ def connect(
         if given is not None:
             instance(given, str, what)
     groups_of(groups, ~wire.Groups.NONE)
-    if name is not None and len(name.encode()) > _MAX_NAME:
+    if name is not None and len(check_printable(name, "name").encode()) > _MAX_NAME:
         raise ShapeError(
             f"name must have at most {_MAX_NAME} bytes, got {len(name.encode())}: {name!r}",
             code=3,
             parameter="name",
             value=name,
             allowed=f"at most {_MAX_NAME} bytes",
-        )
-    if name is not None and name != printable(name):
-        raise ShapeError(
-            f"name must have printable characters only, got {name!a}", code=3, parameter="name", value=name
         )
     chosen = parse_target(target_from_env() if target is None else target).with_flange(flange)
     if key is None and key_file is None:
@@ -175,5 +172,9 @@ def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
         arm.speed = saved.speed
     newest = arm.connection.newest()
     mode = None if newest is None else newest.groups.mode
-    if control and saved.tool and (mode is None or mode.tool != saved.tool):
+    arm.remember_tools(saved.tools)
+    is_measured = saved.tool in {
+        tool.name for tool in saved.tools
+    }  # its data may be newer than the cabinet's
+    if control and saved.tool and (mode is None or mode.tool != saved.tool or is_measured):
         arm.attach_tool(saved.tool)

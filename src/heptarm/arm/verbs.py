@@ -28,10 +28,11 @@ from heptarm.arm.fri import settings as fri_settings
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
-from heptarm.arm.motion import program_request
+from heptarm.arm.motion import load_check, program_request
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
+from heptarm.arm.motion.load_check import LoadCheck
 from heptarm.arm.motion.preview import ProgramPreview
 from heptarm.arm.motion.program_request import ProgramTerms
 from heptarm.arm.motion.recovery import RecoveryAttempts
@@ -46,7 +47,6 @@ from heptarm.arm.motion.servo import (
     documented,
 )
 from heptarm.arm.translate.conditions import condition_message
-from heptarm.arm.translate.text import printable
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.planning.search import STATES, TIMEOUT, Goal
 from heptarm.record.camera import CameraFeed, CameraSubject
@@ -65,11 +65,11 @@ from heptarm.values.motion.planned_path import Path as FoundPath
 from heptarm.values.motion.planned_path import Upright
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import Body, RobotModel
 from heptarm.values.sealed import Sealed
 from heptarm.values.shape import Shape
 from heptarm.values.state import State, Wrench
-from heptarm.values.text import lines
+from heptarm.values.text import lines, printable
 from heptarm.values.tool import KnownTool, Tool, Workpiece
 from heptarm.values.workspace import Workspace
 from heptarm.wire import messages as wire
@@ -792,6 +792,7 @@ class ArmVerbs(Sealed):
     def _send(self, motions: tuple[Motion, ...], terms: ProgramTerms) -> MotionHandle:
         made = program_request.checked(self._connection, self._tooling, motions, terms)
         self._foresight.examine(made)
+        load_check.warn_before(self.robot, terms.mode, self._connection.newest())
         return program_request.send(self._connection, made)
 
     @overload
@@ -981,6 +982,14 @@ class ArmVerbs(Sealed):
         """Tools that can be attached by name: templates of the project, and defined ones."""
         return self._tooling.known
 
+    def remember_tools(self, tools: Sequence[Tool]) -> None:
+        """Know tools by name, as `connect` does with those of a saved target; nothing is attached.
+
+        Raises:
+            ShapeError: not tools.
+        """
+        self._tooling.remember([instance(tool, Tool, f"tools[{index}]") for index, tool in enumerate(tools)])
+
     @property
     def shapes(self) -> tuple[tuple[Shape, Pose], ...]:
         """Shapes of the attached tool and workpiece, each with its pose in the flange frame; see `heptarm.shapes`."""
@@ -1043,6 +1052,41 @@ class ArmVerbs(Sealed):
             ModeConflict: a motion runs.
         """
         self._tooling.detach_workpiece(workpiece)
+
+    @property
+    def load(self) -> Body | None:
+        """Load data of the attached tool and workpiece as one body in the flange frame; None: nothing that is known."""
+        return self._tooling.load
+
+    def verify_load(self, *, refuse: float = load_check.REFUSE) -> LoadCheck:
+        """Check the load data of a resting arm that nothing touches: call it before impedance control.
+
+        A compliant arm sinks under a weight that its load data lack. What the sensors' accuracy does not explain, 3 %
+        of the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion in an
+        impedance mode that begins in position control logs the same warning; none is refused, for it may begin in
+        contact.
+
+        Args:
+            refuse: fraction of the highest torque of an axis above which it is an error, (0, 1].
+
+        Returns:
+            The torques that the load data leave, and the mass at the flange that would explain them.
+
+        Raises:
+            NotReady: the load data are wrong by more than `refuse`, or something touches the arm.
+            StaleState: the subscribed groups lack "joints" or "torques".
+            Timeout: the arm does not rest.
+        """
+        limit = within(refuse, "refuse", 0.0, 1.0, above=True)
+        begin = self.wait_for_rest().stamp
+        states: list[State] = []
+
+        def is_enough(state: State) -> bool:
+            states.append(state)
+            return state.stamp - begin >= load_check.SECONDS * 1e9
+
+        self.wait_until(is_enough)
+        return load_check.verify(self.robot, states, refuse=limit)
 
     @contextlib.contextmanager
     def tool(self, tool: Tool | str, *, frame: str | None = None) -> Iterator[None]:

@@ -23,7 +23,6 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.fri.diagnosis import cause, silence, strangers
 from heptarm.arm.fri.settings import PORTS
 from heptarm.arm.link.target import parse_target
-from heptarm.arm.translate.text import printable
 from heptarm.cli.options import (
     FRI,
     NO_TARGET,
@@ -40,6 +39,7 @@ from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.session.events import Event, Kind
 from heptarm.io.udp import UdpSocket
+from heptarm.values.text import printable
 from heptarm.wire.messages import MAJOR, MINOR, PORT
 
 _REQUESTS = 200

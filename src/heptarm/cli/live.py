@@ -7,12 +7,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from heptarm.cli.options import NO_TARGET, CommandTarget, Json
+from heptarm.cli.options import NO_TARGET, CommandTarget, Json, Overwrite
 from heptarm.cli.output import emit
 from heptarm.cli.record import wait_until_over
 from heptarm.errors import require
 from heptarm.panel.model import groups_for
 from heptarm.values.checks import within
+from heptarm.values.files import refuse_existing
 from heptarm.viewers.live import live as live_view
 
 
@@ -34,6 +35,7 @@ def live(
         float | None, Parameter(name="--for", help="How long [s]. Default: until Ctrl-C.")
     ] = None,
     target: CommandTarget = NO_TARGET,
+    overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
     """Show a robot in the rerun viewer while it moves, beside the program that controls it.
@@ -46,9 +48,11 @@ def live(
     """
     limit = None if seconds is None else within(seconds, "for", 0.0, 1e7, above=True, unit="s")
     require("rerun", extra="rerun")
+    if save is not None:
+        refuse_existing(save, overwrite=overwrite, name="save")
     with target.connect(control=False, state_rate=rate) as arm:
         arm.subscribe(rate=rate, groups=groups_for(arm.connection.welcome.groups))
-        with live_view(arm, save=save, to=to, viewer=True if rerun else None) as view:
+        with live_view(arm, save=save, to=to, viewer=True if rerun else None, overwrite=overwrite) as view:
             if not as_json:
                 places = [str(save)] * (save is not None) + [to] * bool(to)
                 if rerun or not places:

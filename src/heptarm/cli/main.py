@@ -49,11 +49,15 @@ MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin-rel": "motion:
 PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_lin_rel", "to": "plan:plan_to"}
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
+CALIBRATIONS = {"tcp": "calibrate:tcp", "load": "calibrate:load"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
 #: Groups that are commands themselves, and where they are.
 _APPS = {"sim": "sim:app"}
-_GROUPS = {"sim": SIMULATIONS, "move": MOVES, "plan": PLANS, "key": KEYS, "targets": TARGETS, "rl": LEARNING}
+_GROUPS = {
+    **{"sim": SIMULATIONS, "move": MOVES, "plan": PLANS, "calibrate": CALIBRATIONS},
+    **{"key": KEYS, "targets": TARGETS, "rl": LEARNING},
+}
 
 app = App(
     name="heptarm",
@@ -98,11 +102,13 @@ _words = [token for token in _tokens if not token.startswith("-")]
 _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
 _plans = App(name="plan", help="Look ahead of a motion: duration, limits, collisions; nothing moves.")
+_calibrate = App(name="calibrate", help="Measure what is on the flange: the tip of a tool, and the load.")
 _keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
 _targets = App(name="targets", help="List, save and remove robots that have a name.")
 _learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
 app.command(_add(_move, MOVES, listed=_words == ["move"]))
 app.command(_add(_plans, PLANS, listed=_words == ["plan"]))
+app.command(_add(_calibrate, CALIBRATIONS, listed=_words == ["calibrate"]))
 app.command(_add(_keys, KEYS, listed=_words == ["key"]))
 app.command(_add(_targets, TARGETS, listed=_words == ["targets"]))
 app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))
@@ -127,7 +133,7 @@ def main() -> None:
     except CycloptsError as error:
         _fail(f"{_misplaced(error) or ' '.join(str(error).split())} ({_help()})", code=_USAGE)
     except HeptarmError as error:
-        from heptarm.arm.translate.text import printable
+        from heptarm.values.text import printable
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise

@@ -193,9 +193,7 @@ def _show(preview: ProgramPreview, options: PlanOptions, found: dict[str, Any]) 
     """Print a preview behind what was found, and draw it; the exit code is 1 if bodies would touch."""
     written: dict[str, Any] = {}
     if options.out is not None:
-        from heptarm.record import plot
-
-        written = {"file": str(plot.save(preview.plot(), options.out, overwrite=options.overwrite))}
+        written = {"file": str(preview.chart().save(options.out, overwrite=options.overwrite))}
     if options.show:
         preview.show()
     if options.as_json:

@@ -9,7 +9,10 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import Json, Overwrite
 from heptarm.cli.output import emit
+from heptarm.errors import CommandRejected
 from heptarm.record import plot as plots
+from heptarm.record.plot.chart import Style
+from heptarm.record.plot.signals import Kind
 from heptarm.record.recording import load
 from heptarm.values.files import refuse_existing
 
@@ -29,19 +32,45 @@ def plot(
         ),
     ] = None,
     arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
-    compare: Annotated[Path | None, Parameter(help="A second recording, drawn on the first one.")] = None,
+    kind: Annotated[
+        Kind, Parameter(help="Over time, how often each value occurs, or amplitude over frequency.")
+    ] = "time",
+    style: Annotated[
+        Style, Parameter(help="For the screen, or one column of a journal, as .pdf or .svg.")
+    ] = "screen",
+    compare: Annotated[
+        tuple[Path, ...], Parameter(help="Another recording, drawn on the first one; up to three.")
+    ] = (),
+    at: Annotated[
+        str,
+        Parameter(
+            help="Compare from this note or event on, such as ConditionFired. Default: the first motion."
+        ),
+    ] = "",
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
-    """Plot a recording: joints, speeds and torques by their limits, wrench, path; motions and events as bands."""
+    """Plot a recording: joints, speeds and torques by their limits, wrench, path; motions and events as bands.
+
+    With .html: an interactive page that needs no network.
+    """
     names = tuple(name.strip() for name in signals.split(",") if name.strip())
-    target = file.with_suffix(".png") if out is None else out
+    target = file.with_suffix(".pdf" if style == "paper" else ".png") if out is None else out
     refuse_existing(target, overwrite=overwrite, name="out")
     run = load(file, arm=arm)
-    figure = (
-        plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare, arm=arm), names)
-    )
-    written = plots.save(figure, target, overwrite=overwrite)
+    if compare:
+        others = [load(other, arm=arm) for other in compare]
+        chart = plots.compare([run, *others], signals=names, kind=kind, at=at)
+    elif at:
+        raise CommandRejected(
+            "at must be given with compare",
+            parameter="at",
+            value=at,
+            hint="heptarm plot run.mcap --compare other.mcap --at NAME",
+        )
+    else:
+        chart = plots.chart_of(run, signals=names, kind=kind)
+    written = chart.save(target, style=style, overwrite=overwrite)
     if as_json:
         emit(
             {

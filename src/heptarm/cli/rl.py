@@ -93,6 +93,8 @@ def train(
             flush=True,
         )
 
+    curve_file = out.with_suffix(".png")
+    refuse_existing(curve_file, overwrite=overwrite or resume, name="out")
     trained = work(
         None if resume else recipe,
         out=out,
@@ -103,7 +105,7 @@ def train(
         engine=_engine(engine),
         overwrite=overwrite,
     )
-    curve = trained.plot(out.with_suffix(".png"))
+    curve = trained.plot(curve_file, overwrite=True)  # refused above; each worker draws the same
     report = {"policy": str(out), "curve": str(curve), "steps": trained.steps, "seconds": trained.seconds}
     if as_json:
         emit(report)
@@ -143,7 +145,7 @@ def evaluate(
     from heptarm.rl.evaluate import evaluate as work
     from heptarm.rl.sim.randomisation import level
 
-    _refuse_reports(out, overwrite=overwrite)
+    _refuse_reports(out, overwrite=overwrite, film=False)
     report = work(
         _load(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
     )
@@ -177,7 +179,7 @@ def deploy(
     as_json: Json = False,
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
-    _refuse_reports(out, overwrite=overwrite)
+    _refuse_reports(out, overwrite=overwrite, film=film)
     network = _load(policy)
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
@@ -230,21 +232,21 @@ def _ask(arm: Any, network: Policy, settings: DeploySettings) -> int:
     return 0
 
 
-def _refuse_reports(out: Path | None, *, overwrite: bool) -> None:
+def _refuse_reports(out: Path | None, *, overwrite: bool, film: bool) -> None:
     """Refuse, before anything runs, a name under which there is a report."""
     if out is not None:
-        for suffix in (".npz", ".json", ".png"):
+        for suffix in (".npz", ".json", ".png", *([".gif"] if film else [])):
             refuse_existing(out.with_suffix(suffix), overwrite=overwrite, name="out")
 
 
 def _report(report: EpisodeReport, out: Path | None, *, film: bool, overwrite: bool, as_json: bool) -> int:
     if out is not None:
         files = [report.save(out.with_suffix(one), overwrite=overwrite) for one in (".npz", ".json")]
-        files.append(report.plot(out.with_suffix(".png")))
+        files.append(report.plot(out.with_suffix(".png"), overwrite=overwrite))
         if film:
             from heptarm.rl.film import film as draw
 
-            files.append(draw(report, out.with_suffix(".gif")))
+            files.append(draw(report, out.with_suffix(".gif"), overwrite=overwrite))
         if not as_json:
             print("written:", ", ".join(map(str, files)), file=sys.stderr)
     emit(report.as_dict()) if as_json else print(report.summary())

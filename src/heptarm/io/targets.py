@@ -9,12 +9,18 @@ The file is heptarm/targets.toml in the folder of the user's settings, one table
     speed = 0.3                  # ceiling of the speed; otherwise 0.25 of a real robot, 1 of a simulator
     flange = "touch"             # media flange of the robot
 
+    [lab1.tools.gripper]         # a tool that was measured, see heptarm.calibration
+    mass = 1.2
+    com = [0.0, 0.0, 0.06]
+    frames.tcp = [0.0, 0.0, 0.15, 0.0, 0.0, 0.0, 1.0]
+
 When a target was last used is the time of a file of its name in the folder beside it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
 import re
@@ -26,7 +32,9 @@ from heptarm.errors import CommandRejected
 from heptarm.io.folders import private_folder, settings_folder
 from heptarm.values.checks import shown
 from heptarm.values.files import read_text
+from heptarm.values.pose import Pose
 from heptarm.values.robot import flange
+from heptarm.values.tool import Tool
 
 try:
     import tomllib
@@ -40,6 +48,9 @@ _LONGEST_NAME = 64
 #: Names that mean something else.
 _TAKEN = ("localhost", "sim")
 _KEYS = ("address", "key_file", "tool", "speed", "flange")
+#: The table of tools of a target, and what each of them may have: no shapes, which only a program knows.
+_TOOLS = "tools"
+_TOOL_KEYS = ("mass", "com", "inertia", "frames")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +64,7 @@ class SavedTarget:
         tool: attached when a client takes control; "": none.
         speed: ceiling of the speed of all motions, (0, 1]; None: 0.25 of a real robot, 1 of a simulator.
         flange: media flange of the robot: "plain", "touch", or its height [m]; "": not stated.
+        tools: tools that arms of this target know by name.
     """
 
     name: str
@@ -61,6 +73,7 @@ class SavedTarget:
     tool: str = ""
     speed: float | None = None
     flange: str = ""
+    tools: tuple[Tool, ...] = ()
 
     @property
     def last_used(self) -> float | None:
@@ -122,17 +135,43 @@ def _read(name: str, table: Any) -> SavedTarget:
             parameter=name,
             hint='write address = "172.31.1.147" below its name',
         )
-    if unknown := sorted(set(table) - set(_KEYS)):
-        raise CommandRejected(
-            f"{where} has {', '.join(unknown)}, which no target has",
-            parameter=name,
-            allowed=", ".join(_KEYS),
-            hint=f"it may have {', '.join(_KEYS)}",
-        )
+    _refuse_unknown(table, (*_KEYS, _TOOLS), where, name)
     values = {key: table[key] for key in _KEYS if key in table}
+    tools = table.get(_TOOLS, {})
+    if not isinstance(tools, dict):
+        raise CommandRejected(
+            f"{where}: tools must be tables", parameter=name, hint=f"write [{name}.tools.NAME]"
+        )
+    values[_TOOLS] = tuple(_read_tool(one, content, where) for one, content in tools.items())
     if isinstance(values.get("flange"), float):  # a height may be a number
         values["flange"] = f"{values['flange']:g}"
     return check_target(SavedTarget(name, **values), where)
+
+
+def _refuse_unknown(table: dict[str, Any], allowed: tuple[str, ...], where: str, name: str) -> None:
+    if unknown := sorted(set(table) - set(allowed)):
+        raise CommandRejected(
+            f"{where} has {', '.join(unknown)}, which no such entry has",
+            parameter=name,
+            allowed=", ".join(allowed),
+            hint=f"it may have {', '.join(allowed)}",
+        )
+
+
+def _read_tool(name: str, table: Any, where: str) -> Tool:
+    """A tool of an entry of the file."""
+    where = f"tool {name} of {where}"
+    if not isinstance(table, dict):
+        raise CommandRejected(f"{where} must be a table", parameter=name)
+    _refuse_unknown(table, _TOOL_KEYS, where, name)
+    try:
+        frames = table.get("frames", {})
+        poses = {frame: Pose.of(numbers[:3], numbers[3:]) for frame, numbers in frames.items()}
+        return Tool(name, **{key: value for key, value in table.items() if key != "frames"}, frames=poses)
+    except (CommandRejected, AttributeError, TypeError) as error:
+        raise CommandRejected(
+            f"{where}: {error}", parameter=name, hint="a frame is x y z qx qy qz qw, in metres"
+        ) from None
 
 
 def check_target(target: SavedTarget, where: str) -> SavedTarget:
@@ -193,6 +232,8 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
             raise CommandRejected(
                 f"there is a target {target.name}", parameter="name", hint="replace it with --replace"
             )
+        kept = saved_targets()[target.name].tools  # measured ones would be lost otherwise
+        target = dataclasses.replace(target, tools=target.tools or kept)
         remove_target(target.name)
     lines = [f"[{target.name}]", f"address = {_text(target.address)}"]
     lines += [
@@ -202,8 +243,76 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
     ]
     if target.speed is not None:
         lines.append(f"speed = {float(target.speed)!r}")
-    before = _content().rstrip("\n")
-    _write((f"{before}\n\n" if before else "") + "\n".join(lines) + "\n")
+    for tool in target.tools:
+        lines += ["", *_tool_lines(target.name, tool)]
+    _write(_joined(_content(), lines))
+
+
+def save_tool(target: str, tool: Tool) -> None:
+    """Save a tool with a saved target, in place of one of its name; what else is in the file stays as it is.
+
+    Its shapes are not saved.
+
+    Raises:
+        CommandRejected: there is no such target, or the file cannot be changed.
+    """
+    known = saved_targets()
+    if target not in known:
+        raise CommandRejected(
+            f"there is no target {target}",
+            parameter="target",
+            value=target,
+            hint="save it first: heptarm targets add NAME ADDRESS",
+        )
+    text = _joined(_without(target, tool.name), _tool_lines(target, tool))
+    try:
+        tomllib.loads(text)
+    except ValueError:  # such as one that a person has written as an inline table
+        raise CommandRejected(
+            f"the tool {tool.name} of the target {target} in {targets_file()} cannot be replaced: it has no table of "
+            "its own",
+            parameter="tool",
+            hint=f"remove it with an editor, or write it as [{target}.{_TOOLS}.{tool.name}]",
+        ) from None
+    _write(text)
+
+
+def _tool_lines(target: str, tool: Tool) -> list[str]:
+    """A tool as lines of the file; its shapes are left out."""
+    table = ".".join(map(_text, (target, _TOOLS, tool.name)))
+    numbers = {"mass": tool.mass, "com": tool.com.tolist(), "inertia": tool.inertia.tolist()}
+    numbers |= {f"frames.{_text(name)}": pose.array.tolist() for name, pose in tool.frames}
+    return [f"[{table}]", *(f"{key} = {value}" for key, value in numbers.items())]
+
+
+def _joined(text: str, lines: list[str]) -> str:
+    before = text.rstrip("\n")
+    return (f"{before}\n\n" if before else "") + "\n".join(lines) + "\n"
+
+
+def _without(target: str, tool: str | None = None) -> str:
+    """The text of the file without the tables of a target, or without that of one of its tools."""
+    kept, inside = [], False
+    for line in _content().splitlines():
+        if line.lstrip().startswith("["):
+            path = _path(line)
+            inside = path[:1] == [target] if tool is None else path[:3] == [target, _TOOLS, tool]
+        if not inside:
+            kept.append(line)
+    return "\n".join(kept).strip("\n") + "\n" if any(kept) else ""
+
+
+def _path(line: str) -> list[str]:
+    """Names of the table that a line of the file begins: [lab1.tools."my gripper"]; empty: it begins none."""
+    try:
+        table: Any = tomllib.loads(line)
+    except ValueError:
+        return []
+    path = []
+    while isinstance(table, dict) and table:
+        ((name, table),) = table.items()
+        path.append(name)
+    return path
 
 
 def remove_target(name: str) -> None:
@@ -220,13 +329,7 @@ def remove_target(name: str) -> None:
             value=name,
             hint=f"saved are {', '.join(known)}" if known else "none is saved",
         )
-    kept, inside = [], False
-    for line in _content().splitlines():
-        if line.lstrip().startswith("["):
-            inside = line.split("#")[0].strip().strip("[] \"'") == name
-        if not inside:
-            kept.append(line)
-    _write("\n".join(kept).strip("\n") + "\n" if any(kept) else "")
+    _write(_without(name))
     with contextlib.suppress(OSError):
         _mark(name).unlink()
 

@@ -23,6 +23,7 @@ from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.samples import SampleQueue, StateSample, state_rows
 from heptarm.values.checks import flag, instance, within
 from heptarm.values.files import refuse_existing
+from heptarm.values.frames import check_printable
 from heptarm.values.sealed import Sealed
 
 _log = logging.getLogger("heptarm.record")
@@ -340,7 +341,7 @@ class Recorder(Sealed):
         """Put a mark on the time line; `Recording.between` finds it by its text.
 
         Raises:
-            ShapeError: not a text.
+            ShapeError: not a text, or one with characters that cannot be printed.
             CommandRejected: it is empty or longer than 1000 characters.
         """
         if not 1 <= len(instance(text, str, "text")) <= _LONGEST_NOTE:
@@ -349,6 +350,7 @@ class Recorder(Sealed):
                 parameter="text",
                 value=text,
             )
+        check_printable(text.replace("\t", " "), "text", lines=True)
         for source in self._sources.values():
             source.journal.add(NOTE, text)
 

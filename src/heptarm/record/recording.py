@@ -16,7 +16,9 @@ from heptarm.errors import CommandRejected, require
 from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout, image_data
 from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.pictures import Pictures
-from heptarm.record.plot import figure_of
+from heptarm.record.plot import Chart, chart_of
+from heptarm.record.plot.chart import Style
+from heptarm.record.plot.signals import Kind
 from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
 from heptarm.record.samples import signals_of
 from heptarm.values.checks import Array, flag, frozen, instance, shown
@@ -52,14 +54,31 @@ class Recording(RecordedData):
         pictures: of a simulated camera, if there was one.
     """
 
-    def plot(self, *signals: str) -> Figure:
-        """A figure of signals over time, with motions and events; without names the usual ones. See `heptarm plot`.
+    def chart(self, *signals: str, kind: Kind = "time") -> Chart:
+        """A chart to be written, also as an interactive page: `run.chart("q", "wrench").save("run.html")`.
+
+        Args:
+            signals: names as in `names`, or "path"; none: the usual ones.
+            kind: "time"; "histogram": the share of the samples at each value; "spectrum": amplitude spectral density.
 
         Raises:
-            CommandRejected: no such signal.
-            MissingExtra: matplotlib is not installed.
+            CommandRejected: no such signal, or nothing to draw.
         """
-        return figure_of(self, signals)
+        return chart_of(self, signals=signals, kind=kind)
+
+    def plot(self, *signals: str, kind: Kind = "time", style: Style = "screen") -> Figure:
+        """A Matplotlib figure of signals over time, with motions and events. See `heptarm plot`.
+
+        Args:
+            signals: names as in `names`, or "path"; none: the usual ones.
+            kind: as in `chart`.
+            style: "screen"; "paper": one column of a journal.
+
+        Raises:
+            CommandRejected: no such signal, or nothing to draw.
+            MissingExtra: Matplotlib is not installed.
+        """
+        return self.chart(*signals, kind=kind).figure(style=style)
 
 
 # ------------------------------------------------------------------------------------------------ reading

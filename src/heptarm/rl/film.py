@@ -11,9 +11,18 @@ import numpy as np
 from heptarm.errors import CommandRejected, LimitError, require
 from heptarm.rl.report import EpisodeReport
 from heptarm.sim.picture import ArmPicture, Viewpoint
+from heptarm.values.checks import flag
+from heptarm.values.files import refuse_existing
 
 
-def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int = 4, every: int = 2) -> Path:
+def film(
+    report: EpisodeReport,
+    path: str | os.PathLike[str],
+    *,
+    episodes: int = 4,
+    every: int = 2,
+    overwrite: bool = False,
+) -> Path:
     """Draw the first episodes of a report one after the other; return the path.
 
     Args:
@@ -21,10 +30,11 @@ def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int =
         path: `.gif` for a film that plays at the task's speed, `.png` for a row of pictures of the first episode.
         episodes: how many the film shows.
         every: decisions from one picture to the next.
+        overwrite: replace a file that exists.
 
     Raises:
         MissingExtra: matplotlib (with Pillow) is not installed.
-        CommandRejected: another kind of file.
+        CommandRejected: another kind of file, or the file exists.
         LimitError: no episodes, or no decisions.
     """
     target = Path(path)
@@ -33,6 +43,7 @@ def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int =
     for name, value in (("episodes", episodes), ("every", every)):
         if value < 1:
             raise LimitError(f"{name} must be at least 1, got {value}", code=2, parameter=name)
+    refuse_existing(target, overwrite=flag(overwrite, "overwrite"))
     figures = require("matplotlib.figure", extra="rl")
     return (
         _row(report, target, figures)

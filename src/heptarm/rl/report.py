@@ -184,16 +184,19 @@ class EpisodeReport:
         except Exception as error:  # of any numbers and texts in place of a report's
             raise unreadable(where, f"{type(error).__name__}: {error}", what=what) from None
 
-    def plot(self, path: str | os.PathLike[str], *, most: int = 60) -> Path:
+    def plot(self, path: str | os.PathLike[str], *, most: int = 60, overwrite: bool = False) -> Path:
         """Plot paths, and distance over time; return the path of the picture.
 
         Args:
             path: file to write, `.png`, `.svg` or `.pdf`.
             most: episodes that are drawn; the distribution is of all.
+            overwrite: replace a file that exists.
 
         Raises:
             MissingExtra: matplotlib is not installed.
+            CommandRejected: the file exists.
         """
+        file = refuse_existing(Path(path), overwrite=flag(overwrite, "overwrite"))
         figures = require("matplotlib.figure", extra="rl")
         figure = figures.Figure(figsize=(13, 4.2), layout="constrained")
         side, above, over = figure.subplots(1, 3)
@@ -219,5 +222,5 @@ class EpisodeReport:
         over.set_title(f"{len(self.final)} episodes, {1e3 * self.mean:.1f} mm at the end")
         over.grid(which="both", alpha=0.3)
         over.legend()
-        figure.savefig(path, dpi=110)
-        return Path(path)
+        figure.savefig(file, dpi=110)
+        return file

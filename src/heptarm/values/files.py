@@ -39,12 +39,16 @@ def path_of(value: str | Path, name: str = "path") -> Path:
         CommandRejected: no file can have this name.
     """
     path = Path(instance(value, (str, Path), name))
-    if "\0" in str(path) or not str(value):
+    try:
+        encoded = os.fsencode(path)
+    except UnicodeEncodeError:  # half of a surrogate pair
+        encoded = b""
+    if not encoded or b"\0" in encoded or not str(value):
         raise CommandRejected(
-            f"{name} must be the name of a file, got {shown(str(path))}",
+            f"{name} must be the name of a file, got {str(path)[:300]!a}",
             parameter=name,
             value=str(path),
-            hint="a name has at least one character, and no NUL",
+            hint="a name has at least one character, no NUL, and no half of a surrogate pair",
         )
     return path
 

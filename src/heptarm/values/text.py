@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from typing import Any
@@ -37,6 +38,9 @@ _ANGLES = ("q", "near", "e1")
 _LAST = ("triggers", "dynamics", "blending")
 #: Entries of a list that are shown.
 _SHOWN = 6
+#: Control characters, invisible format characters such as those that reverse the direction of writing, halves of
+#: surrogate pairs, separators of lines and paragraphs.
+_REMOVED = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
 def fixed(value: float, digits: int) -> str:
@@ -137,3 +141,18 @@ def _unit(name: str) -> str:
         if name.endswith(suffix):
             return _SUFFIXES[suffix]
     return _UNITS.get(name, "")
+
+
+def printable(text: str, *, lines: bool = False) -> str:
+    """Remove what cannot be printed.
+
+    Args:
+        text: from another client, a cabinet or the environment.
+        lines: keep line breaks; otherwise they become blanks.
+    """
+    if text.isprintable():
+        return text
+    if lines:
+        return "\n".join(printable(line) for line in text.split("\n"))
+    one_line = " ".join(text.splitlines()).replace("\t", " ")
+    return "".join(c for c in one_line if unicodedata.category(c) not in _REMOVED)

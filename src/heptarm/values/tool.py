@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.checks import Array, Value, array, frozen, shown, within
-from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
+from heptarm.values.checks import Array, Value, array, frozen, instance, shown, within
+from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
 from heptarm.values.shape import Shape, checked_shapes
@@ -174,6 +174,27 @@ class KnownTool(Value):
         return tuple(name for name, _ in self.frames)
 
 
+def as_tool(tool: Tool | KnownTool | str) -> Tool:
+    """The tool itself; one of a known tool; of a name a new one, which weighs nothing.
+
+    Raises:
+        ShapeError: it is none of these.
+    """
+    if isinstance(tool, Tool):
+        return tool
+    if isinstance(tool, str):
+        return Tool(tool)
+    known = instance(tool, KnownTool, "tool", hint="a Tool, one of arm.tools, or the name of a new one")
+    return Tool(
+        known.name,
+        mass=known.mass,
+        com=known.com,
+        inertia=known.inertia,
+        frames=dict(known.frames),
+        shapes=known.shapes,
+    )
+
+
 def _text(tool: _Carried | KnownTool) -> str:
     """Name, load data, frames and shapes, a line each."""
     rows = {
@@ -233,14 +254,7 @@ def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose
 
 
 def _checked(name: str, parameter: str, longest: int) -> str:
-    if not isinstance(name, str) or not 1 <= len(name.encode()) <= longest:
-        raise ShapeError(
-            f"{parameter} must be a name of 1 to {longest} bytes, got {shown(name)}",
-            code=3,
-            parameter=parameter,
-            value=name,
-        )
-    if SEPARATOR in name:
+    if SEPARATOR in check_name(name, parameter, longest=longest, hint=""):
         raise LimitError(
             f'{parameter} must not contain "{SEPARATOR}", got {shown(name)}',
             code=2,

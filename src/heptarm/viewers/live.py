@@ -16,6 +16,7 @@ from heptarm.arm.several import Arms
 from heptarm.errors import CommandRejected, require
 from heptarm.record.recorder import Recorder, RecordSource, epoch_of
 from heptarm.values.checks import flag, instance, within
+from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.sealed import Sealed
 
 if TYPE_CHECKING:
@@ -140,6 +141,7 @@ def live(
     to: str = "",
     viewer: bool | None = None,
     rate: float | None = None,
+    overwrite: bool = False,
 ) -> LiveView:
     """Show an arm in the rerun viewer while it moves: its shapes, plots of its signals, and its events.
 
@@ -156,6 +158,7 @@ def live(
         to: address of a viewer that runs already, such as "rerun+http://192.168.0.5:9876/proxy"; empty: none.
         viewer: open a viewer on this machine; None: if neither `save` nor `to` is given.
         rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
+        overwrite: replace a file that exists.
 
     Returns:
         The view: end it with `close`, or use it as a `with` block.
@@ -164,10 +167,12 @@ def live(
         MissingExtra: the package rerun or mujoco is not installed.
         ShapeError: not an arm, or not a text.
         LimitError: a rate outside its range.
-        CommandRejected: the file cannot be written, no viewer answers at the address, or this machine has no display.
+        CommandRejected: the file exists or cannot be written, no viewer answers at the address, or this machine has no
+            display.
     """
     instance(arm, (Arm, Arms), "arm")
-    file = None if save is None else Path(instance(save, (str, Path), "save"))
+    replaces = flag(overwrite, "overwrite")
+    file = None if save is None else refuse_existing(path_of(save, "save"), overwrite=replaces, name="save")
     address = instance(to, str, "to")
     is_asked = (file is None and not address) if viewer is None else flag(viewer, "viewer")
     if rate is not None:

@@ -10,7 +10,7 @@ from heptarm.arm.link.connection import Connection
 from heptarm.errors import CommandRejected, ShapeError, Timeout
 from heptarm.values.checks import callback as check_callback
 from heptarm.values.checks import finite, flag, instance, integer, shown, within, word
-from heptarm.values.frames import check_name
+from heptarm.values.frames import check_name, check_printable
 from heptarm.values.sealed import Sealed
 from heptarm.wire import messages as wire
 
@@ -235,7 +235,7 @@ def _labels(buttons: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _text(text: str, name: str, longest: int, *, least: int = 0) -> str:
-    """A text of limited length. Raises ShapeError."""
+    """A text of limited length that can be shown. Raises ShapeError."""
     if not least <= len(instance(text, str, name).encode(errors="replace")) <= longest:
         allowed = f"{least} to {longest}" if least else f"at most {longest}"
         raise ShapeError(
@@ -244,4 +244,4 @@ def _text(text: str, name: str, longest: int, *, least: int = 0) -> str:
             parameter=name,
             value=text,
         )
-    return text
+    return check_printable(text, name, lines=True)

@@ -64,6 +64,7 @@ class Tooling:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
+        self._saved: dict[str, Tool] = {}
         self._defined: dict[str, KnownTool] = {}
         self._workpiece: Workpiece | None = None
         self._commanded: Attachment | None = None
@@ -72,13 +73,18 @@ class Tooling:
         """Forget what this client attached: another client may have changed it."""
         self._commanded = self._workpiece = None
 
+    def remember(self, tools: Sequence[Tool]) -> None:
+        """Know the tools that are saved with the target; one is defined on the cabinet when it is attached."""
+        self._saved = {tool.name: tool for tool in tools}
+
     @property
     def known(self) -> dict[str, KnownTool]:
-        """Tools by name: those that the cabinet reported, and those that this client defined."""
+        """Tools by name: the saved ones, those that the cabinet reported, and those that this client defined."""
+        saved = {name: _known(tool) for name, tool in self._saved.items()}
         reported = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
         event = self._connection.events.attached
         latest = {} if event is None or event.tool is None else {event.tool.name: known_tool(event.tool)}
-        return reported | self._defined | latest
+        return reported | saved | self._defined | latest
 
     @property
     def taught(self) -> dict[str, Pose]:
@@ -140,14 +146,14 @@ class Tooling:
         """Attach a tool, after defining it if it is a `Tool`; see `Arm.attach_tool`."""
         if frame is not None:
             check_name(frame, "frame")
+        if isinstance(tool, str) and tool not in self._defined:
+            tool = self._saved.get(tool, tool)
         if isinstance(tool, Tool):
             main = frame if frame is not None else (tool.frame_names or (FLANGE,))[0]
             if frame is not None:
                 tool.frame(frame)
             self._connection.request(wire.DefineTool(tool=tool_message(tool)))
-            self._defined[tool.name] = KnownTool(
-                tool.name, tool.mass, tool.frames, tool.com, tool.inertia, tool.shapes
-            )
+            self._defined[tool.name] = _known(tool)
             name = tool.name
         elif isinstance(tool, str):
             name, main = tool, frame or ""
@@ -359,6 +365,10 @@ class Tooling:
         """External force and torque at the origin of one frame in the axes of another; raises as `pose` does."""
         lever = self.pose(state, TOOL).xyz - self.pose(state, name).xyz
         return state.wrench.seen(lever, self.pose(state, axes).rotation)
+
+
+def _known(tool: Tool) -> KnownTool:
+    return KnownTool(tool.name, tool.mass, tool.frames, tool.com, tool.inertia, tool.shapes)
 
 
 def _as_workpiece(workpiece: Workpiece | str) -> Workpiece:

@@ -130,6 +130,10 @@ def _parsed(text: str) -> Target:
         options = tuple(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
         if parts.netloc in ROBOTS:
             for name, value in options:
+                if b"\0" in os.fsencode(
+                    value
+                ):  # and UnicodeEncodeError, a ValueError, at half of a surrogate pair
+                    raise ValueError(f"{name} has a NUL")
                 check_target_option(name, value)
             return Target(model=parts.netloc, options=options)
         if options:

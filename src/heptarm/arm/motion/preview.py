@@ -6,13 +6,13 @@ import tempfile
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heptarm.errors import require
 from heptarm.io.plan_box import PlanOutline, hand_over
-from heptarm.record import plot as plots
+from heptarm.record.plot.chart import Band, Chart, ChartRow, Line, Mark, Style
+from heptarm.record.plot.signals import path_line, path_row
 from heptarm.values.checks import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision
 from heptarm.values.condition.condition import Condition
@@ -188,52 +188,33 @@ class ProgramPreview(Value):
 
     # ----------------------------------------------------------------------------------- figures
 
-    def plot(self) -> Figure:
-        """A figure: joint positions, speeds and torques beside their limits, and the path of the tool frame.
+    def chart(self) -> Chart:
+        """Joint positions, speeds and torques beside their limits over time, and the path of the tool frame."""
+        rows = []
+        for limit in ("position", "velocity", "torque"):
+            values, middle, room = self._limited(limit)
+            fractions = (values - middle) / room
+            lines = (
+                Line(self.t, fractions[:, joint], label=f"A{joint + 1}", colour=joint) for joint in range(7)
+            )
+            rows.append(ChartRow(LIMITS[limit][0], "fraction of limit", tuple(lines), edges=(-1.0, 1.0)))
+        touched = [int(np.abs(self.t - found.t).argmin()) for found in self.collisions]
+        path = self.tcp[:, :3]
+        rows.append(path_row("tool frame", (path_line(path, "path"),), path[touched] * 1e3))
+        return Chart(
+            f"preview: {self.robot.title}, {len(self.motions)} motions, {self.duration:.2f} s",
+            tuple(rows),
+            tuple(Band(one.begin, one.begin + one.duration) for one in self.motions),
+            tuple(Mark(found.t, "collision", is_alarm=True) for found in self.collisions),
+        )
+
+    def plot(self, *, style: Style = "screen") -> Figure:
+        """A Matplotlib figure of the chart.
 
         Raises:
-            MissingExtra: matplotlib is not installed.
+            MissingExtra: Matplotlib is not installed.
         """
-        figures: Any = require("matplotlib.figure", extra="record")
-        figure: Figure = figures.Figure(figsize=(11, 9.5), layout="constrained")
-        grid = figure.add_gridspec(4, 1, height_ratios=[1.9, 1.9, 1.9, 3.6])
-        shared = None
-        for row, limit in enumerate(("position", "velocity", "torque")):
-            values, middle, room = self._limited(limit)
-            axes = shared = figure.add_subplot(grid[row], sharex=shared)
-            for joint in range(7):
-                line = (values[:, joint] - middle[joint]) / room[joint]
-                axes.plot(self.t, line, color=f"C{joint}", linewidth=1.0, label=f"A{joint + 1}")
-            for edge in (-1.0, 1.0):
-                axes.axhline(edge, color="firebrick", linewidth=0.8, linestyle=":")
-            for index, one in enumerate(self.motions):
-                end = one.begin + one.duration
-                axes.axvspan(one.begin, end, color="0.5", alpha=0.12 if index % 2 else 0.06, linewidth=0)
-            for found in self.collisions:
-                axes.axvline(found.t, color="firebrick", linewidth=0.9, linestyle="--")
-            axes.set_ylabel(f"{LIMITS[limit][0]}\n[fraction of limit]", fontsize=8)
-            axes.grid(alpha=0.25)
-            axes.spines[["top", "right"]].set_visible(False)
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=7)
-        axes.set_xlabel("time [s]", fontsize=8)
-        self._draw_path(figure.add_subplot(grid[3], projection="3d"))
-        title = f"preview: {self.robot.title}, {len(self.motions)} motions, {self.duration:.2f} s"
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11)
-        return figure
-
-    def _draw_path(self, axes: Any) -> None:
-        points = self.tcp[:, :3] * 1e3
-        axes.plot(*points.T, color="tab:blue", linewidth=1.2)
-        axes.scatter(*points[0], color="tab:blue", marker="o", s=18)
-        axes.scatter(*points[-1], color="tab:blue", marker="s", s=18)
-        for found in self.collisions:
-            nearest = int(np.abs(self.t - found.t).argmin())
-            axes.scatter(*points[nearest], color="firebrick", marker="x", s=40)
-        for name, place in zip("xyz", ("set_xlabel", "set_ylabel", "set_zlabel"), strict=True):
-            getattr(axes, place)(f"{name} [mm]", fontsize=8)
-        axes.set_title("path of the tool frame (circle: begin, square: end)", fontsize=8, loc="left")
-        spans = np.ptp(points, axis=0)
-        axes.set_box_aspect(np.maximum(spans, max(float(spans.max()), 1.0) * 0.2))
+        return self.chart().figure(style=style)
 
     def outline(self) -> PlanOutline:
         """What a panel shows of it."""
@@ -241,17 +222,17 @@ class ProgramPreview(Value):
         return PlanOutline(self.robot.name, self.t, self.q, self.tcp[:, :3], touches)
 
     def show(self) -> Path | None:
-        """Show it: as a ghost of the arm in an open panel of this user, otherwise as a figure in the web browser.
+        """Show it: as a ghost of the arm in an open panel of this user, otherwise as a page in the web browser.
 
         Returns:
-            The page of the figure, a file that stays; None: a panel shows it.
+            The page, a file that stays; None: a panel shows it.
 
         Raises:
-            MissingExtra: no panel is open, and matplotlib is not installed.
+            MissingExtra: no panel is open, and plotly is not installed.
         """
         if hand_over(self.outline()):
             return None
         folder = Path(tempfile.mkdtemp(prefix="heptarm-preview-"))
-        page = plots.save(self.plot(), folder / "preview.html")
+        page = self.chart().save(folder / "preview.html")
         webbrowser.open(page.as_uri())
         return page

@@ -2,32 +2,14 @@
 
 from __future__ import annotations
 
-import unicodedata
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from heptarm.values.text import printable
 from heptarm.wire.messages import Message, ProcessData
 
-#: Control characters, invisible format characters such as those that reverse the direction of writing, halves of
-#: surrogate pairs, separators of lines and paragraphs.
-_REMOVED = ("Cc", "Cf", "Cs", "Zl", "Zp")
 #: Fields that may have several lines.
 _WITH_LINES = ("text",)
-
-
-def printable(text: str, *, lines: bool = False) -> str:
-    """Remove what cannot be printed.
-
-    Args:
-        text: from another client, a cabinet or the environment.
-        lines: keep line breaks; otherwise they become blanks.
-    """
-    if text.isprintable():
-        return text
-    if lines:
-        return "\n".join(printable(line) for line in text.split("\n"))
-    one_line = " ".join(text.splitlines()).replace("\t", " ")
-    return "".join(c for c in one_line if unicodedata.category(c) not in _REMOVED)
 
 
 def printable_message(message: Message) -> Message:

@@ -80,12 +80,18 @@ class Trained:
         """Wall time without imports [s]."""
         return self.history[-1].seconds if self.history else 0.0
 
-    def plot(self, path: str | os.PathLike[str]) -> Path:
+    def plot(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Plot the learning curve; return the path of the picture.
+
+        Args:
+            path: file to write, `.png`, `.svg` or `.pdf`.
+            overwrite: replace a file that exists.
 
         Raises:
             MissingExtra: matplotlib is not installed.
+            CommandRejected: the file exists.
         """
+        target = refuse_existing(Path(path), overwrite=flag(overwrite, "overwrite"))
         figures = require("matplotlib.figure", extra="rl")
         figure = figures.Figure(figsize=(7, 4), layout="constrained")
         axes = figure.subplots()
@@ -96,8 +102,8 @@ class Trained:
         axes.set_ylabel("distance at the end of an episode, noisy actions [mm]")
         axes.set_title(f"seed {self.policy.facts.get('seed')}, {self.seconds:.0f} s")
         axes.grid(which="both", alpha=0.3)
-        figure.savefig(path, dpi=120)
-        return Path(path)
+        figure.savefig(target, dpi=120)
+        return target
 
 
 class Training:

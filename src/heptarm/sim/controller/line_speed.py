@@ -40,6 +40,8 @@ _ROUNDING, _AT_REST = 1.02, 1e-6
 #: Ticks of a slowed trajectory that are checked before it is followed: until the next target, usually.
 _CHECKED = 12
 _TINY = 1e-12
+#: Margin of the fraction of a step, for the noise of the inverse kinematics.
+_EXACT = 1e-4
 
 
 class RateProfile:
@@ -139,6 +141,24 @@ class AxisLimits:
         speeds = np.diff(np.array(q), axis=0) / TICK
         changes = np.diff(np.vstack([speed, speeds]), axis=0) / TICK
         return bool((np.abs(changes) <= self._hardest).all() and (np.abs(speeds) <= self._fastest).all())
+
+    def fraction(self, before: Array, step: Array) -> float:
+        """The fraction of a set-point's step nearest to 1 with which no axis changes its speed too much.
+
+        Where the axes disagree, it stays as near to 1 as one of them wants it.
+
+        Args:
+            before: the last step, shape (7,) [rad].
+            step: the next one, likewise.
+        """
+        most = (1.0 - _EXACT) * self._hardest * TICK * TICK
+        if (np.abs(step - before) <= most).all():
+            return 1.0
+        moves = np.abs(step) > _TINY
+        size, sign = np.abs(step[moves]), np.sign(step[moves])
+        middle, reach = before[moves] * sign / size, most[moves] / size
+        low, high = float((middle - reach).max()), float((middle + reach).min())
+        return max(0.0, min(max(1.0, min(low, high)), max(low, high)))
 
     def profile(
         self,

@@ -22,6 +22,7 @@ from heptarm.planning.motion import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT, TICK
 from heptarm.planning.seam import ServoDirect, ServoStraight, ServoTiming
 from heptarm.planning.targets import goes_on
 from heptarm.sim.controller.line_speed import HORIZON, AxisLimits, RateProfile
+from heptarm.sim.controller.setpoints import stoppable
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, is_half_turn, rotation, turn_between
 from heptarm.values.robot import RobotModel
@@ -90,7 +91,15 @@ class OnlineTrajectory:
         place: list[float] = self._plan.at_time(time)[0]
         return place
 
-    def aim(self, state: OtgState, target: Array, *, speed: Array, minimum: float) -> bool:
+    def aim(
+        self,
+        state: OtgState,
+        target: Array,
+        *,
+        speed: Array,
+        minimum: float,
+        within: tuple[Array, Array] | None = None,
+    ) -> bool:
         """Plan from a state to a target.
 
         Args:
@@ -98,6 +107,7 @@ class OnlineTrajectory:
             target: its end.
             speed: velocity at the target.
             minimum: least duration [s].
+            within: lowest and highest coordinates; the trajectory may take a run-up, or has to turn round.
 
         Returns:
             False if that cannot be planned: the last trajectory continues.
@@ -109,7 +119,7 @@ class OnlineTrajectory:
         )
         parameters.target_position, parameters.target_velocity = target.tolist(), speed.tolist()
         parameters.minimum_duration = minimum
-        return self._start(state)
+        return self._start(state, within)
 
     def halt(self, state: OtgState) -> bool:
         """Plan from a state to rest, wherever that is; returns as `aim` does."""
@@ -119,7 +129,7 @@ class OnlineTrajectory:
         parameters.minimum_duration = None
         return self._start(state)
 
-    def _start(self, state: OtgState) -> bool:
+    def _start(self, state: OtgState, within: tuple[Array, Array] | None = None) -> bool:
         parameters = self._input
         parameters.current_position, parameters.current_velocity, parameters.current_acceleration = (
             values.tolist() for values in state
@@ -127,10 +137,15 @@ class OnlineTrajectory:
         plan = Trajectory(self._axes)
         try:
             result = self._planner.calculate(parameters, plan)
-        except RuckigError:
+        except (RuckigError, ValueError):  # the latter: a result that its Python has no name for
             return False
         if result not in (Result.Working, Result.Finished):
             return False
+        if within is not None:
+            low, high = np.minimum(within[0], state[0]) - _TINY, np.maximum(within[1], state[0]) + _TINY
+            extrema = plan.position_extrema
+            if any(one.min < a or one.max > b for one, a, b in zip(extrema, low, high, strict=True)):
+                return False
         self._plan, self.time = plan, 0.0
         return True
 
@@ -144,6 +159,8 @@ _SLOW = 0.05
 #: A target that no trajectory leads to yet is tried again after this time [s]; and these are the times of a trajectory
 #: after which the axes try to be at rest [s].
 _AGAIN, _STOPS = 0.01, (0.02, 0.05, 0.1, 0.2)
+#: How often a step in time is corrected for the axes at most.
+_CORRECTIONS = 3
 #: An acceleration whose square is at most this times speed and jerk ends before the speed does.
 _SOONER = 1.9
 #: A velocity or acceleration perpendicular to the line that is smaller than this [m/s, rad/s, ...] is rounding.
@@ -229,6 +246,7 @@ class StraightFollower:
         self._inverse, self._a3 = PathInverse(robot, frame), float(here[2])
         self._q = here.copy()
         self._speed = np.zeros(7)  # of the axes, in the motion's own time
+        self._step = np.zeros(7)  # the last one of the set-points [rad]
         self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
         self._centre: Quat = tuple(origin.quat.tolist())  # orientation at rest
         self._followed: _Trajectory | None = None
@@ -260,14 +278,14 @@ class StraightFollower:
         Raises:
             Unreachable: the line leaves the workspace.
         """
-        there = self.ahead(dt)
         self._waited += dt
-        one = self._followed
+        one, before = self._followed, self._q
         if one is None:
             self.resting += dt
         else:
-            before, self._q = self._q, there
-            self._elapsed += dt
+            step = self._followable(one, dt)
+            self._elapsed += step
+            self._q = self._set_point(one, self._elapsed)
             one.otg.time = one.profile.at(self._elapsed)[0]
             self.resting = 0.0 if self._goal is not None else max(0.0, one.otg.over)
             if dt > 0.0:
@@ -276,7 +294,24 @@ class StraightFollower:
                 self._go_on(one, rate=one.profile.at(self._elapsed)[1])
         if self._goal is not None and self._waited >= _AGAIN:
             self.aim(self._goal)
-        return there
+        self._step = self._q - before
+        return self._q
+
+    def _followable(self, one: _Trajectory, dt: float) -> float:
+        """The step of time nearest to another one [s] with which no axis changes its speed too much.
+
+        The profile was found from samples: between two of them an axis may need a few per cent more.
+        """
+        step, later = dt, self._set_point(one, self._elapsed + dt)
+        for _ in range(_CORRECTIONS):
+            if dt <= 0.0:
+                break
+            nearest = self._axes.fraction(self._step, later - self._q)
+            if nearest == 1.0:
+                break
+            step *= nearest
+            later = self._set_point(one, self._elapsed + step)
+        return step
 
     def brake(self, *, scale: float, rate: float) -> None:
         """Come to rest along the line; ends when `is_still`.
@@ -514,6 +549,11 @@ class ServoLimits:
     highest: Array
     timing: ServoTiming
 
+    def within(self, q: Array) -> Array:
+        """The positions nearest to others that no axis is beyond, shape (7,) [rad]."""
+        inside: Array = np.clip(q, self.lowest, self.highest)
+        return inside
+
     def bounded(self, q: Array, dq: Array, later: float) -> Array:
         """Velocities with which every axis comes to rest before the limits of its position, shape (7,) [rad/s].
 
@@ -546,19 +586,6 @@ class ServoLimits:
             robot.q_max,
             timing,
         )
-
-
-def _stoppable(room: Array, acceleration: Array) -> Array:
-    """Largest speeds for the next tick after which axes still come to rest within a distance, shape (7,) [rad/s].
-
-    The speed changes from tick to tick: that of m accelerations times a tick stops within 1 + ... + m of the steps that
-    one of them makes, and between two of these speeds the distance is linear.
-    """
-    step = acceleration * TICK
-    room = np.maximum(room, 0.0)
-    whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * room / (step * TICK)) - 1.0))
-    most: Array = 0.5 * whole * step + room / ((whole + 1.0) * TICK)
-    return most
 
 
 class _HardBrake:
@@ -600,6 +627,8 @@ class SmartFollower:
         self._otg = self._new_trajectory()
         self._still = here.copy()
         self._goal: tuple[Array, Array | None] | None = None
+        self._waits = False  # no trajectory leads to the target yet
+        self._waited = 0.0  # since that was tried [s]
         self._passes = False
         self._stopping = False
         self._hard: _HardBrake | None = None
@@ -618,14 +647,27 @@ class SmartFollower:
         return self._otg.remaining
 
     def aim(self, q: Array, dq: Array | None = None) -> None:
-        """Set the target, shape (7,) [rad], and the velocity at it [rad/s]."""
+        """Set the target, shape (7,) [rad], and the velocity at it [rad/s]; beyond a limit of the axes: on it."""
         if self._stopping:
             return
-        self._goal = q, dq
+        q = self._limits.within(q)
+        self._goal, self._waited = (q, dq), 0.0
         pass_at = np.zeros(7) if dq is None else self._limits.bounded(q, dq, 4.0 * TICK)
-        if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._limits.timing.min_trajectory_time):
-            self._passes = bool(pass_at.any())
-            self.resting = 0.0
+        self._waits = not (self._leads_to(q, pass_at) or (pass_at.any() and self._leads_to(q, np.zeros(7))))
+
+    def _leads_to(self, q: Array, speed: Array) -> bool:
+        """Follow a trajectory to a target; False: none does from here, or an axis would leave its range on it."""
+        limits = self._limits
+        if not self._otg.aim(
+            self._state(),
+            q,
+            speed=speed,
+            minimum=limits.timing.min_trajectory_time,
+            within=(limits.lowest, limits.highest),
+        ):
+            return False
+        self._passes, self.resting = bool(speed.any()), 0.0
+        return True
 
     def ahead(self, dt: float) -> Array:
         """What `advance` would return if no further target came, shape (7,) [rad]."""
@@ -644,6 +686,10 @@ class SmartFollower:
             elif not self._passes:
                 self.resting = over
         there = self._state()[0]
+        if self._waits and self._goal is not None and not self._stopping:
+            self.resting, self._waited = 0.0, self._waited + dt
+            if self._waited >= _AGAIN:
+                self.aim(*self._goal)
         return there if self._hard is None else self._hard.advance(dt, there)
 
     def brake(self, *, scale: float, rate: float, speed: Array | None = None) -> None:
@@ -719,8 +765,8 @@ class DirectFollower:
         return self._left
 
     def aim(self, q: Array, dq: Array | None = None) -> None:
-        """Set the target, shape (7,) [rad]; its velocity follows from the next targets."""
-        self._target = q.copy()
+        """Set the target, shape (7,) [rad], beyond a limit: on it; its velocity follows from the next targets."""
+        self._target = q = self._limits.within(q)
         least = float((np.abs(q - self._q) / self._limits.velocity).max())
         self._left = max(self._limits.timing.min_trajectory_time, least)
         self.resting = 0.0
@@ -744,17 +790,17 @@ class DirectFollower:
         if dt <= 0.0:
             return self._q, self._dq
         limits, distance = self._limits, self._target - self._q
-        ceiling = np.minimum(limits.velocity, _stoppable(np.abs(distance), limits.acceleration))
+        ceiling = np.minimum(limits.velocity, stoppable(np.abs(distance), limits.acceleration))
         # an axis that had to pass its target, since that came too near, stays within its range
-        below = np.minimum(limits.lowest, self._target) - self._q
-        above = np.maximum(limits.highest, self._target) - self._q
+        below = np.minimum(limits.lowest - self._q, 0.0)
+        above = np.maximum(limits.highest - self._q, 0.0)
         velocity = np.clip(
             np.clip(distance / max(self._left, APPROACH), -ceiling, ceiling),
-            -_stoppable(-below, limits.acceleration),
-            _stoppable(above, limits.acceleration),
+            -stoppable(-below, limits.acceleration),
+            stoppable(above, limits.acceleration),
         )
         dq = self._dq + np.clip(velocity - self._dq, -limits.acceleration * dt, limits.acceleration * dt)
-        return self._q + np.clip(dq * dt, np.minimum(below, 0.0), np.maximum(above, 0.0)), dq
+        return self._q + np.clip(dq * dt, below, above), dq
 
     def brake(self, *, scale: float, rate: float) -> None:
         """Come to rest as fast as the axes may."""

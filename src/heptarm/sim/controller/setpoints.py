@@ -89,3 +89,16 @@ class SetPoints:
         """The first axis that a set-point would move beyond its limits, from 0; None: there is none."""
         beyond = (there > self._highest) | (there < self._lowest)
         return int(beyond.argmax()) if beyond.any() else None
+
+
+def stoppable(room: Array, acceleration: Array) -> Array:
+    """Largest speeds for the next tick after which axes still come to rest within a distance, shape (7,) [rad/s].
+
+    The speed changes from tick to tick: that of m accelerations times a tick stops within 1 + ... + m of the steps that
+    one of them makes, and between two of these speeds the distance is linear.
+    """
+    step = acceleration * TICK
+    room = np.maximum(room, 0.0)
+    whole = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * room / (step * TICK)) - 1.0))
+    most: Array = 0.5 * whole * step + room / ((whole + 1.0) * TICK)
+    return most

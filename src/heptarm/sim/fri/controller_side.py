@@ -67,9 +67,10 @@ _WORD = 0xFFFFFFFF
 
 @dataclass(slots=True)
 class _SentMessage:
-    """A sent message: its time and session state; what the client has to mirror, while the session waits for that."""
+    """A sent message: time, tick and session state; what the client has to mirror, while the session waits for that."""
 
     at: int
+    tick: int
     state: m.SessionState
     monitor: m.MonitorData | None
     ipo: m.IpoData | None
@@ -249,7 +250,7 @@ class Controller:
             if self.state is m.SessionState.COMMANDING_WAIT:
                 self._synchronise(command, asked)
             elif self.state is m.SessionState.COMMANDING_ACTIVE:
-                self._execute(command, number)
+                self._execute(command, number, late=self._ticks - asked.tick)
 
     def _foreign(self, datagram: bytes) -> str:
         """What a client is that no message can be read of."""
@@ -310,8 +311,8 @@ class Controller:
         self._mirrors = q
         return ""
 
-    def _execute(self, command: m.Command, number: int) -> None:
-        """Execute a command; an illegal one ends the overlay."""
+    def _execute(self, command: m.Command, number: int, *, late: int) -> None:
+        """Execute a command, so many ticks late; an illegal one ends the overlay."""
         assert self.overlay is not None and self._limits is not None
         assert self._set_point is not None and self._last is not None
         lacks = missing(self.overlay.mode, command)
@@ -336,7 +337,7 @@ class Controller:
             return
         self._tau, self._wrench = tau, wrench
         self._last, self._last_number = q, number
-        self._set_point.command(q, after=ticks)
+        self._set_point.command(q, after=ticks, late=late)
 
     def _joints(self, command: m.Command) -> Array:
         assert self._last is not None
@@ -452,7 +453,7 @@ class Controller:
         )
         waits = self.state is m.SessionState.COMMANDING_WAIT
         self._asked[number % KEPT] = _SentMessage(  # what is kept without a need is searched for garbage, too
-            now, self.state, message.monitor if waits else None, message.ipo if waits else None
+            now, self._ticks, self.state, message.monitor if waits else None, message.ipo if waits else None
         )
         if self.state is not m.SessionState.IDLE and number % configuration.multiplier == 0:
             self.meter.asked(number // configuration.multiplier, now)

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
+
 import numpy as np
 
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.planning.motion import TICK
+from heptarm.sim.controller.setpoints import OVERSPEED, stoppable
 from heptarm.values.checks import Array
 from heptarm.values.robot import RobotModel
 
 #: Ticks without a command during which the motion continues.
 COAST = 5
-#: Largest velocity of a set-point, relative to the axis' limit.
-OVERSPEED = 1.2
+#: Fraction of the acceleration with which set-points return to the commands: these accelerate, too.
+_PLANNED = 0.5
+#: Set-points this close to the reference, and this close to its speed, are on it [rad, rad/tick].
+_TOGETHER = 1e-9
 
 
 class CommandInterpolator:
-    """Interpolates between the commands of a client.
+    """Follows the commands of a client, one set-point per tick.
+
+    The reference goes straight from command to command in the client's time, and on beyond the last one for a
+    while; its mean over a receive period makes it smooth. So late answers do not hurry the arm, and set-points
+    accelerate no harder than the commands. What is missing breaks the reference: the set-points then return to it
+    within the limits of the axes.
 
     Args:
         robot: its limits hold.
@@ -27,55 +38,91 @@ class CommandInterpolator:
     def __init__(self, robot: RobotModel, start: Array, *, ticks: int) -> None:
         self._ticks = ticks
         self._leap = OVERSPEED * robot.dq_max * TICK
-        self._slowing = robot.ddq_max * TICK * TICK
-        self._least, self._most = robot.q_min, robot.q_max
+        self._fastest, self._acceleration = robot.dq_max, robot.ddq_max
+        self._low, self._high = robot.q_min, robot.q_max
         self._coast = max(COAST, 2 * ticks)
         self.q = start.copy()
         self._speed = np.zeros(7)  # [rad/tick], as all speeds here
-        self._from, self._from_speed = self.q, self._speed
-        self._goal, self._goal_speed = self.q, self._speed
-        self._age = ticks + self._coast  # ticks since the last command
-        self._last = self.q
+        self._time = 0  # ticks so far
+        self._arrival = -ticks - self._coast  # of the last command
+        self._knots = deque([_Knot(0, start, np.zeros(7))])  # the one followed, and later ones
+        self._has_begun = False
+        self._window = deque([start] * ticks, maxlen=ticks)  # of the reference
+        self._before = start  # the reference of the last tick
+        self._is_broken = False
 
     @property
     def age(self) -> int:
         """Ticks since the last command."""
-        return self._age
+        return self._time - self._arrival
 
-    def command(self, q: Array, *, after: int) -> None:
-        """Take a command, shape (7,) [rad], `after` ticks of the client's time later than the one before."""
-        self._from, self._from_speed = self.q, self._speed
-        self._goal_speed = (q - self._last) / after
-        self._goal = self._last = q
-        self._age = 0
+    def command(self, q: Array, *, after: int, late: int = 0) -> None:
+        """Take a command.
+
+        Args:
+            q: shape (7,) [rad].
+            after: ticks of the client's time since the command before.
+            late: ticks since the message that it answers, beyond the one in which an answer is due.
+        """
+        self._arrival = self._time
+        last, due = self._knots[-1], self._time - late + self._ticks
+        before = last.due if self._has_begun else due - after
+        self._has_begun, self._is_broken = True, self._is_broken or before < self._time
+        self._knots.append(_Knot(max(due, before + 1), q, (q - last.q) / after))
 
     def tick(self) -> Array:
         """The set-point of the next tick, shape (7,) [rad]."""
-        self._age += 1
-        if self._age <= self._ticks:
-            target = self._interpolated(self._age / self._ticks)
-        elif self._age <= self._ticks + self._coast:
-            target = self._goal + (self._age - self._ticks) * self._goal_speed
+        self._time += 1
+        if not self._has_begun:
+            return self.q
+        while len(self._knots) > 1 and self._knots[0].due < self._time:
+            self._knots.popleft()
+        knot = self._knots[0]
+        over = self._time - knot.due
+        self._is_broken = self._is_broken or over > 0
+        if over > self._coast:
+            self._window.extend([self.q] * self._ticks)
+            self._before = self.q
+            step = self._bounded(np.zeros(7))
         else:
-            target = self.q + self._speed - np.clip(self._speed, -self._slowing, self._slowing)
-        target = np.clip(target, self._least, self._most)
-        step = np.clip(target - self.q, -self._leap, self._leap)
-        self.q = self.q + step
-        self._speed = step
+            self._window.append(np.clip(knot.q + over * knot.speed, self._low, self._high))
+            target = np.mean(self._window, axis=0) if self._ticks > 1 else self._window[0]
+            step = self._towards(target, target - self._before)
+            self._before = target
+        self.q, self._speed = self.q + step, step
         return self.q
 
-    def _interpolated(self, s: float) -> Array:
-        """Cubic from the set-point at the arrival of the command to the command; s in (0, 1]."""
-        if s >= 1.0:
-            return self._goal
-        n, r = self._ticks, 1.0 - s
-        rise = s * s * (3.0 - 2.0 * s)
-        return (
-            self._from
-            + rise * (self._goal - self._from)
-            + (n * s * r * r) * self._from_speed
-            - (n * s * s * r) * self._goal_speed
-        )
+    def _towards(self, target: Array, speed: Array) -> Array:
+        """The step to a target that moves with a speed, or as much of it as an axis can do."""
+        step: Array = target - self.q
+        lag = step - speed
+        if (
+            self._is_broken
+            and np.abs(lag).max() < _TOGETHER
+            and np.abs(speed - self._speed).max() < _TOGETHER
+        ):
+            self._is_broken = self._knots[0].due < self._time
+        if not self._is_broken:
+            return np.clip(step, -self._leap, self._leap)
+        closing = stoppable(np.abs(lag), _PLANNED * self._acceleration) * TICK
+        return self._bounded(speed + np.sign(lag) * np.minimum(np.abs(lag), closing))
+
+    def _bounded(self, step: Array) -> Array:
+        """The step nearest to another one within velocity and acceleration, that stops before the position limits."""
+        fastest, change = self._fastest * TICK, self._acceleration * TICK * TICK
+        step = np.clip(np.clip(step, -fastest, fastest), self._speed - change, self._speed + change)
+        down = stoppable(self.q - self._low, self._acceleration) * TICK
+        up = stoppable(self._high - self.q, self._acceleration) * TICK
+        return np.clip(step, -down, up)
+
+
+@dataclass(frozen=True, slots=True)
+class _Knot:
+    """A command: the tick at which its position is due, and the speed on the way there [rad/tick]."""
+
+    due: int
+    q: Array
+    speed: Array
 
 
 #: Under a torque overlay the position only preloads a spring; public clients command it up to 0.1 rad off.

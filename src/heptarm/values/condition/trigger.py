@@ -8,7 +8,7 @@ from typing import TypeAlias
 from heptarm.errors import ShapeError
 from heptarm.values.checks import Value, finite, shown
 from heptarm.values.condition.condition import Condition, check_condition
-from heptarm.values.frames import check_name
+from heptarm.values.frames import check_name, check_printable
 from heptarm.values.io import SignalValue
 
 _LONGEST_LABEL = 128
@@ -48,13 +48,14 @@ class Notify(Value):
     label: str = ""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.label, str) or len(self.label.encode()) > _LONGEST_LABEL:
+        if not isinstance(self.label, str) or len(self.label.encode(errors="replace")) > _LONGEST_LABEL:
             raise ShapeError(
                 f"label must be a text of at most {_LONGEST_LABEL} bytes, got {shown(self.label)}",
                 code=3,
                 parameter="label",
                 value=self.label,
             )
+        check_printable(self.label, "label")
 
     def __str__(self) -> str:
         """In words."""

@@ -1,0 +1,246 @@
+"""`heptarm calibrate`: measure the tip of a tool, and the load on the flange."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from heptarm import calibration
+from heptarm.arm.arm import Arm
+from heptarm.arm.link.target import target_from_env
+from heptarm.calibration.load_motion import SECONDS, SPEED
+from heptarm.calibration.tip import TOLERANCE
+from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, Model
+from heptarm.cli.output import confirm as ask_person
+from heptarm.cli.output import emit
+from heptarm.errors import CommandRejected, NotReady
+from heptarm.io.targets import saved_target
+from heptarm.model.kinematics import forward
+from heptarm.panel.points import PointList
+from heptarm.values.files import read_text
+from heptarm.values.mode.compliance import compliance
+from heptarm.values.motion.hand_guiding import hand_guide
+from heptarm.values.motion.motion import hold
+from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel, robot
+from heptarm.values.tool import KnownTool, Tool
+
+_ACCESS = Access()
+#: Longest time in which a person guides the arm to a pose [s].
+_GUIDED = 600.0
+#: Pushed states per second: many, for their mean is what counts [Hz].
+_RATE = 500.0
+
+Save = Annotated[
+    str,
+    Parameter(
+        name="--save",
+        help="Save the result as this tool of the saved target. Default: it is only printed.",
+    ),
+]
+
+
+def tcp(
+    *,
+    poses: Annotated[int, Parameter(help="Number of poses about the fixed point.")] = 6,
+    along: Annotated[
+        str,
+        Parameter(
+            help="Two axes of the tool such as z,x: two more poses, in which the fixed point touches these axes, give "
+            "the orientation. Default: that of the flange."
+        ),
+    ] = "",
+    guide: Annotated[
+        Literal["none", "hand", "compliance"],
+        Parameter(
+            help="How the arm gets to a pose. none: you jog it at the smartPAD, in the panel or by another program; "
+            "hand: by the hand guiding device; compliance: it is compliant between the poses."
+        ),
+    ] = "none",
+    points: Annotated[
+        Path | None,
+        Parameter(help="File of taught points that the panel has saved: computed from them, without an arm."),
+    ] = None,
+    model: Annotated[Model, Parameter(help="Robot of --points, with its media flange.")] = "iiwa14",
+    tolerance: Annotated[
+        float, Parameter(help="The most by which a pose may miss the fixed point [m].")
+    ] = TOLERANCE,
+    frame: Annotated[str, Parameter(help="Frame of the tool that the tip becomes.")] = "tcp",
+    save: Save = "",
+    target: CommandTarget = NO_TARGET,
+    as_json: Json = False,
+) -> int:
+    """Measure the tip of a tool: bring it to one fixed point in several poses, and confirm each.
+
+    For example:
+
+        heptarm calibrate tcp --target lab1
+
+        heptarm calibrate tcp --along z,x --guide compliance --save gripper --target lab1
+
+        heptarm calibrate tcp --points points.json
+    """
+    axes = tuple(part.strip() for part in along.split(",")) if along else ()
+    if len(axes) not in (0, 2):
+        raise CommandRejected(
+            f"along must be two axes of the tool, got {along!r}", parameter="along", hint="for example z,x"
+        )
+    if points is not None and (axes or guide != "none"):
+        raise CommandRejected(
+            "points are computed without an arm, so along and guide have no effect with them",
+            parameter="points",
+            hint="leave them out, or use calibration.tcp(..., along=...) in Python",
+        )
+    place = _saved_as(save, target)
+    if points is not None:
+        taught = _taught(points, robot(model))
+        found = calibration.tcp(taught, tolerance=tolerance)
+        saved = saved_target(place) if place else None
+        named = {one.name: one for one in saved.tools} if saved is not None else {}
+        old: Tool | KnownTool | str = named.get(save, save)
+    else:
+        with target.connect(control=guide != "none") as arm, _guiding(arm, guide) as confirm:
+            about = calibration.record_poses(arm, count=poses, confirm=confirm)
+            extra = {}
+            for axis in axes:
+                what = f"let the fixed point touch the {axis} axis of the tool"
+                (extra[axis],) = calibration.record_poses(arm, count=1, confirm=_asking(confirm, what))
+            old = arm.tools.get(save, save)
+        found = calibration.tcp(about, along=extra or None, tolerance=tolerance)
+    if place:
+        found.save(place, old, frame=frame)
+    if as_json:
+        emit(
+            {"tcp": found.pose.array.tolist(), "sigma_m": found.sigma.tolist(), "point": found.point.tolist()}
+            | {"sigma_rad": found.sigma_angle, "residuals_m": found.residuals.tolist(), "worst": found.worst}
+            | {"suspect": found.is_suspect, "saved": bool(place)}
+        )
+    else:
+        print(found)
+        print(_outcome(save, place))
+    return 0
+
+
+def load(
+    *,
+    inertia: Annotated[
+        bool,
+        Parameter(
+            negative="", help="Measure the inertia, too, during the motions: give a --speed of 0.3 or more."
+        ),
+    ] = False,
+    speed: Annotated[float, Parameter(help="Fraction of the full speed, (0, 1].")] = SPEED,
+    seconds: Annotated[float, Parameter(help="Time of each rest [s].")] = SECONDS,
+    dry_run: Annotated[
+        bool, Parameter(name="--dry-run", negative="", help="Show what would move; move nothing.")
+    ] = False,
+    save: Save = "",
+    access: Access = _ACCESS,
+) -> int:
+    """Measure mass and centre of mass of what is on the flange, and compare them with the load data in use.
+
+    A4 to A7 move to nine postures around the present one, and back; what moves is shown first.
+
+    For example:
+
+        heptarm calibrate load --target lab1
+
+        heptarm calibrate load --inertia --speed 0.4 --save gripper --target lab1
+    """
+    place = _saved_as(save, access.target)
+    with access.target.connect(control=not dry_run, state_rate=_RATE) as arm:
+        plan = calibration.load_plan(
+            arm, excitation="short" if inertia else "rests", speed=speed, seconds=seconds
+        )
+        print(plan, file=sys.stderr if access.as_json else sys.stdout, flush=True)
+        if dry_run:
+            return 0
+        if not (arm.is_virtual or access.yes or ask_person(f"Move the real {arm.robot.title} like this?")):
+            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        found = calibration.load(arm, plan=plan)
+        old = arm.tools.get(save, save)
+    if place:
+        found.save(place, old)
+    if access.as_json:
+        emit(
+            {"mass_kg": found.mass, "sigma_kg": found.sigma_mass, "declared_kg": found.declared.mass}
+            | {"com_m": found.com.tolist(), "sigma_com_m": found.sigma_com.tolist()}
+            | {"inertia": found.inertia.tolist(), "sigma_inertia": found.sigma_inertia.tolist()}
+            | {"offset_nm": found.offset.tolist(), "agrees": found.is_as_declared, "saved": bool(place)}
+        )
+    else:
+        print(found)
+        print(_outcome(save, place))
+    return 0
+
+
+def _saved_as(tool: str, target: CommandTarget) -> str:
+    """Name of the saved target that gets a tool; empty: nothing is to be saved.
+
+    Raises:
+        CommandRejected: the target is not a saved one, so that nothing could be saved: before anything moves.
+    """
+    if not tool:
+        return ""
+    Tool(tool)  # its name is checked before anything is measured
+    text = target_from_env() if target.text is None else target.text
+    if saved_target(text) is None:
+        raise CommandRejected(
+            f"{text} is not a saved target, so that no tool can be saved with it",
+            parameter="save",
+            value=tool,
+            hint="heptarm targets add NAME ADDRESS, then --target NAME",
+        )
+    return text
+
+
+def _outcome(tool: str, place: str) -> str:
+    if place:
+        return f"saved as the tool {tool} of {place}"
+    return "nothing is changed; --save TOOL saves it with a saved target"
+
+
+def _taught(file: Path, model: RobotModel) -> list[Pose]:
+    """Poses of the flange of the points in a file of the panel."""
+    points = PointList(model)
+    points.load(read_text(file, name="points"))
+    return [Pose.from_matrix(forward(model, point.q)) for point in points]
+
+
+@contextmanager
+def _guiding(arm: Arm, guide: str) -> Iterator[Callable[[str], bool]]:
+    """What asks the person for the next pose, while the arm can be moved as the person chose."""
+    if guide == "compliance":
+        arm.verify_load()  # a compliant arm sinks under a load that it does not know
+
+    def confirm(text: str) -> bool:
+        if guide == "none":
+            return _ask(text)
+        motion, mode = (hand_guide(), None) if guide == "hand" else (hold(_GUIDED), compliance("xyzabc"))
+        if guide == "compliance" and not _ask(f"{text}; Enter makes the arm compliant"):
+            return False
+        handle = arm.start(motion, mode=mode, when="reject")
+        try:
+            return _ask(text)
+        finally:
+            handle.cancel()
+            arm.wait_for_rest()
+
+    yield confirm
+
+
+def _asking(confirm: Callable[[str], bool], what: str) -> Callable[[str], bool]:
+    """What asks for something else than a pose about the tip."""
+    return lambda _: confirm(f"{what}, not its tip")
+
+
+def _ask(text: str) -> bool:
+    """Show what to do, and wait for Enter; q, or the end of the input, gives up."""
+    print(f"{text} [Enter; q gives up] ", end="", file=sys.stderr, flush=True)
+    line = sys.stdin.readline()
+    return bool(line) and line.strip().lower() not in ("q", "quit")
