@@ -1,4 +1,4 @@
-/* Distances of the nearest two bodies at many postures, and how far the arm may move on from there.
+/* Distances of shapes at joint positions, of the nearest two at many postures, and how far the arm may move on from there.
    heptarm.sim.distances says which pairs of shapes count.
 
    Each shape has a box with rounded edges around it, whose distance from another one is cheap to bound from below. Only for pairs
@@ -9,10 +9,17 @@
 
 #include "kinematics.h"
 
-/* Around a shape, in its own frame: a box of half edges `half` and centre `middle`, extended by `radius` on all sides; and
-   `reach`, of a sphere around its origin: infinite where no bound is known. A plane is not bounded, and has no box. [m] */
+/* Around a shape, or around several of one body, in the frame of the shape `frame`: a box of half edges `half` and centre
+   `middle`, extended by `radius` on all sides; and `reach`, of a sphere around the origin of that frame. A plane has neither. [m] */
 struct hull {
-    double half[3], middle[3], radius, reach, is_plane;
+    double half[3], middle[3], radius, reach;
+    int64_t frame, is_plane;
+};
+
+/* A hull of the arm, its tool or what it holds, and one that it may meet. `size` is 1 for two shapes; else the second hull is around
+   those of the next entries, of which there are `size` less this one: a tree, in the order of a walk through it. */
+struct entry {
+    int32_t first, second, size;
 };
 
 /* A body that the flange carries: where its position is in MuJoCo's, and its pose in the flange: place, quaternion x y z w. */
@@ -30,9 +37,9 @@ struct checks {
     double *positions;                      /* of all joints, in MuJoCo's data */
     const double *places, *turns;           /* of the shapes, likewise */
     const double *flange_place, *flange_turn;
-    const struct hull *hulls;               /* of the shapes */
-    const int32_t *pairs;                   /* of shapes, two numbers each */
-    int64_t count;                          /* of pairs */
+    const struct hull *hulls;               /* of the shapes, then those around several */
+    const struct entry *entries;
+    int64_t count, all;                     /* of entries: of those that may not touch; with those that may */
     const struct grip *grips;
     int64_t held;                           /* count of grips */
 };
@@ -60,32 +67,30 @@ static void carry(const struct checks *c) {
     c->kinematics(c->model, c->data);
 }
 
-static void centre(const struct checks *c, int32_t shape, double *at) {
-    rotate(c->turns + 9 * shape, c->hulls[shape].middle, at);
-    for (int k = 0; k < 3; k++) at[k] += c->places[3 * shape + k];
+static void centre(const struct checks *c, const struct hull *hull, double *at) {
+    rotate(c->turns + 9 * hull->frame, hull->middle, at);
+    for (int k = 0; k < 3; k++) at[k] += c->places[3 * hull->frame + k];
 }
 
-/* Lower bound of the distance of a shape above a plane. */
-static double above(const struct checks *c, int32_t plane, int32_t shape) {
-    const struct hull *hull = c->hulls + shape;
-    const double *turn = c->turns + 9 * shape, *base = c->turns + 9 * plane;
+/* Lower bound of the distance of a hull above a plane. */
+static double above(const struct checks *c, const struct hull *plane, const struct hull *hull) {
+    const double *turn = c->turns + 9 * hull->frame, *base = c->turns + 9 * plane->frame;
     const double normal[3] = {base[2], base[5], base[8]};
     double at[3], result = -hull->radius;
-    centre(c, shape, at);
+    centre(c, hull, at);
     for (int k = 0; k < 3; k++) {
         double along = normal[0] * turn[k] + normal[1] * turn[3 + k] + normal[2] * turn[6 + k];
-        result += normal[k] * (at[k] - c->places[3 * plane + k]) - hull->half[k] * fabs(along);
+        result += normal[k] * (at[k] - c->places[3 * plane->frame + k]) - hull->half[k] * fabs(along);
     }
     return result;
 }
 
-/* Lower bound of the distance of two shapes: of their boxes along the axes of either, whose gaps are at right angles. */
-static double apart(const struct checks *c, int32_t first, int32_t second) {
-    const struct hull *a = c->hulls + first, *b = c->hulls + second;
-    const double *ra = c->turns + 9 * first, *rb = c->turns + 9 * second;
+/* Lower bound of the distance of two hulls: of their boxes along the axes of either, whose gaps are at right angles. */
+static double apart(const struct checks *c, const struct hull *a, const struct hull *b) {
+    const double *ra = c->turns + 9 * a->frame, *rb = c->turns + 9 * b->frame;
     double at[3], there[3], turn[3][3], squares[2] = {0.0, 0.0};
-    centre(c, first, at);
-    centre(c, second, there);
+    centre(c, a, at);
+    centre(c, b, there);
     for (int k = 0; k < 3; k++) there[k] -= at[k];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) turn[i][j] = fabs(ra[i] * rb[j] + ra[3 + i] * rb[3 + j] + ra[6 + i] * rb[6 + j]);
@@ -100,34 +105,64 @@ static double apart(const struct checks *c, int32_t first, int32_t second) {
     return gap > 0.0 ? sqrt(gap) - a->radius - b->radius : -INFINITY;
 }
 
-/* Whether two shapes are surely farther apart than a distance. */
-static int is_beyond(const struct checks *c, int32_t first, int32_t second, double distance) {
-    const struct hull *a = c->hulls + first, *b = c->hulls + second;
+/* Whether two hulls are surely farther apart than a distance. */
+static int is_beyond(const struct checks *c, const struct hull *a, const struct hull *b, double distance) {
     double most = distance + TOLERANCE, reach = a->reach + b->reach + most, square = 0.0;
-    if (a->is_plane != 0.0 || b->is_plane != 0.0) {
-        int32_t plane = a->is_plane != 0.0 ? first : second, other = plane == first ? second : first;
-        return !isinf(c->hulls[other].reach) && above(c, plane, other) > most;
-    }
-    if (isinf(reach)) return 0;
+    if (b->is_plane) return above(c, b, a) > most;
+    if (a->is_plane) return above(c, a, b) > most;
     for (int k = 0; k < 3; k++) {
-        double gap = c->places[3 * first + k] - c->places[3 * second + k];
+        double gap = c->places[3 * a->frame + k] - c->places[3 * b->frame + k];
         square += gap * gap;
     }
-    return (reach > 0.0 && square > reach * reach) || apart(c, first, second) > most;
+    return (reach > 0.0 && square > reach * reach) || apart(c, a, b) > most;
+}
+
+/* The next pair of shapes from an entry on that may be nearer than a distance; `end`: there is none. */
+static int64_t next_near(const struct checks *c, int64_t n, int64_t end, double distance) {
+    while (n < end) {
+        const struct entry *entry = c->entries + n;
+        if (is_beyond(c, c->hulls + entry->first, c->hulls + entry->second, distance))
+            n += entry->size;
+        else if (entry->size == 1)
+            return n;
+        else
+            n++;
+    }
+    return end;
+}
+
+/* Distance of a pair of shapes; at least `most`: they are farther apart than that, which is not negative. */
+static double between(const struct checks *c, int64_t n, double most) {
+    return c->distance(c->model, c->data, c->entries[n].first, c->entries[n].second, most, NULL);
+}
+
+/* Let the arm be at joint positions. */
+static void move(const struct checks *c, const double *q) {
+    memcpy(c->positions, q, N * sizeof *q);
+    c->kinematics(c->model, c->data);
+    if (c->held) carry(c);
 }
 
 /* Distance of the nearest two bodies in a posture; infinite: none are nearer than `below`. */
 static double nearest(const struct checks *c, const double *q, double below) {
     double best = below;
-    memcpy(c->positions, q, N * sizeof *q);
-    c->kinematics(c->model, c->data);
-    if (c->held) carry(c);
-    for (int64_t n = 0; n < c->count; n++) {
-        int32_t first = c->pairs[2 * n], second = c->pairs[2 * n + 1];
-        if (is_beyond(c, first, second, best)) continue;
-        best = fmin(best, c->distance(c->model, c->data, first, second, fmax(best, 0.0), NULL));
-    }
+    move(c, q);
+    for (int64_t n = 0; (n = next_near(c, n, c->count, best)) < c->count; n++)
+        best = fmin(best, between(c, n, fmax(best, 0.0)));
     return best < below ? best : INFINITY;
+}
+
+/* Pairs of shapes that are nearer than `below` in a posture, two numbers each, and their distances; their count. */
+int64_t hc_pairs(const struct checks *c, const double *q, double below, int32_t *shapes, double *distances) {
+    int64_t found = 0;
+    move(c, q);
+    for (int64_t n = 0; (n = next_near(c, n, c->all, below)) < c->all; n++) {
+        distances[found] = between(c, n, fmax(below, 0.0));
+        if (distances[found] >= below) continue;
+        shapes[2 * found] = c->entries[n].first, shapes[2 * found + 1] = c->entries[n].second;
+        found++;
+    }
+    return found;
 }
 
 /* Distances of the nearest two bodies in many postures. */
