@@ -236,7 +236,9 @@ class Events:
 
     def _note_servo(self, message: wire.ServoStatus) -> None:
         before = self.servo_status(message.servo)
-        if message.refused and (before is None or not before.refused):  # the first one; the others are counted
+        if message.refused and (
+            before is None or not before.refused
+        ):  # the first one; the others are counted
             _log.warning("servo motion: the cabinet refused a target: %s", message.text)
         self._servo_status = message
 
