@@ -267,7 +267,7 @@ def _before(distance: float) -> Callable[[Pose], Pose]:
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    """What picking and placing share.
+    """What picking and placing have in common.
 
     Attributes:
         arm: in control.

@@ -126,7 +126,7 @@ class _Blocked(Value):
 
 
 @dataclass(slots=True)
-class Follower:
+class PathFollower:
     """Follows one path; see `Arm.follow`.
 
     Attributes:
