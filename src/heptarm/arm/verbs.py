@@ -31,7 +31,7 @@ from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import load_check, program_request
-from heptarm.arm.motion.following import FollowedPath, PathFollower, FollowTerms
+from heptarm.arm.motion.following import FollowedPath, FollowTerms, PathFollower
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
