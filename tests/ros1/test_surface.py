@@ -11,7 +11,7 @@ import actionlib
 import pytest
 import rospy
 
-from tests.conformance import hands, surface
+from tests.conformance import hands, paths, surface
 from tests.conformance.stage import ROOT, Stage
 from tests.ros1.peer import NodeProcess, call, collect, publisher, until
 from tests.ros1.test_examples import run
@@ -107,7 +107,7 @@ def probe(ros: None, arena: Stage) -> Iterator[Client]:
     assert node.end() == 0, node.said
 
 
-CASES = surface.CASES | hands.CASES
+CASES = surface.CASES | hands.CASES | paths.CASES
 #: What takes longest: every run has it with the node of ROS 2.
 IN_LONG_RUN = {
     "a_collision_guard_stops_motions_and_makes_compliant",

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rclpy.action import ActionClient
 
-from tests.conformance import hands, surface
+from tests.conformance import hands, paths, surface
 from tests.conformance.stage import ROOT, Stage
 from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration
 from tests.ros2.test_examples import run
@@ -105,7 +105,7 @@ def probe(ros: Ros, arena: Stage) -> Iterator[Client]:
     node.finish()
 
 
-CASES = surface.CASES | hands.CASES
+CASES = surface.CASES | hands.CASES | paths.CASES
 
 
 @pytest.mark.parametrize("case", CASES)
