@@ -70,7 +70,7 @@ def context() -> Any:
     fixture = Pose.at(0.5, 0.1, 0.2)
     arm = message(robot=robot("iiwa14"), state=state, frames={"/Fixture": fixture}, tools={})
     driver = message(configuration=configuration, arm=arm)
-    world = NodeWorld("iiwa14", scene="", margin=0.005)
+    world = NodeWorld(cast(Any, driver))
     ros = message(pose=pose)
     return cast(
         Any,

@@ -45,10 +45,7 @@ class NodeContext:
         self.gripper: TwoSignalGripper | None = None
         self.gripper_goal = 0
         self.iiwa_stack = IiwaStackSettings()
-        values = driver.configuration.values
-        self.world = NodeWorld(
-            driver.arm.robot.name, scene=values["planning.scene"], margin=values["planning.margin"]
-        )
+        self.world = NodeWorld(driver)
         self._mode = contextlib.ExitStack()
 
     @property

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from heptarm.errors import CommandRejected
+from heptarm.ros.node.driver import Driver
 from heptarm.sim.collision import CollisionModel
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
@@ -103,16 +104,14 @@ class WorldDraft:
 
 
 class NodeWorld:
-    """The world around the arm of a node; it begins with a scene.
+    """The world around the arm of a node; it begins with the scene of the parameters.
 
     Args:
-        robot: name of the robot.
-        scene: ready scene, or file, as of `heptarm.CollisionModel`; "": none.
-        margin: bodies nearer than this count as touching [m].
+        driver: of the arm.
     """
 
-    def __init__(self, robot: str, *, scene: str, margin: float) -> None:
-        self._settings = robot, scene, margin
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
         self._lock = threading.Lock()
         self._model: CollisionModel | None = None
         self._bodies: Mapping[str, SceneBody] = MappingProxyType({})
@@ -155,6 +154,8 @@ class NodeWorld:
 
     def _made(self) -> CollisionModel:
         if self._model is None:
-            robot, scene, margin = self._settings
-            self._model = CollisionModel(robot, scene=scene, margin=margin)
+            values = self._driver.configuration.values
+            self._model = CollisionModel(
+                self._driver.arm.robot.name, scene=values["planning.scene"], margin=values["planning.margin"]
+            )
         return self._model
