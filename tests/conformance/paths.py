@@ -48,7 +48,9 @@ def world(probe: Probe) -> dict[str, Any]:
 def furnished(probe: Probe) -> None:
     """Put the table and the wall into the world, by the topics of single objects and of scenes."""
     table = box(probe, "table", [0.4, 0.6, TABLE], pose(probe, (0.6, 0.0, TABLE / 2)))
-    fields = {name: getattr(table, name) for name in ("header", "id", "pose", "primitives", "primitive_poses")}
+    fields = {
+        name: getattr(table, name) for name in ("header", "id", "pose", "primitives", "primitive_poses")
+    }
     probe.tell("/surface/collision_object", "moveit_msgs/CollisionObject", **fields)()
     scene = probe.make("moveit_msgs/PlanningSceneWorld")
     scene.collision_objects = [box(probe, "wall", WALL, pose(probe, PLACE, TURN))]

@@ -35,9 +35,7 @@ def header(frame: str = "") -> SimpleNamespace:
 def pose(
     xyz: tuple[float, ...] = (0.0, 0.0, 0.0), quat: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
 ) -> SimpleNamespace:
-    return message(
-        position=message(**dict(zip("xyz", xyz))), orientation=message(**dict(zip("xyzw", quat)))
-    )
+    return message(position=message(**dict(zip("xyz", xyz))), orientation=message(**dict(zip("xyzw", quat))))
 
 
 def body(name: str, *, operation: Any = 0, frame: str = "", **fields: Any) -> SimpleNamespace:
@@ -91,7 +89,9 @@ def context() -> Any:
 
 def test_bodies_come_go_and_move_in_the_frames_that_their_headers_name(context: Any) -> None:
     scene.collision_object(context, body("wall", pose=pose((0.5, 0.2, 0.3))))
-    scene.collision_object(context, body("jig", operation=b"\x00", frame="Fixture", pose=pose((0.0, 0.0, 0.1))))
+    scene.collision_object(
+        context, body("jig", operation=b"\x00", frame="Fixture", pose=pose((0.0, 0.0, 0.1)))
+    )
     scene.collision_object(context, body("tag", frame="tool"))
     found = context.world.bodies
     np.testing.assert_allclose(found["wall"].pose.xyz, [0.5, 0.2, 0.3])
@@ -143,7 +143,8 @@ def test_the_arm_carries_what_is_attached_and_leaves_it_where_it_is(context: Any
     turned = HOME.copy()
     turned[0] = 1.0
     scene.collision_object(
-        context, body("post", pose=pose(tuple(Pose.from_matrix(forward(robot("iiwa14"), turned)).xyz + [0, 0, -0.2])))
+        context,
+        body("post", pose=pose(tuple(Pose.from_matrix(forward(robot("iiwa14"), turned)).xyz + [0, 0, -0.2]))),
     )
     touched = {frozenset((one.first, one.second)) for one in context.world.model.touching(turned)}
     assert frozenset(("part", "post")) in touched
@@ -208,9 +209,7 @@ def test_what_cannot_be_attached_is_refused(context: Any) -> None:
 
 
 def position(link: str, xyz: tuple[float, ...], size: list[float], kind: int = 2) -> Any:
-    region = message(
-        primitives=[message(type=kind, dimensions=size)], primitive_poses=[pose(xyz)], meshes=[]
-    )
+    region = message(primitives=[message(type=kind, dimensions=size)], primitive_poses=[pose(xyz)], meshes=[])
     return message(
         header=header("link_0"),
         link_name=link,
@@ -263,7 +262,10 @@ def test_constraints_become_goals_of_the_tool_frame(context: Any) -> None:
         (wanted(), MoveItCode.INVALID_GOAL_CONSTRAINTS),
         (wanted(visibility_constraints=[message()]), MoveItCode.INVALID_GOAL_CONSTRAINTS),
         (wanted(position_constraints=[position("hand", (0, 0, 0), [0.1])]), MoveItCode.INVALID_LINK_NAME),
-        (wanted(position_constraints=[position("flange", (0, 0, 0), [0.1])]), MoveItCode.INVALID_GOAL_CONSTRAINTS),
+        (
+            wanted(position_constraints=[position("flange", (0, 0, 0), [0.1])]),
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        ),
         (
             wanted(position_constraints=[position("tool", (0, 0, 0), [0.1, 0.1], kind=3)]),
             MoveItCode.INVALID_GOAL_CONSTRAINTS,

@@ -25,7 +25,7 @@ WALL, PLACE, TURN = (0.5, 0.02, 0.7), (0.5, 0.33, 0.35), (0.0, 0.0, np.sin(np.pi
 
 
 @pytest.fixture
-def moveit(client: Client) -> Iterator[pymoveit2.MoveIt2]:
+def moveit(client: Client, request: pytest.FixtureRequest) -> Iterator[pymoveit2.MoveIt2]:
     made = client.ros.do(
         pymoveit2.MoveIt2,
         node=client.ros.node,
@@ -33,6 +33,7 @@ def moveit(client: Client) -> Iterator[pymoveit2.MoveIt2]:
         base_link_name="link_0",
         end_effector_name="flange",
         callback_group=ReentrantCallbackGroup(),
+        use_move_group_action=request.param == "move_action",
     )
     client.ros.meet(f"{client.name}/plan")  # the node has discovered its clients, too
     made.max_velocity, made.allowed_planning_time = 0.6, 100.0
@@ -42,6 +43,9 @@ def moveit(client: Client) -> Iterator[pymoveit2.MoveIt2]:
     client.ros.do(made.destroy)
 
 
+@pytest.mark.parametrize(
+    "moveit", ["move_action", pytest.param("execute_trajectory", marks=pytest.mark.long)], indirect=True
+)
 def test_pymoveit2_plans_around_a_wall_and_drives(client: Client, moveit: pymoveit2.MoveIt2) -> None:
     assert moveit.move_to_configuration(HOME, timeout_sec=PATIENCE) and moveit.wait_until_executed(PATIENCE)
     moveit.add_collision_box(id="wall", size=WALL, position=PLACE, quat_xyzw=TURN)
@@ -61,13 +65,16 @@ def test_pymoveit2_plans_around_a_wall_and_drives(client: Client, moveit: pymove
     assert len(driven) > 50 and world.distances(driven[::5]).min() > 0.0
 
 
+@pytest.mark.parametrize("moveit", ["move_action"], indirect=True)
 def test_pymoveit2_drives_lines_and_asks_for_kinematics(client: Client, moveit: pymoveit2.MoveIt2) -> None:
     assert moveit.move_to_configuration(HOME, timeout_sec=PATIENCE) and moveit.wait_until_executed(PATIENCE)
     there = Pose.from_matrix(forward(robot("iiwa14"), HOME))
     found = until(lambda: moveit.compute_fk(joint_state=HOME), "no forward kinematics")
     np.testing.assert_allclose(found.pose.position.z, there.xyz[2], atol=1e-6)
     wanted = there.xyz + [0.0, 0.05, 0.1]
-    solved = until(lambda: moveit.compute_ik(position=wanted.tolist(), quat_xyzw=there.quat.tolist()), "no IK")
+    solved = until(
+        lambda: moveit.compute_ik(position=wanted.tolist(), quat_xyzw=there.quat.tolist()), "no IK"
+    )
     q = [dict(zip(solved.name, solved.position))[name] for name in client.joints]
     np.testing.assert_allclose(forward(robot("iiwa14"), q)[:3, 3], wanted, atol=1e-6)
     begin = client.now()

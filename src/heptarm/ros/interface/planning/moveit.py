@@ -35,7 +35,13 @@ from heptarm.ros.interface.planning.constraints import (
     start_of,
 )
 from heptarm.ros.interface.planning.paths import timed, trajectory_fields
-from heptarm.ros.interface.planning.scene import carried_model, change_scene, scene_fields, tool_on_flange
+from heptarm.ros.interface.planning.scene import (
+    carried_model,
+    change_scene,
+    replace_scene,
+    scene_fields,
+    tool_on_flange,
+)
 from heptarm.ros.interface.program_goal import run_motion
 from heptarm.ros.interface.service import Service, ServiceResponse
 from heptarm.ros.interface.topics import Topic
@@ -116,7 +122,8 @@ class _Request:
     Args:
         context: of the node.
         message: the request.
-        difference: moveit_msgs/PlanningScene by which the world differs for this request; None: it does not.
+        difference: moveit_msgs/PlanningScene by which the world differs for this request; that of MoveIt's clients is
+            empty, and not marked as a difference. None: it does not differ.
 
     Raises:
         HeptarmError: refused; the text gives the reason.
@@ -438,7 +445,7 @@ def _get_scene(context: NodeContext, request: Any) -> ServiceResponse:
 def _apply_scene(context: NodeContext, request: Any) -> ServiceResponse:
     """Change the world."""
     with context.world.changing() as draft:
-        change_scene(context, draft, request.scene)
+        replace_scene(context, draft, request.scene)
     return ServiceResponse(True, "the world has changed")
 
 

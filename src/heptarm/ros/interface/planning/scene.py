@@ -51,14 +51,26 @@ def attached_collision_object(context: NodeContext, message: Any) -> None:
 def planning_scene(context: NodeContext, message: Any) -> None:
     """Change, or replace, the world by a moveit_msgs/PlanningScene."""
     with context.world.changing() as draft:
-        change_scene(context, draft, message)
+        replace_scene(context, draft, message)
 
 
 # ------------------------------------------------------------------------------------------- changes
 
 
+def replace_scene(context: NodeContext, draft: WorldDraft, message: Any) -> None:
+    """Replace a world by a moveit_msgs/PlanningScene, or change it by one that is a difference.
+
+    Raises:
+        HeptarmError: refused; the text gives the reason.
+    """
+    if not message.is_diff:
+        for name in tuple(draft.bodies):
+            draft.remove(name)
+    change_scene(context, draft, message)
+
+
 def change_scene(context: NodeContext, draft: WorldDraft, message: Any) -> None:
-    """Change a world by a moveit_msgs/PlanningScene; one that is no difference replaces it.
+    """Change a world by a moveit_msgs/PlanningScene, as a difference.
 
     Raises:
         HeptarmError: refused; the text gives the reason.
@@ -71,9 +83,6 @@ def change_scene(context: NodeContext, draft: WorldDraft, message: Any) -> None:
             parameter="allowed_collision_matrix",
             hint="remove the body, or attach it to the arm",
         )
-    if not message.is_diff:
-        for name in tuple(draft.bodies):
-            draft.remove(name)
     for one in message.world.collision_objects:
         change_body(context, draft, one)
     for one in message.robot_state.attached_collision_objects:
