@@ -241,6 +241,7 @@ def fri_pose(context: NodeContext, message: Any) -> None:
 
 
 _JOINTS, _POSE = "sensor_msgs/JointState", "geometry_msgs/PoseStamped"
+_SCENE = "moveit_msgs/PlanningScene"
 _FORWARD_POSITION, _FORWARD_VELOCITY = (
     "forward_position_controller/commands",
     "forward_velocity_controller/commands",
@@ -265,7 +266,7 @@ TOPICS = (
     Topic("~/fri/joint", _JOINTS, fri_joint),
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
     Topic("~/fri/pose", _POSE, fri_pose),
-    Topic("planning_scene", "moveit_msgs/PlanningScene", scene.planning_scene, depth=100, aside=True),
+    Topic("planning_scene", _SCENE, scene.planning_scene, depth=100, aside=True),
     Topic("collision_object", "moveit_msgs/CollisionObject", scene.collision_object, depth=100, aside=True),
     Topic(
         "attached_collision_object",
@@ -292,12 +293,14 @@ def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
     """List the topics that a node subscribes to.
 
     Args:
-        values: of the node's parameters: `names` adds some, `forward_controllers` leaves some out. What has types of
-            a package that is not installed is left out, too.
+        values: of the node's parameters: `names` adds some, `forward_controllers` leaves some out. Without the package
+            moveit_msgs those of the world are left out, too.
     """
     forward = values["forward_controllers"]
-    left_out = () if forward else (_FORWARD_POSITION, _FORWARD_VELOCITY)
-    ours = tuple(row for row in TOPICS if row.name not in left_out and is_installed(row.type))
+    left_out: tuple[str, ...] = () if forward else (_FORWARD_POSITION, _FORWARD_VELOCITY)
+    if not is_installed(_SCENE):
+        left_out += ("planning_scene", "collision_object", "attached_collision_object")
+    ours = tuple(row for row in TOPICS if row.name not in left_out)
     return ours + tuple(
         Topic(
             entry.name,
