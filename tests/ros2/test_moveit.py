@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ WALL, PLACE, TURN = (0.5, 0.02, 0.7), (0.5, 0.33, 0.35), (0.0, 0.0, np.sin(np.pi
 
 
 @pytest.fixture
-def moveit(client: Client, request: pytest.FixtureRequest) -> Iterator[pymoveit2.MoveIt2]:
+def moveit(client: Client, request: pytest.FixtureRequest) -> Iterator[Any]:
     made = client.ros.do(
         pymoveit2.MoveIt2,
         node=client.ros.node,
@@ -46,7 +47,7 @@ def moveit(client: Client, request: pytest.FixtureRequest) -> Iterator[pymoveit2
 @pytest.mark.parametrize(
     "moveit", ["move_action", pytest.param("execute_trajectory", marks=pytest.mark.long)], indirect=True
 )
-def test_pymoveit2_plans_around_a_wall_and_drives(client: Client, moveit: pymoveit2.MoveIt2) -> None:
+def test_pymoveit2_plans_around_a_wall_and_drives(client: Client, moveit: Any) -> None:
     assert moveit.move_to_configuration(HOME, timeout_sec=PATIENCE) and moveit.wait_until_executed(PATIENCE)
     moveit.add_collision_box(id="wall", size=WALL, position=PLACE, quat_xyzw=TURN)
     until(
@@ -66,7 +67,7 @@ def test_pymoveit2_plans_around_a_wall_and_drives(client: Client, moveit: pymove
 
 
 @pytest.mark.parametrize("moveit", ["move_action"], indirect=True)
-def test_pymoveit2_drives_lines_and_asks_for_kinematics(client: Client, moveit: pymoveit2.MoveIt2) -> None:
+def test_pymoveit2_drives_lines_and_asks_for_kinematics(client: Client, moveit: Any) -> None:
     assert moveit.move_to_configuration(HOME, timeout_sec=PATIENCE) and moveit.wait_until_executed(PATIENCE)
     there = Pose.from_matrix(forward(robot("iiwa14"), HOME))
     found = until(lambda: moveit.compute_fk(joint_state=HOME), "no forward kinematics")
