@@ -11,6 +11,7 @@ import pytest
 
 from heptarm.errors import CommandRejected, HeptarmError, NoPath, ShapeError
 from heptarm.model.kinematics import forward
+from heptarm.ros.interface.offered import offered, offered_actions
 from heptarm.ros.interface.planning import constraints, scene
 from heptarm.ros.interface.planning.constraints import MoveItCode, RequestRefused
 from heptarm.ros.interface.planning.world import NodeWorld
@@ -317,3 +318,19 @@ def test_the_group_and_the_start_state(context: Any) -> None:
     )
     start = constraints.start_of(context, some)
     assert start is not None and start[1] == 0.4 and start[3] == HOME[3]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_moveits_names_are_offered_on_request_where_its_types_are_installed(
+    is_there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("offered", "topics"):
+        monkeypatch.setattr(f"heptarm.ros.interface.{module}.is_installed", lambda _: is_there)
+    for wanted_too in (True, False):
+        table = offered(NodeConfiguration.of({"moveit": wanted_too}).values)
+        names = {row.name for row in (*table.topics, *table.services)}
+        names |= {row.name for row in offered_actions("heptarm", with_moveit=wanted_too)}
+        assert ("collision_object" in names) is is_there
+        for name in ("compute_ik", "move_action", "trajectory_execution_event"):
+            assert (name in names) is (is_there and wanted_too)
+        assert table.missing == (("moveit_msgs",) if wanted_too and not is_there else ())
