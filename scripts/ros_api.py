@@ -168,6 +168,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "active": ("~/state",),
         "change": (WORDS + "a servo topic keeps its initial control mode",),
         "close": ("the end of the messages", "~/stop"),
+        "refused": ("the node's log",),
         "result": ("~/state",),
         "set": SERVOS,
         "start": ("joint_states", "~/pose"),

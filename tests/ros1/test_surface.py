@@ -111,6 +111,7 @@ CASES = surface.CASES | hands.CASES | paths.CASES
 #: What takes longest: every run has it with the node of ROS 2.
 IN_LONG_RUN = {
     "a_collision_guard_stops_motions_and_makes_compliant",
+    "a_path_is_found_around_a_wall_and_moved_along",
     "a_trajectory_is_taught_and_replayed",
     "an_fri_session_is_opened_commanded_and_closed",
     "forward_controllers_are_followed",
