@@ -17,7 +17,7 @@ from heptarm.model.kinematics import forward
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of, pose_message
 from heptarm.ros.interface.motions import frame_in_base, pose_of
-from heptarm.ros.interface.planning.world import SceneBody, WorldDraft
+from heptarm.ros.interface.planning.world import Part, SceneBody, WorldDraft
 from heptarm.sim.collision import CollisionModel
 from heptarm.values import shape as shapes
 from heptarm.values.mesh import Mesh
@@ -160,7 +160,7 @@ def _body_of(context: NodeContext, draft: WorldDraft, message: Any, frame: Pose)
         raise CommandRejected(
             "a plane is not supported: it has no end", parameter="planes", hint="send a box as large as it is"
         )
-    parts = (
+    parts: tuple[Part, ...] = (
         *(_primitive(*one) for one in _pairs(message.primitives, message.primitive_poses, "primitive_poses")),
         *(_mesh(*one) for one in _pairs(message.meshes, message.mesh_poses, "mesh_poses")),
     )
