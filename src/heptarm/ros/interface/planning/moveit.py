@@ -390,11 +390,12 @@ def _lines(robot: RobotModel, link: Pose, begin: Array, poses: Sequence[Pose], r
         points: list[Array] = []
         for step in range(1, count + 1):
             between = here.interpolate(pose, step / count)
-            is_blocked = is_blocked or (found := _next(robot, inverse, between, q, jump)) is None
-            if is_blocked:
+            found = None if is_blocked else _next(robot, inverse, between, q, jump)
+            if found is None:
+                is_blocked = True
                 break
             q = found
-            points.append(q)
+            points.append(found)
         lines.append((points, count))
         here = pose
     return lines
