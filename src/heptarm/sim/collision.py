@@ -482,7 +482,7 @@ class _Models:
             model = compiled(self._robot, self._boxes, self._scene, carried=carried, obstacles=obstacles)
         self._made[key] = model
         for oldest in list(self._made)[:-_MOST_KEPT]:
-            del self._made[oldest]
+            self._made.pop(oldest, None)  # another thread may have done so
         return model
 
 
