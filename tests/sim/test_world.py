@@ -185,7 +185,7 @@ def test_a_scene_of_your_own_may_include_the_ready_gripper_and_wire_it(tmp_path:
 @pytest.mark.parametrize(
     ("text", "because"),
     [
-        ("nowhere.xml", "one of bins, narrow-slot, peg-in-hole, shelf, table"),
+        ("nowhere.xml", "one of bins, narrow-slot, peg-in-hole, shelf, table, two-arms"),
         ("two-finger-gripper", "must be a file"),
         ("../scenes/table", "must be a file"),
     ],
