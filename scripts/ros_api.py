@@ -66,6 +66,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "operator": ("~/operate", "see below"),
         "pad": ("see below",),
         "pause": ("~/pause",),
+        "loaded": (WORDS + "models of bodies are values of a Python program",),
         "find_path": (WORDS + "a planner such as MoveIt finds paths around bodies",),
         "plan": (WORDS + "a planner such as MoveIt previews the paths that it sends",),
         "pose": ("~/get_pose", "~/pose", "~/state"),

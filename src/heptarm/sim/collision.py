@@ -392,7 +392,9 @@ class CollisionModel(Sealed):
         view._arms = (*self._arms, OtherArm(name, model.name, place, _carried(tool, workpiece, None)))
         view._distances = view._compiled(self._distances)
         view._distances.set_arm(name, posture)
-        view._check_base(view._distances, f"{name}/link_1")  # MuJoCo has no distance of two bases, which never move
+        view._check_base(
+            view._distances, f"{name}/link_1"
+        )  # MuJoCo has no distance of two bases, which never move
         return view
 
     def set_arm(self, name: str, q: npt.ArrayLike) -> None:

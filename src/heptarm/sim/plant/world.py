@@ -150,7 +150,7 @@ def compiled(
     if origin != ORIGIN:
         _place_floor(spec, origin)
     for arm in arms:
-        _add_arm(spec, arm)
+        _add_arm(spec, arm, meshes)
     if scene is not None:
         scene.attach_to(spec, at=origin, flange=f"{tool_of}/flange" if tool_of else "flange")
     has_tool = spec.body(PREFIX + TOOL) is not None and not tool_of
@@ -190,9 +190,9 @@ def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
     body.add_camera(name=CAMERA, pos=pose.xyz, quat=np.roll(pose.quat, 1), fovy=degrees(camera.fov))
 
 
-def _add_arm(spec: mujoco.MjSpec, arm: OtherArm) -> None:
+def _add_arm(spec: mujoco.MjSpec, arm: OtherArm, meshes: ArmMeshes | None) -> None:
     """Add another arm to the world; its bodies, joints and sites are named "NAME/...", its joints come behind."""
-    other = specification(arm.robot)
+    other = specification(arm.robot, meshes)
     for one in arm.carried:
         one.add_to(other)
     for body in other.bodies[1:]:
