@@ -87,7 +87,7 @@ def test_programs_that_would_meet_are_refused_before_anything_moves(arms: ha.Arm
     left, right = arms
     world = facing(arms)
     before = [arm.wait_for_rest().q_cmd for arm in arms]
-    meet = {arm: [ha.lin_rel(x=0.18, frame="base"), ha.lin_rel(x=-0.18, frame="base")] for arm in arms}
+    meet = {arm: [ha.lin_rel(x=0.2, frame="base"), ha.lin_rel(x=-0.2, frame="base")] for arm in arms}
     with pytest.raises(
         ha.CollisionForeseen, match=r"^left: link_\d is .* right/link_\d after \d\.\d\d s"
     ) as error:
