@@ -217,9 +217,9 @@ def test_a_point_is_touched_along_an_axis(wall: ha.CollisionModel) -> None:
 def test_a_path_is_improved_by_further_states(wall: ha.CollisionModel) -> None:
     first, more, again = (
         planning.find_path(wall, start=LEFT, goal=RIGHT, seed=3, improve=improve, timeout=120.0)
-        for improve in (0, 60, 60)
+        for improve in (0, 25, 25)
     )
-    assert more.duration <= first.duration and more.stats.states >= first.stats.states + 60
+    assert more.duration <= first.duration and more.stats.states >= first.stats.states + 25
     assert more.points == again.points and is_free(wall, more)
     seen: list[tuple[int, float]] = []
     stopped = planning.find_path(
@@ -230,9 +230,9 @@ def test_a_path_is_improved_by_further_states(wall: ha.CollisionModel) -> None:
         improve=10**6,
         timeout=600.0,
         progress=lambda states, nearest: seen.append((states, nearest)),
-        stop=lambda: len(seen) > 20,
+        stop=lambda: seen[-1][0] > first.stats.states + 5,
     )
-    assert len(seen) == 21 and stopped.duration <= first.duration  # what was found so far
+    assert stopped.duration <= first.duration  # what was found so far
     assert [states for states, _ in seen] == sorted(states for states, _ in seen)
 
 
