@@ -102,6 +102,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "load": {"path": "no such file"},
     "record_client": {"path": "no folder of mine/run.mcap"},
     "Recording.__getitem__": {"name": "q"},
+    "Recording.chart": {"signals": "q"},
     "Arm.record": {"path": "no folder of mine/run.mcap"},
     "Camera": {"place": (1.5, 0.0, 1.0), "target": (0.2, 0.0, 0.5), "size": (64, 48), "frame": "base"},
     "Limits": {"q_max": np.full(7, 1.0)},

@@ -565,7 +565,7 @@ class CollisionModel(Sealed):
             ShapeError: another shape.
         """
         rows, bound = _rows(q, "q"), within(below, "below", 0.0, 1.0, unit="m")
-        return np.array([self._distances.nearest(row, bound) for row in rows])
+        return self._distances.nearest(rows, bound)
 
     def first_on(self, path: npt.ArrayLike) -> TouchOnPath | None:
         """The first place on a joint path at which two bodies touch.
@@ -614,24 +614,24 @@ class CollisionModel(Sealed):
         moved, least = self._distances.moved(change), max(self._margin, _LEAST_MARGIN)
         if not moved:
             return None
-        at, is_last = 0.0, False
-        distance = self._distances.nearest(first, self._reach(moved)) if not known else self._margin
-        while not is_last:
-            reach = min(max(distance, self._margin), self._reach((1.0 - at) * moved))
-            at += (reach + least) / moved
-            is_last = at >= 1.0
-            at = min(at, 1.0)
-            q = last if is_last else first + at * change
-            distance = self._distances.nearest(q, self._reach((1.0 - at) * moved))
+        far = max(_FAR, self._margin)
+        at, distance = 0.0, self._margin
+        if not known:
+            distance = float(self._distances.nearest(first[None], min(max(moved, self._margin), far))[0])
+        while at < 1.0:
+            at, distance = self._distances.advance(
+                *(first, change),
+                start=(at, distance),
+                margin=self._margin,
+                least=least,
+                far=far,
+                is_single=bool(known),
+            )
             if distance < self._margin or known:
-                found = self._new(q, known)
+                found = self._new(first + at * change, known)
                 if found is not None:
                     return found, at
         return None
-
-    def _reach(self, moved: float) -> float:
-        """How far it pays to look for the nearest body when points still move so far [m]."""
-        return min(max(moved, self._margin), max(_FAR, self._margin))
 
     def _new(self, q: Array, start: dict[tuple[str, str], float]) -> Clearance | None:
         """The nearest pair that touches at joint positions and did not at the start, or is nearer now."""
