@@ -113,7 +113,7 @@ class Distances:
         self._arms_at = {
             name.removesuffix("/link_0"): int(model.jnt_qposadr[model.joint(name.replace("link_0", "A1")).id])
             for name in names
-            if name.endswith("/link_0")
+            if name.endswith("/link_0") and plain(name) == name
         }
         self.arms = tuple(self._arms_at)
         self.checks = 0
@@ -293,10 +293,10 @@ class Distances:
     def nearest_of_arms(self, q: Array, below: float) -> tuple[tuple[str, str], float] | None:
         """The nearest bodies of this arm and another one, their distance [m]; None: none are nearer than `below`."""
         geoms, distances = self.pairs(q, below)
-        counts = self._is_of_arm[geoms].any(axis=1) & self.counts(geoms)
+        counts = self._is_of_arm[geoms].any(axis=1) & self._counts(geoms)
         if not counts.any():
             return None
-        index = int(np.where(counts, distances, inf).argmin())
+        index = int(np.where(counts, distances, np.inf).argmin())
         return self.named(*geoms[index].tolist()), float(distances[index])
 
     def named(self, first: int, second: int) -> tuple[str, str]:
