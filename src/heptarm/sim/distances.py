@@ -95,6 +95,7 @@ class Distances:
 
     Attributes:
         names: of all bodies, without the world.
+        arms: names of the other arms.
         free: names of the free bodies of the world.
         checks: postures computed so far.
     """
@@ -112,11 +113,19 @@ class Distances:
             if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         }
         self.free = tuple(self._free_at)
+        self._arms_at = {
+            name.removesuffix("/link_0"): int(model.jnt_qposadr[model.joint(name.replace("link_0", "A1")).id])
+            for name in names
+            if name.endswith("/link_0") and plain(name) == name
+        }
+        self.arms = tuple(self._arms_at)
         self.checks = 0
         root = int(model.body("link_0").id)  # the arm and what is mounted on it are of the tree of the base
         bodies = model.geom_bodyid.astype(int)
         is_own = model.body_rootid[bodies] == root
         is_tool = np.array([names[body] != self._bodies[body] for body in bodies.tolist()])
+        roots = [int(model.body(f"{name}/link_0").id) for name in self.arms]
+        self._is_of_arm = np.isin(model.body_rootid[bodies], roots)
         self._fixed_group = np.where(is_own, np.where(is_tool, _TOOL, _LINK), _WORLD)
         self._geom_names = [
             (self._bodies[body] if body else plain(str(model.geom(geom).name))) or "world"
@@ -166,6 +175,16 @@ class Distances:
                 at = Pose.of(model.geom_pos[geom], np.roll(model.geom_quat[geom], -1))
                 found.append(Shape(kind, _size(kind, model.geom_size[geom]), at))
         return tuple(found)
+
+    def set_arm(self, name: str, q: Array) -> None:
+        """Put another arm into a posture, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        self._data.qpos[address : address + _JOINTS] = q
+
+    def posture_of(self, name: str) -> Array:
+        """The posture of another arm, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        return self._data.qpos[address : address + _JOINTS].copy()
 
     def hold(self, held: dict[str, Pose]) -> None:
         """Let the flange carry free bodies, and nothing else; their poses in the flange frame."""
@@ -284,6 +303,15 @@ class Distances:
             *(margin, least, far, is_single, ctypes.byref(at), ctypes.byref(distance)),
         )
         return at.value, distance.value
+
+    def nearest_of_arms(self, q: Array, below: float) -> tuple[tuple[str, str], float] | None:
+        """The nearest bodies of this arm and another one, their distance [m]; None: none are nearer than `below`."""
+        geoms, distances = self.pairs(q, below)
+        counts = self._is_of_arm[geoms].any(axis=1) & self._counts(geoms)
+        if not counts.any():
+            return None
+        index = int(np.where(counts, distances, np.inf).argmin())
+        return self.named(*geoms[index].tolist()), float(distances[index])
 
     def named(self, first: int, second: int) -> tuple[str, str]:
         """Names of the bodies of two shapes, that of the arm first; both of the arm: in the order of the alphabet."""
