@@ -252,6 +252,12 @@ from .values.motion.motion import (
     hold as hold,
 )
 from .values.motion.planned_path import (
+    OnLine as OnLine,
+)
+from .values.motion.planned_path import (
+    OnPlane as OnPlane,
+)
+from .values.motion.planned_path import (
     Path as Path,
 )
 from .values.motion.planned_path import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import model, shapes
+from heptarm import model, planning, shapes
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
 from tests.simulators import FASTER
@@ -100,6 +100,18 @@ def test_a_path_begins_where_the_arm_is(arm: ha.Arm, wall: ha.CollisionModel) ->
     with pytest.raises(ha.CommandRejected, match=r"got 0\.050 rad at A\d"):
         arm.move(path)
     arm.move([ha.ptp(path.start), path])
+
+
+def test_a_path_of_another_robot_is_refused(arm: ha.Arm) -> None:
+    other = planning.find_path(ha.CollisionModel("iiwa7"), start=LEFT, goal=LEFT + 0.05)
+    with pytest.raises(
+        ha.CommandRejected, match="the path must be one of this robot, the iiwa14, got .* iiwa7"
+    ):
+        arm.move(other)
+    with pytest.raises(
+        ha.CommandRejected, match="the path must be one of this robot, the iiwa14, got .* iiwa7"
+    ):
+        arm.plan(other)
 
 
 def test_the_model_of_the_arm_is_avoided_unless_another_is_given(

@@ -92,7 +92,9 @@ def test_the_loop_estimates_it_at_the_media_flange() -> None:
     words = bench.layout.states.newest()
     assert words is not None
     state = State(words)
-    place = 0.026 * model.forward(touch, state.q)[:3, 2]  # from the plain flange, on which the torques' wrench acts
+    place = (
+        0.026 * model.forward(touch, state.q)[:3, 2]
+    )  # from the plain flange, on which the torques' wrench acts
     moment = np.array(WRENCH[3:]) - np.cross(place, WRENCH[:3])
     assert state.is_wrench_estimated
     assert state.wrench == pytest.approx(np.concatenate([WRENCH[:3], moment]), rel=0.02, abs=0.1)

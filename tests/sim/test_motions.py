@@ -192,4 +192,3 @@ def test_no_axis_is_too_fast_between_the_samples_of_a_path() -> None:
     fastest = float((np.abs(np.diff(track.q_cmd, axis=0)) * 1e3 / plant.robot.dq_max).max())
     assert 0.999 < fastest <= 1.0
     assert pose_of(plant).distance_to(goal) < 1e-3
-

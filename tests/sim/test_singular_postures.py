@@ -169,4 +169,3 @@ def test_with_an_e1_for_its_end_such_a_line_may_be_followed() -> None:
         plan(arm, motions.lin(goal), start)
     found = plan(arm, motions.lin(goal, redundancy=(float(end[2]), -1, -1)), start)
     assert found.end[2] == pytest.approx(end[2], abs=1e-6)
-

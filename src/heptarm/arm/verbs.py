@@ -48,12 +48,12 @@ from heptarm.arm.motion.servo import (
 )
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
-from heptarm.planning.search import STATES, TIMEOUT, Goal
+from heptarm.planning.search import STATES, TIMEOUT, Goal, Keep
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
 from heptarm.values.checks import array, callback, instance, integer, shown, within, word
-from heptarm.values.clearance import CollisionCheck, PlanningWorld
+from heptarm.values.clearance import CarriesTools, CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -62,7 +62,6 @@ from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.planned_path import Path as FoundPath
-from heptarm.values.motion.planned_path import Upright
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import Body, RobotModel
@@ -87,6 +86,7 @@ _TOOL_PATIENCE = 5.0
 REAL_SPEED = 0.25
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 _Arm = TypeVar("_Arm", bound="ArmVerbs")
+_Carrier = TypeVar("_Carrier")
 OnCollision: TypeAlias = Callable[[Collision], None] | None
 #: Guards of the blocks that `guarded` has begun, which FRI sessions obey, and what is called at a collision; at most
 #: one for an arm, since two would contradict each other.
@@ -548,12 +548,14 @@ class ArmVerbs(Sealed):
         goal: Goal,
         *,
         avoid: PlanningWorld | None = None,
-        keep: Upright | None = None,
+        keep: Keep | None = None,
         speed: float | None = None,
         timeout: float = TIMEOUT,
         states: int = STATES,
+        improve: int = 0,
         seed: int = 0,
         stop: Callable[[], bool] | None = None,
+        progress: Callable[[int, float], object] | None = None,
     ) -> FoundPath:
         """Find a path around bodies, from where the arm rests, with what is attached to it. Nothing moves.
 
@@ -567,12 +569,15 @@ class ArmVerbs(Sealed):
                 or several of these, of which the path reaches one.
             avoid: model of the bodies, such as a `heptarm.CollisionModel`, whose margin is kept; None:
                 `arm.collision_check`.
-            keep: constraint along the path, such as `Upright("z", within=0.1)`; None: none.
+            keep: constraint along the path, such as `Upright("z", within=0.1)`, or several of them; None: none.
             speed: ceiling for which its duration is computed, (0, 1]; the lower one of this and `arm.speed`.
             timeout: longest search [s].
             states: most joint positions that the search reaches.
+            improve: joint positions that it reaches after that in search of faster paths.
             seed: of its random numbers: the same one finds the same path in the same world.
             stop: called again and again; the search ends when it returns true.
+            progress: called again and again with the joint positions reached so far, and how near start and goal came
+                [rad].
 
         Raises:
             NoPath: none was found; the text has the bodies in the way, or how near it came.
@@ -589,9 +594,29 @@ class ArmVerbs(Sealed):
             speed=terms.speed,
             timeout=timeout,
             states=states,
+            improve=improve,
             seed=seed,
             stop=stop,
+            progress=progress,
         )
+
+    def loaded(self, model: _Carrier) -> _Carrier:
+        """A model of bodies with the shapes of what is attached to this arm, as its own checks and searches use it.
+
+        Args:
+            model: such as a `heptarm.CollisionModel`; it stays as it is.
+
+        Raises:
+            ShapeError: not a model that carries tools.
+        """
+        if not isinstance(model, CarriesTools):
+            raise ShapeError(
+                f"model must be a model of bodies that carries tools, got {shown(model)}",
+                parameter="model",
+                value=model,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
+        return self._tooling.loaded(model)
 
     @property
     def workspace(self) -> Workspace | None:

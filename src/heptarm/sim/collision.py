@@ -6,7 +6,7 @@ safety function: it knows only what its scene contains.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, require
-from heptarm.values.checks import Array, array, finite_entries, instance, numbers, shown, within
-from heptarm.values.clearance import Clearance, TouchOnPath
+from heptarm.values.checks import Array, array, finite_entries, frozen, instance, numbers, shown, within
+from heptarm.values.clearance import Clearance, ForeseenCollision, TouchOnPath
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import RobotModel
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from heptarm.sim.distances import Distances
     from heptarm.sim.plant.carried import CarriedShapes
     from heptarm.sim.plant.obstacles import Obstacle
+    from heptarm.sim.plant.other_arm import OtherArm
     from heptarm.sim.plant.scene import Scene
     from heptarm.sim.plant.world import Box
 
@@ -43,6 +44,8 @@ _LEAST_MARGIN = 1e-3
 _FAR = 0.05
 #: Most spheres of a cloud.
 _MOST_SPHERES = 5000
+#: First parts of names in compiled models, which no arm may have.
+_PREFIXES = ("scene", "tool", "workpiece", "added")
 #: Compiled models that are kept, one for each tool and workpiece that was carried lately.
 _MOST_KEPT = 8
 
@@ -97,6 +100,7 @@ class CollisionModel(Sealed):
         self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
         self._added: dict[str, Obstacle] = {}
         self._carried: tuple[CarriedShapes, ...] = ()
+        self._arms: tuple[OtherArm, ...] = ()
         try:
             made = [Box.of(text) for text in texts]
             self._models = _Models(robot, made, Scene.of(scene) if scene else None)
@@ -107,15 +111,17 @@ class CollisionModel(Sealed):
             raise CommandRejected(str(error), parameter="scene" if scene else "boxes") from None
 
     def _compiled(self, before: Distances | None = None) -> Distances:
-        """The distances of the present world; free bodies are where they were before."""
+        """The distances of the present world; free bodies and other arms are where they were before."""
         from heptarm.sim.distances import Distances
 
-        model = self._models.carrying(self._carried, tuple(self._added.values()))
+        model = self._models.compiled(self._carried, tuple(self._added.values()), self._arms)
         made = Distances(model, self._allowed)
         if before is not None:
             for name in made.free:
                 if name in before.free:
                     made.put(name, before.place_of(name))
+            for name in set(made.arms) & set(before.arms):
+                made.set_arm(name, before.posture_of(name))
         made.hold(self._held)
         return made
 
@@ -138,6 +144,11 @@ class CollisionModel(Sealed):
     def bodies(self) -> tuple[str, ...]:
         """Names of all bodies: of the arm, its tool and the scene."""
         return self._distances.names
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the other arms in the world, see `with_arm`."""
+        return tuple(one.name for one in self._arms)
 
     @property
     def checks(self) -> int:
@@ -205,15 +216,8 @@ class CollisionModel(Sealed):
     ) -> None:
         from heptarm.sim.plant.obstacles import Obstacle
 
-        instance(name, str, "name")
+        self._check_new(name)
         check_pose(at, "at")
-        if not name or "/" in name or name in ("world", *self._distances.names):
-            raise CommandRejected(
-                f"name must be a new name without a slash, got {shown(name)}",
-                parameter="name",
-                value=name,
-                hint="remove the body of that name first, or place it: bodies are listed in `bodies`",
-            )
         self._added[name] = Obstacle(name, parts, at, points, radius)
         try:
             made = self._compiled(self._distances)
@@ -224,6 +228,17 @@ class CollisionModel(Sealed):
                 raise
             raise CommandRejected(f"{name} is no body: {error}", parameter="shape", value=name) from None
         self._distances = made
+
+    def _check_new(self, name: str) -> None:
+        """Refuse a name of a body or an arm that is no new one."""
+        instance(name, str, "name")
+        if not name or "/" in name or name in ("world", *_PREFIXES, *self._distances.names, *self.arms):
+            raise CommandRejected(
+                f"name must be a new name without a slash, got {shown(name)}",
+                parameter="name",
+                value=name,
+                hint="remove the body of that name first, or place it: bodies are listed in `bodies`, arms in `arms`",
+            )
 
     def _check_base(self, made: Distances, name: str) -> None:
         """Refuse a body inside the base of the arm.
@@ -319,11 +334,192 @@ class CollisionModel(Sealed):
             instance(workpiece, (Workpiece, KnownTool), "workpiece")
         if at is not None:
             check_pose(at, "at")
-        view = copy(self)
-        view._held, view._added = dict(self._held), dict(self._added)
+        view = self._copy()
         view._carried = _carried(tool, workpiece, at)
         view._distances = view._compiled(self._distances)
         return view
+
+    def _copy(self) -> CollisionModel:
+        """A model whose later changes do not reach this one."""
+        view = copy(self)
+        view._held, view._added = dict(self._held), dict(self._added)
+        return view
+
+    # -------------------------------------------------------------------------------- other arms
+
+    def with_arm(
+        self,
+        name: str,
+        *,
+        at: Pose | None = None,
+        robot: str = "",
+        q: npt.ArrayLike | None = None,
+        tool: Tool | KnownTool | None = None,
+        workpiece: Workpiece | KnownTool | None = None,
+    ) -> CollisionModel:
+        """The same model, with the world as it is now, and another arm in it: its bodies are "NAME/link_3" and so on.
+
+        Checks and paths keep clear of it in the posture that `set_arm` gives it. `seen_by` is the same world for it.
+
+        Args:
+            name: of the arm, as of `connect_all`: a new name without a slash.
+            at: pose of its base in the base of this arm; None: where the scene has a site of that name.
+            robot: its name, such as "iiwa7"; "": as this one.
+            q: its posture, shape (7,) [rad]; None: all joints at 0.
+            tool: its tool, whose shapes it carries; None: none.
+            workpiece: what the tool holds; None: nothing.
+
+        Raises:
+            ShapeError: wrong types.
+            CommandRejected: the name is not new, no such robot, no place, or its base would be inside this one's.
+        """
+        from heptarm.sim.plant.other_arm import OtherArm
+
+        self._check_new(name)
+        place = self._models.site(name) if at is None else at
+        if place is None:
+            raise CommandRejected(
+                f"at must be the pose of the base of {name}: the scene has no site of that name, got None",
+                parameter="at",
+                value=None,
+                hint="for example at=heptarm.Pose.at(1.2, 0.0, 0.0)",
+            )
+        check_pose(place, "at")
+        model = known(instance(robot, str, "robot")) if robot else self._robot
+        posture = np.zeros(7) if q is None else array(q, 7, "q")
+        model.check(posture, "q")
+        view = self._copy()
+        view._arms = (*self._arms, OtherArm(name, model.name, place, _carried(tool, workpiece, None)))
+        view._distances = view._compiled(self._distances)
+        view._distances.set_arm(name, posture)
+        view._check_base(
+            view._distances, f"{name}/link_1"
+        )  # MuJoCo has no distance of two bases, which never move
+        return view
+
+    def set_arm(self, name: str, q: npt.ArrayLike) -> None:
+        """Put another arm into a posture, such as the one of its newest state.
+
+        Args:
+            name: of the arm.
+            q: joint positions, shape (7,) [rad].
+
+        Raises:
+            CommandRejected: there is no arm of that name.
+            ShapeError: not seven numbers.
+            LimitError: beyond the limits of its joints.
+        """
+        other = self._arm(name)
+        posture = array(q, 7, "q")
+        known(other.robot).check(posture, "q")
+        self._distances.set_arm(name, posture)
+
+    def seen_by(self, name: str, *, own: str, q: npt.ArrayLike | None = None) -> CollisionModel:
+        """The same world for another arm in it: what it checks and plans is that arm, in whose base all poses are.
+
+        Bodies that this arm holds stay where they are, and do not move with it there.
+
+        Args:
+            name: of the other arm.
+            own: name under which this arm is in that world.
+            q: posture of this arm there, shape (7,) [rad]; None: all joints at 0.
+
+        Raises:
+            CommandRejected: there is no arm of that name, or `own` is not a new one.
+            ShapeError: wrong types.
+            LimitError: beyond the limits of the joints.
+        """
+        from heptarm.sim.plant.other_arm import OtherArm
+
+        chosen = self._arm(name)
+        self._check_new(own)
+        posture = np.zeros(7) if q is None else array(q, 7, "q")
+        self._robot.check(posture, "q")
+        back = chosen.pose.inverse()
+        others = (OtherArm(one.name, one.robot, back @ one.pose, one.carried) for one in self._arms)
+        view = self._copy()
+        view._robot, view._carried, view._held = known(chosen.robot), chosen.carried, {}
+        view._arms = (
+            OtherArm(own, self._robot.name, back, self._carried),
+            *(one for one in others if one.name != name),
+        )
+        view._models = self._models.seen_by(name, view._robot.name, back, own)
+        view._distances = view._compiled()
+        view._distances.set_arm(own, posture)
+        for one in view.arms[1:]:
+            view._distances.set_arm(one, self._distances.posture_of(one))
+        for body in self._distances.free:
+            view._distances.put(body, back @ self._distances.place_of(body))
+        return view
+
+    def _arm(self, name: str) -> OtherArm:
+        instance(name, str, "name")
+        found = next((one for one in self._arms if one.name == name), None)
+        if found is None:
+            raise _unknown(name, self.arms, "another arm of the world", "name")
+        return found
+
+    def first_together(
+        self, t: npt.ArrayLike, q: npt.ArrayLike, others: Mapping[str, npt.ArrayLike]
+    ) -> ForeseenCollision | None:
+        """The first time at which this arm and another one touch, when all move; other bodies do not count.
+
+        Between two times the joints move straight. As in `first_on`, the arms are checked where they could have met,
+        by the largest movement of any point of both, so that they never meet between two checks.
+
+        Args:
+            t: times, shape (n,) [s].
+            q: joint positions of this arm at these times, shape (n, 7) [rad].
+            others: likewise of other arms, by their names; those that are not named stay as they are.
+
+        Returns:
+            The time and the nearest bodies then; None: nothing touches. Other arms are where they were then, or at the
+            end.
+
+        Raises:
+            ShapeError: wrong shapes.
+            CommandRejected: there is no arm of that name.
+        """
+        from heptarm.sim.distances import Distances
+
+        rows = {"q": _rows(q, "q")} | {name: _rows(one, name) for name, one in others.items()}
+        times = finite_entries(numbers(t, "t", "times of shape (n,)"), "t")
+        if any(times.shape != (len(one),) for one in rows.values()):
+            raise ShapeError(
+                f"t and all joint positions must have the same length, got {times.shape} and "
+                f"{[len(one) for one in rows.values()]}",
+                parameter="t",
+            )
+        path = rows.pop("q")
+        movers: dict[str, Distances] = {
+            name: Distances(_Models(self._arm(name).robot, [], None).compiled(self._arm(name).carried), ())
+            for name in rows
+        }
+        free = -1.0  # bound on the movement until which nothing can meet [m]
+        for k in range(max(1, len(path) - 1)):
+            last = min(k + 1, len(path) - 1)
+            moved = self._distances.moved(path[last] - path[k])
+            moved += max(
+                (one.moved(rows[name][last] - rows[name][k]) for name, one in movers.items()), default=0.0
+            )
+            at = 0.0
+            while free < (1.0 - at) * moved or free < 0.0 or (last == len(path) - 1 and at < 1.0):
+                at = min(1.0, at + max(free, 0.0) / moved) if moved else 1.0
+                for name, row in rows.items():
+                    self._distances.set_arm(name, row[k] + at * (row[last] - row[k]))
+                here = path[k] + at * (path[last] - path[k])
+                found = self._distances.nearest_of_arms(here, max(_FAR, self._margin))
+                if found is not None and found[1] < self._margin:
+                    return ForeseenCollision(
+                        Clearance(*found[0], found[1]),
+                        float(times[k] + at * (times[last] - times[k])),
+                        0,
+                        frozen(here),
+                    )
+                free = max(self._margin, _LEAST_MARGIN)
+                free += max(_FAR, self._margin) if found is None else found[1]
+            free -= (1.0 - at) * moved
+        return None
 
     def _check_free(self, name: str) -> None:
         instance(name, str, "body")
@@ -369,7 +565,7 @@ class CollisionModel(Sealed):
             ShapeError: another shape.
         """
         rows, bound = _rows(q, "q"), within(below, "below", 0.0, 1.0, unit="m")
-        return np.array([self._distances.nearest(row, bound) for row in rows])
+        return self._distances.nearest(rows, bound)
 
     def first_on(self, path: npt.ArrayLike) -> TouchOnPath | None:
         """The first place on a joint path at which two bodies touch.
@@ -418,24 +614,24 @@ class CollisionModel(Sealed):
         moved, least = self._distances.moved(change), max(self._margin, _LEAST_MARGIN)
         if not moved:
             return None
-        at, is_last = 0.0, False
-        distance = self._distances.nearest(first, self._reach(moved)) if not known else self._margin
-        while not is_last:
-            reach = min(max(distance, self._margin), self._reach((1.0 - at) * moved))
-            at += (reach + least) / moved
-            is_last = at >= 1.0
-            at = min(at, 1.0)
-            q = last if is_last else first + at * change
-            distance = self._distances.nearest(q, self._reach((1.0 - at) * moved))
+        far = max(_FAR, self._margin)
+        at, distance = 0.0, self._margin
+        if not known:
+            distance = float(self._distances.nearest(first[None], min(max(moved, self._margin), far))[0])
+        while at < 1.0:
+            at, distance = self._distances.advance(
+                *(first, change),
+                start=(at, distance),
+                margin=self._margin,
+                least=least,
+                far=far,
+                is_single=bool(known),
+            )
             if distance < self._margin or known:
-                found = self._new(q, known)
+                found = self._new(first + at * change, known)
                 if found is not None:
                     return found, at
         return None
-
-    def _reach(self, moved: float) -> float:
-        """How far it pays to look for the nearest body when points still move so far [m]."""
-        return min(max(moved, self._margin), max(_FAR, self._margin))
 
     def _new(self, q: Array, start: dict[tuple[str, str], float]) -> Clearance | None:
         """The nearest pair that touches at joint positions and did not at the start, or is nearer now."""
@@ -466,23 +662,65 @@ class _Models:
         robot: its name.
         boxes: fixed boxes around it.
         scene: what else is around it; None: nothing.
+        origin: pose of boxes, scene and floor in the base of the arm.
+        tool_of: the other arm that has the tool of the scene; "": this one.
     """
 
-    def __init__(self, robot: str, boxes: list[Box], scene: Scene | None) -> None:
+    def __init__(
+        self,
+        robot: str,
+        boxes: list[Box],
+        scene: Scene | None,
+        *,
+        origin: Pose = ORIGIN,
+        tool_of: str = "",
+    ) -> None:
         self._robot, self._boxes, self._scene = robot, boxes, scene
-        self._made: dict[tuple[tuple[CarriedShapes, ...], tuple[Obstacle, ...]], Any] = {}
+        self._origin, self._tool_of = origin, tool_of
+        self._made: dict[tuple[object, ...], Any] = {}
 
-    def carrying(self, carried: tuple[CarriedShapes, ...], obstacles: tuple[Obstacle, ...]) -> Any:
-        """The model of an arm that carries shapes, among bodies that were added; the last ones are kept."""
+    def site(self, name: str) -> Pose | None:
+        """Where the scene has a site of that name, in the base of the arm; None: it has none."""
+        found = None if self._scene is None else self._scene.place_of(name)
+        return None if found is None else self._origin @ found
+
+    def seen_by(self, name: str, robot: str, back: Pose, own: str) -> _Models:
+        """Models of the same world for another arm in it.
+
+        Args:
+            name: of that arm.
+            robot: its robot.
+            back: pose of the base of this arm in its base.
+            own: name of this arm there.
+        """
+        tool_of = {"": own, name: ""}.get(self._tool_of, self._tool_of)
+        return _Models(robot, self._boxes, self._scene, origin=back @ self._origin, tool_of=tool_of)
+
+    def compiled(
+        self,
+        carried: tuple[CarriedShapes, ...],
+        obstacles: tuple[Obstacle, ...] = (),
+        arms: tuple[OtherArm, ...] = (),
+    ) -> Any:
+        """The model of an arm that carries shapes, among added bodies and other arms; the last ones are kept."""
         from heptarm.sim.plant.world import compiled
 
-        key = (carried, obstacles)
+        key = (carried, obstacles, arms)
         model = self._made.pop(key, None)
         if model is None:
-            model = compiled(self._robot, self._boxes, self._scene, carried=carried, obstacles=obstacles)
+            model = compiled(
+                self._robot,
+                self._boxes,
+                self._scene,
+                carried=carried,
+                obstacles=obstacles,
+                arms=arms,
+                origin=self._origin,
+                tool_of=self._tool_of,
+            )
         self._made[key] = model
         for oldest in list(self._made)[:-_MOST_KEPT]:
-            del self._made[oldest]
+            self._made.pop(oldest, None)  # another thread may have done so
         return model
 
 
@@ -500,11 +738,11 @@ def _carried(
     return tuple(one for one in found if one.shapes)
 
 
-def _unknown(name: str, known: tuple[str, ...], what: str) -> CommandRejected:
+def _unknown(name: str, known: tuple[str, ...], what: str, parameter: str = "body") -> CommandRejected:
     listed = ", ".join(known) or "none"
     return CommandRejected(
-        f"body must be {what}, one of {listed}; got {shown(name)}",
-        parameter="body",
+        f"{parameter} must be {what}, one of {listed}; got {shown(name)}",
+        parameter=parameter,
         value=name,
         allowed=listed,
     )

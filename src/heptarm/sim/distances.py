@@ -1,18 +1,22 @@
 """Distances between the bodies of a compiled model at joint positions, and how far a movement of the joints moves them.
 
-MuJoCo computes them. Bodies of the world do not meet each other here, so that what lies on a table costs nothing.
+`native/collision.c` finds the near pairs, by boxes around the shapes, and asks MuJoCo for their distances. Bodies of
+the world do not meet each other here, so that what lies on a table costs nothing.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Collection
-from math import inf
+from functools import cache
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from heptarm._library import Unavailable, library
 from heptarm.sim.plant.carried import plain
+from heptarm.sim.plant.native import mujoco_library
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 
@@ -21,9 +25,62 @@ _WORLD, _LINK, _TOOL, _HELD = range(4)
 #: Which of them meet: the world does not meet itself, and a gripper touches what it holds.
 _MEETS = np.ones((4, 4), bool)
 _MEETS[_WORLD, _WORLD] = _MEETS[_TOOL, _HELD] = _MEETS[_HELD, _TOOL] = False
-#: Bits of a contact type that can be moved apart: MuJoCo has 32 of them, for three domains.
-_BITS = 10
+#: Shapes of a body that are tried one by one, not by a box around them.
+_FEW = 8
 _JOINTS = 7
+_POINTER, _WORD, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+#: MuJoCo's functions that are called in C.
+_CALLED = {"mj_kinematics": "kinematics", "mj_geomDistance": "distance"}
+
+
+class _Checks(ctypes.Structure):
+    """`struct checks` of native/collision.c."""
+
+    _fields_ = [
+        *[
+            (name, _POINTER)
+            for name in ["model", "data", "kinematics", "distance", "positions", "places", "turns"]
+        ],
+        *[(name, _POINTER) for name in ["flange_place", "flange_turn", "hulls", "entries"]],
+        ("count", _WORD),
+        ("all", _WORD),
+        ("grips", _POINTER),
+        ("held", _WORD),
+    ]
+
+
+#: `struct hull` and `struct grip`.
+_HULL = np.dtype(
+    [
+        *[("half", np.float64, 3), ("middle", np.float64, 3), ("radius", np.float64), ("reach", np.float64)],
+        *[("frame", np.int64), ("is_plane", np.int64)],
+    ]
+)
+_GRIP = np.dtype([("address", np.int64), ("place", np.float64, 3), ("quat", np.float64, 4)])
+
+
+@cache
+def _functions() -> ctypes.CDLL:
+    """The functions of native/collision.c.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing, or does not fit.
+    """
+    made = library()
+    made.hc_nearest.restype = None
+    made.hc_nearest.argtypes = (_POINTER, _WORD, _POINTER, _REAL, _POINTER)
+    made.hc_advance.restype = _WORD
+    made.hc_advance.argtypes = (
+        *(_POINTER, _POINTER, _POINTER),
+        *(_REAL, _REAL, _REAL, _REAL, ctypes.c_int),
+        *(_POINTER, _POINTER),
+    )
+    made.hc_pairs.restype = _WORD
+    made.hc_pairs.argtypes = (_POINTER, _POINTER, _REAL, _POINTER, _POINTER)
+    made.hc_size.restype = _WORD
+    if made.hc_size() != ctypes.sizeof(_Checks):
+        raise Unavailable(f"`struct checks` must have {ctypes.sizeof(_Checks)} bytes, got {made.hc_size()}")
+    return made
 
 
 class Distances:
@@ -35,14 +92,13 @@ class Distances:
 
     Attributes:
         names: of all bodies, without the world.
+        arms: names of the other arms.
         free: names of the free bodies of the world.
         checks: postures computed so far.
     """
 
     def __init__(self, model: mujoco.MjModel, allowed: Collection[frozenset[str]]) -> None:
         self._model = model = model.__copy__()
-        # several contacts of two shapes help a simulation; their distances may all be larger than the true one
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
         self._data = mujoco.MjData(model)
         self._open_gripper()
         names = [str(model.body(body).name) for body in range(model.nbody)]
@@ -54,11 +110,19 @@ class Distances:
             if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         }
         self.free = tuple(self._free_at)
+        self._arms_at = {
+            name.removesuffix("/link_0"): int(model.jnt_qposadr[model.joint(name.replace("link_0", "A1")).id])
+            for name in names
+            if name.endswith("/link_0") and plain(name) == name
+        }
+        self.arms = tuple(self._arms_at)
         self.checks = 0
         root = int(model.body("link_0").id)  # the arm and what is mounted on it are of the tree of the base
         bodies = model.geom_bodyid.astype(int)
         is_own = model.body_rootid[bodies] == root
         is_tool = np.array([names[body] != self._bodies[body] for body in bodies.tolist()])
+        roots = [int(model.body(f"{name}/link_0").id) for name in self.arms]
+        self._is_of_arm = np.isin(model.body_rootid[bodies], roots)
         self._fixed_group = np.where(is_own, np.where(is_tool, _TOOL, _LINK), _WORLD)
         self._geom_names = [
             (self._bodies[body] if body else plain(str(model.geom(geom).name))) or "world"
@@ -68,11 +132,11 @@ class Distances:
         labels = np.array([known.index(name) for name in self._geom_names])
         may_touch = np.array([[frozenset((a, b)) in allowed for b in known] for a in known])
         self._forbidden = ~may_touch[np.ix_(labels, labels)] if may_touch.any() else None
-        self._types = model.geom_contype.copy(), model.geom_conaffinity.copy()
-        self._below = -1.0
+        self._boxes = _Boxes(model, _hulls(model))
         self._flange = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange"))
         self._measure()
         self._held: dict[str, Pose] = {}
+        self._group = np.zeros(0, int)
         self.hold({})
 
     def _open_gripper(self) -> None:
@@ -98,6 +162,16 @@ class Distances:
             self._data.qpos[address : address + 3], np.roll(self._data.qpos[address + 3 : address + 7], -1)
         )
 
+    def set_arm(self, name: str, q: Array) -> None:
+        """Put another arm into a posture, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        self._data.qpos[address : address + _JOINTS] = q
+
+    def posture_of(self, name: str) -> Array:
+        """The posture of another arm, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        return self._data.qpos[address : address + _JOINTS].copy()
+
     def hold(self, held: dict[str, Pose]) -> None:
         """Let the flange carry free bodies, and nothing else; their poses in the flange frame."""
         model = self._model
@@ -105,12 +179,44 @@ class Distances:
         is_held = np.array([self._bodies[int(body)] in held for body in model.geom_bodyid], bool) & (
             self._fixed_group == _WORLD
         )
-        self._group = np.where(is_held, _HELD, self._fixed_group)
-        self._separate(self._group != _WORLD)
+        group = np.where(is_held, _HELD, self._fixed_group)
+        if not np.array_equal(group, self._group):
+            self._group = group
+            self._meet()
         self._levers = self._own_levers
         if held:
             found = [self._lever(self._in_flange(geom), geom) for geom in np.flatnonzero(is_held).tolist()]
             self._levers = np.vstack([self._own_levers, *found])
+        self._prepare()
+
+    def _meet(self) -> None:
+        """Which pairs of shapes meet: first those that may not touch, then the others."""
+        pairs = _candidates(self._model, self._group != _WORLD)
+        pairs = pairs[_MEETS[self._group[pairs[:, 0]], self._group[pairs[:, 1]]]]
+        counts = self._counts(pairs)
+        parts = self._boxes.entries(pairs[counts]), self._boxes.entries(pairs[~counts])
+        self._entries, self._count, self._hulls = np.concatenate(parts), len(parts[0]), self._boxes.hulls
+        self._found = np.empty((len(pairs), 2), np.int32), np.empty(len(pairs))
+
+    def _prepare(self) -> None:
+        """What the functions in C need to know: the shapes that meet, and what the flange carries."""
+        model, data, memory = self._model, self._data, _Checks()
+        grips = np.array(
+            [(self._free_at[name], pose.xyz, pose.quat) for name, pose in self._held.items()], _GRIP
+        )
+        place, turn = data.site_xpos[self._flange], data.site_xmat[self._flange]
+        memory.model, memory.data = model._address, data._address
+        shown = mujoco_library(_CALLED)
+        for name, member in _CALLED.items():
+            setattr(memory, member, ctypes.cast(getattr(shown, name), _POINTER).value)
+        memory.positions, memory.places = data.qpos.ctypes.data, data.geom_xpos.ctypes.data
+        memory.turns = data.geom_xmat.ctypes.data
+        memory.flange_place, memory.flange_turn = place.ctypes.data, turn.ctypes.data
+        memory.hulls, memory.entries = self._hulls.ctypes.data, self._entries.ctypes.data
+        memory.count, memory.all = self._count, len(self._entries)
+        memory.grips, memory.held = grips.ctypes.data, len(grips)
+        self._grips = grips
+        self._memory = memory
 
     def _in_flange(self, geom: int) -> Array:
         """Where a shape of a held body is in the base at the posture of the levers, shape (3,) [m]."""
@@ -118,67 +224,80 @@ class Distances:
         middle = Pose.of(self._model.geom_pos[geom])  # in its body, which has the free joint
         return (self._flange_pose @ self._held[name] @ middle).xyz
 
-    def _separate(self, is_own: npt.NDArray[np.bool_]) -> None:
-        """Move the bits of contact types so that shapes of the world meet none of the world."""
-        model, (kind, meets) = self._model, self._types
-        if max(kind.max(), meets.max()) >= 1 << _BITS:
-            return  # too many kinds: all meet, and what does not count is left out later
-        # own to world in the first domain, world to own in the second, own to own in the third
-        model.geom_contype[:] = np.where(is_own, kind | kind << 2 * _BITS, kind << _BITS)
-        model.geom_conaffinity[:] = np.where(is_own, meets << _BITS | meets << 2 * _BITS, meets)
-        for of_body, of_geom in (
-            (model.body_contype, model.geom_contype),
-            (model.body_conaffinity, model.geom_conaffinity),
-        ):
-            of_body[:] = 0
-            np.bitwise_or.at(of_body, model.geom_bodyid, of_geom)
-
-    # ---------------------------------------------------------------------------------- distances
-
-    def pairs(self, q: Array, below: float) -> tuple[npt.NDArray[np.int32], Array]:
-        """Pairs of shapes nearer than a distance [m] at joint positions, shapes (n, 2) and (n,) [m].
-
-        Pairs that may touch are among them, see `counts`.
-        """
-        model, data = self._model, self._data
-        if below != self._below:  # of the narrow and of the broad phase
-            model.geom_margin[:] = model.body_margin[:] = self._below = below
-        data.qpos[:_JOINTS] = q
-        mujoco.mj_kinematics(model, data)
-        if self._held:
-            self._carry()
-        mujoco.mj_collision(model, data)
-        self.checks += 1
-        if not data.ncon:
-            return _NO_PAIRS
-        contact = data.contact
-        geoms, distances = contact.geom, contact.dist
-        group = self._group
-        counts = _MEETS[group[geoms[:, 0]], group[geoms[:, 1]]] & (distances <= below)
-        return geoms[counts], distances[counts]
-
-    def _carry(self) -> None:
-        """Move what is held with the flange."""
-        at, quat = self._data.site_xpos[self._flange], np.zeros(4)
-        mujoco.mju_mat2Quat(quat, self._data.site_xmat[self._flange])
-        flange = Pose.of(at, np.roll(quat, -1))
-        for name, pose in self._held.items():
-            self.put(name, flange @ pose)
-        mujoco.mj_kinematics(self._model, self._data)
-
-    def counts(self, geoms: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
+    def _counts(self, geoms: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
         """Which of n pairs of shapes may not touch, shape (n,)."""
         if self._forbidden is None:
             return np.ones(len(geoms), bool)
         counted: npt.NDArray[np.bool_] = self._forbidden[geoms[:, 0], geoms[:, 1]]
         return counted
 
-    def nearest(self, q: Array, below: float) -> float:
-        """Distance of the nearest two bodies that may not touch [m]; infinite: none are nearer than `below`."""
+    # ---------------------------------------------------------------------------------- distances
+
+    def pairs(self, q: Array, below: float) -> tuple[npt.NDArray[np.int32], Array]:
+        """Pairs of shapes nearer than a distance at joint positions, also those that may touch: (n, 2) and (n,) [m]."""
+        given, (shapes, distances) = np.ascontiguousarray(q, float), self._found
+        count = _functions().hc_pairs(
+            *(ctypes.byref(self._memory), given.ctypes.data, below),
+            *(shapes.ctypes.data, distances.ctypes.data),
+        )
+        self.checks += 1
+        return shapes[:count].copy(), distances[:count].copy()
+
+    def nearest(self, q: Array, below: float) -> Array:
+        """Distance of the nearest two bodies that may not touch, in n postures, shape (n,) [m].
+
+        Args:
+            q: joint positions, shape (n, 7) [rad].
+            below: largest distance that is computed [m]; where none are nearer it is infinite.
+        """
+        given, result = np.ascontiguousarray(q, float), np.empty(len(q))
+        _functions().hc_nearest(
+            ctypes.byref(self._memory), len(given), given.ctypes.data, below, result.ctypes.data
+        )
+        self.checks += len(given)
+        return result
+
+    def advance(
+        self,
+        first: Array,
+        change: Array,
+        *,
+        start: tuple[float, float],
+        margin: float,
+        least: float,
+        far: float,
+        is_single: bool,
+    ) -> tuple[float, float]:
+        """Move on along a straight path until two bodies are nearer than a margin, or to its end.
+
+        Args:
+            first: joint positions at its beginning, shape (7,) [rad].
+            change: of the joints along it, shape (7,) [rad].
+            start: fraction of the path from which it moves on, and the distance there [m].
+            margin: nearer bodies touch [m].
+            least: what a point may move beyond the distance in a step [m].
+            far: bodies are looked for so far [m].
+            is_single: move by one step only.
+
+        Returns:
+            The fraction at which it ends, and the distance there [m]; infinite: none are near.
+        """
+        begin, along = np.ascontiguousarray(first, float), np.ascontiguousarray(change, float)
+        at, distance = _REAL(start[0]), _REAL(start[1])
+        self.checks += _functions().hc_advance(
+            *(ctypes.byref(self._memory), begin.ctypes.data, along.ctypes.data, self.moved(along)),
+            *(margin, least, far, is_single, ctypes.byref(at), ctypes.byref(distance)),
+        )
+        return at.value, distance.value
+
+    def nearest_of_arms(self, q: Array, below: float) -> tuple[tuple[str, str], float] | None:
+        """The nearest bodies of this arm and another one, their distance [m]; None: none are nearer than `below`."""
         geoms, distances = self.pairs(q, below)
-        if len(distances) and self._forbidden is not None:
-            distances = distances[self.counts(geoms)]
-        return float(distances.min()) if len(distances) else inf
+        counts = self._is_of_arm[geoms].any(axis=1) & self._counts(geoms)
+        if not counts.any():
+            return None
+        index = int(np.where(counts, distances, np.inf).argmin())
+        return self.named(*geoms[index].tolist()), float(distances[index])
 
     def named(self, first: int, second: int) -> tuple[str, str]:
         """Names of the bodies of two shapes, that of the arm first; both of the arm: in the order of the alphabet."""
@@ -249,11 +368,127 @@ class Distances:
         return float(np.linalg.norm(np.cross(point - self._anchors[joint], self._axes[joint])))
 
 
-_NO_PAIRS = (np.zeros((0, 2), np.int32), np.zeros(0))
-
-
 def _quaternion(matrix: Array) -> Array:
     """Quaternion x y z w of MuJoCo's rotation matrix, shape (4,)."""
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, matrix)
     return np.roll(quat, -1)
+
+
+def _hulls(model: mujoco.MjModel) -> npt.NDArray[np.void]:
+    """`struct hull` of each shape: a box with rounded edges around it.
+
+    Raises:
+        ValueError: a kind of shape whose distances MuJoCo does not compute reliably.
+    """
+    kinds = mujoco.mjtGeom
+    result = np.zeros(model.ngeom, _HULL)
+    result["half"], result["middle"] = model.geom_aabb[:, 3:], model.geom_aabb[:, :3]
+    result["reach"], result["frame"] = model.geom_rbound, np.arange(model.ngeom)
+    for geom, kind in enumerate(model.geom_type.tolist()):
+        radius, length = model.geom_size[geom, :2].tolist()
+        if kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
+            half = 0.0 if kind == kinds.mjGEOM_SPHERE else length
+            result[geom]["half"], result[geom]["middle"], result[geom]["radius"] = (
+                (0.0, 0.0, half),
+                0.0,
+                radius,
+            )
+        elif kind == kinds.mjGEOM_PLANE:
+            result[geom]["is_plane"] = True
+        elif kind not in (kinds.mjGEOM_CYLINDER, kinds.mjGEOM_BOX, kinds.mjGEOM_MESH, kinds.mjGEOM_ELLIPSOID):
+            name = plain(model.geom(geom).name or model.body(model.geom_bodyid[geom]).name) or "of the world"
+            raise ValueError(
+                f"a scene must have no height field and no signed distance field to compute distances, got geom {name};"
+                " add heptarm.shapes.height_map instead, or boxes and meshes"
+            )
+    return result
+
+
+def _candidates(model: mujoco.MjModel, is_own: npt.NDArray[np.bool_]) -> npt.NDArray[np.int32]:
+    """Pairs of shapes that MuJoCo lets meet by the rules of the model, the first one of the arm's, shape (n, 2)."""
+    first, second = (
+        side.ravel() for side in np.meshgrid(np.flatnonzero(is_own), np.arange(model.ngeom), indexing="ij")
+    )
+    once = ~is_own[second] | (first < second)
+    first, second = first[once], second[once]
+    kind, meets, body = model.geom_contype, model.geom_conaffinity, model.geom_bodyid.astype(int)
+    does = ((kind[first] & meets[second]) | (kind[second] & meets[first])) != 0
+    marks = np.stack([body[first] << 16 | body[second], body[second] << 16 | body[first]])
+    does &= ~np.isin(marks, model.exclude_signature).any(axis=0)
+    welded, above = model.body_weldid, model.body_weldid[model.body_parentid]
+    one, other = welded[body[first]], welded[body[second]]
+    does &= one != other
+    if not model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
+        does &= ~((one != 0) & (other != 0) & ((one == above[other]) | (other == above[one])))
+    listed = np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]), axis=1)
+    ordered = np.sort(np.column_stack([first, second]), axis=1)
+    for pair in listed:
+        does |= (ordered == pair).all(axis=1)
+    return np.asarray(np.column_stack([first, second])[does], np.int32)
+
+
+class _Boxes:
+    """Pairs of shapes in the order in which they are tried: a box around many shapes of a body before each of them.
+
+    Args:
+        model: MuJoCo's.
+        hulls: of its shapes.
+    """
+
+    def __init__(self, model: mujoco.MjModel, hulls: npt.NDArray[np.void]) -> None:
+        self._bodies, self._own, self._around = model.geom_bodyid, hulls, list[npt.NDArray[np.void]]()
+        self._trees: dict[bytes, npt.NDArray[np.int32]] = {}
+        self._turns = np.empty((model.ngeom, 3, 3))
+        for turn, quat in zip(self._turns, model.geom_quat):
+            mujoco.mju_quat2Mat(turn.reshape(-1), quat)
+        self._places = model.geom_pos  # in the body, as the turns
+        self._middles = self._places + np.einsum("nij,nj->ni", self._turns, hulls["middle"])
+
+    @property
+    def hulls(self) -> npt.NDArray[np.void]:
+        """Hulls of the shapes, then those around several."""
+        return np.concatenate([self._own, *self._around])
+
+    def entries(self, pairs: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+        """`struct entry` of pairs of shapes, which are ordered by the first one, shape (n, 3)."""
+        found = [np.zeros((0, 3), np.int32)]
+        for firsts in np.split(pairs, np.flatnonzero(np.diff(pairs[:, 0])) + 1):
+            # a plane has an entry of its own, as if it were a body
+            others = firsts[:, 1]
+            bodies = np.where(self._own["is_plane"][others] != 0, -1 - others, self._bodies[others])
+            for body in set(bodies.tolist()):
+                tree = self._tree(others[bodies == body])
+                found += [np.column_stack([np.full(len(tree), firsts[0, 0]), tree])]
+        return np.concatenate(found, dtype=np.int32)
+
+    def _tree(self, geoms: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+        """Entries of shapes of one body, without the first shapes, shape (n, 2)."""
+        key = geoms.tobytes()
+        if key not in self._trees:
+            made = np.column_stack([geoms, np.ones(len(geoms), np.int32)])
+            if len(geoms) > _FEW:
+                middles = self._middles[geoms]
+                order = geoms[middles[:, np.ptp(middles, axis=0).argmax()].argsort(kind="stable")]
+                half = len(order) // 2
+                parts = self._tree(order[:half]), self._tree(order[half:])
+                top = (self._hull(geoms), 1 + sum(map(len, parts)))
+                made = np.concatenate([[top], *parts], dtype=np.int32)
+            self._trees[key] = made
+        return self._trees[key]
+
+    def _hull(self, geoms: npt.NDArray[np.int32]) -> int:
+        """Make a hull around shapes of one body; returns its index."""
+        middles = self._middles[geoms]
+        inner = 0.5 * (middles.min(axis=0) + middles.max(axis=0))
+        frame = int(geoms[((self._places[geoms] - inner) ** 2).sum(axis=1).argmin()])
+        turn = self._turns[frame]
+        centres = (middles - self._places[frame]) @ turn
+        halves = np.abs(turn.T @ self._turns[geoms]) @ self._own["half"][geoms][:, :, None]
+        extents = halves[:, :, 0] + self._own["radius"][geoms][:, None]
+        low, high = (centres - extents).min(axis=0), (centres + extents).max(axis=0)
+        made = np.zeros(1, _HULL)
+        made["half"], made["middle"] = 0.5 * (high - low), 0.5 * (low + high)
+        made["reach"], made["frame"] = np.linalg.norm(np.maximum(np.abs(low), np.abs(high))), frame
+        self._around.append(made)
+        return len(self._own) + len(self._around) - 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, runtime_checkable
 
@@ -112,6 +113,30 @@ class PlanningWorld(Protocol):
 
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
+
+
+@runtime_checkable
+class WorldOfArms(Protocol):
+    """What a check of programs of several arms needs; `heptarm.CollisionModel` is one."""
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the other arms in the world."""
+
+    def carrying(
+        self,
+        tool: KnownTool | None,
+        workpiece: Workpiece | KnownTool | None = None,
+        *,
+        at: Pose | None = None,
+    ) -> WorldOfArms:
+        """The same world, of an arm that carries a tool and a workpiece."""
+
+    def seen_by(self, name: str, *, own: str) -> WorldOfArms:
+        """The same world for another arm in it, where this one has the name `own`."""
+
+    def first_together(self, t: Array, q: Array, others: Mapping[str, Array]) -> ForeseenCollision | None:
+        """The first time at which this arm and another one touch, when they move; None: nothing touches."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,12 +20,12 @@ from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, Sha
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
-from heptarm.planning.search import Goal, find_path
+from heptarm.planning.search import Goal, Keep, find_path
 from heptarm.values.checks import Array, frozen, shown
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, PlanningWorld, TouchOnPath
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.motion import Motion
-from heptarm.values.motion.planned_path import Path, Upright
+from heptarm.values.motion.planned_path import Path
 from heptarm.values.pose import quaternion
 from heptarm.values.state import State
 from heptarm.values.tool import unknown
@@ -138,12 +138,14 @@ class Foresight:
         goal: Goal,
         *,
         avoid: PlanningWorld | None,
-        keep: Upright | None,
+        keep: Keep | None,
         speed: float,
         timeout: float,
         states: int,
+        improve: int,
         seed: int,
         stop: Callable[[], bool] | None,
+        progress: Callable[[int, float], object] | None,
     ) -> Path:
         """Find a path from where the arm rests; see `Arm.find_path`."""
         world = self.check if avoid is None else avoid
@@ -171,8 +173,10 @@ class Foresight:
             speed=speed,
             timeout=timeout,
             states=states,
+            improve=improve,
             seed=seed,
             stop=stop,
+            progress=progress,
         )
         # it is checked with what the arm carries when it is sent, and with the world as it is then
         return replace(found, world=world)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -53,6 +54,8 @@ from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
 from heptarm.wire import messages as wire
+
+_log = logging.getLogger("heptarm.arm")
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -672,6 +675,12 @@ class Servo(Block):
         self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
 
     @property
+    def refused(self) -> int:
+        """Targets so far that the arm was not sent to: refused by the cabinet, by its last report, or held here."""
+        stats = self.stats
+        return stats.refused + stats.held
+
+    @property
     def stats(self) -> ServoStats:
         """Statistics so far; also after the block."""
         seconds = (self._last_sent - self._first_sent) * 1e-9
@@ -857,6 +866,8 @@ class PoseServo(Servo):
         except Unreachable as error:
             self._held += 1
             reason = self._reason(pose) or f"out of reach: {error.text}"
+            if not self._slowdowns:  # the first one; the others are counted
+                _log.warning("servo motion: a target is not sent, the arm is held: %s", reason)
             self._slowdown = self._slowdowns[reason] = Slowdown(reason, 0.0)
             return
         if (

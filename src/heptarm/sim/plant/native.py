@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
@@ -87,14 +88,17 @@ CONSTANTS: dict[str, int] = {
 }
 
 
-def _mujoco() -> ctypes.CDLL:
+def mujoco_library(names: Iterable[str]) -> ctypes.CDLL:
     """MuJoCo's library, in which its module for Python has its functions.
 
+    Args:
+        names: of what it has to show.
+
     Raises:
-        Unavailable: it does not show the ones that a tick calls.
+        Unavailable: it does not show all of them.
     """
     library = ctypes.CDLL(mujoco._functions.__file__)
-    missing = [name for name in (*_CALLED, "mjcb_time") if not hasattr(library, name)]
+    missing = [name for name in names if not hasattr(library, name)]
     if missing:
         raise Unavailable(f"MuJoCo {mujoco.__version__} shows no {', '.join(missing)}")
     return library
@@ -121,7 +125,7 @@ def tick_library() -> ctypes.CDLL:
     if made.ht_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct tick` must have {ctypes.sizeof(_Memory)} bytes, got {made.ht_size()}")
     if mujoco.get_mjcb_time() is None:
-        clock = _POINTER.in_dll(_mujoco(), "mjcb_time")
+        clock = _POINTER.in_dll(mujoco_library(["mjcb_time"]), "mjcb_time")
         clock.value = ctypes.cast(made.ht_no_clock, _POINTER).value
     return made
 
@@ -162,7 +166,7 @@ class NativeTick:
         numbers, vector, product = constants(robot), np.zeros(model.nv), np.zeros(model.nv)
         self._kept = (model, data, shared, ranges, arm, numbers, vector, product)
         memory.model, memory.data = model._address, data._address
-        functions = _mujoco()
+        functions = mujoco_library(_CALLED)
         for name, member in _CALLED.items():
             setattr(memory, member, ctypes.cast(getattr(functions, name), _POINTER).value)
         memory.memory = shared.header.ctypes.data - 8 * HeaderWords.SECTION.start
