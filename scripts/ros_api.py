@@ -66,6 +66,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "operator": ("~/operate", "see below"),
         "pad": ("see below",),
         "pause": ("~/pause",),
+        "loaded": (WORDS + "models of bodies are values of a Python program",),
         "find_path": ("~/plan", "~/plan_and_execute"),
         "plan": ("~/plan", "of paths around bodies; other planners preview the paths that they send"),
         "pose": ("~/get_pose", "~/pose", "~/state"),

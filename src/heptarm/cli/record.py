@@ -43,7 +43,7 @@ CameraFrame = Annotated[
 CameraScene = Annotated[
     str | None,
     Parameter(
-        help="What is around the arm: table, peg-in-hole, bins, shelf, narrow-slot, or a file (MJCF); "
+        help="What is around the arm: table, peg-in-hole, bins, shelf, narrow-slot, two-arms, or a file (MJCF); "
         "nothing of it moves."
     ),
 ]

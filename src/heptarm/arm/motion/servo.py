@@ -534,8 +534,21 @@ class Servo(Block):
         handle = self._handle = MotionHandle.send(
             self._connection, self._message, until=self._terms.until, breaks=self._terms.breaks
         )
-        if not handle.wait_started(_PATIENCE):
+        try:
+            self._wait_until_started(handle)
+        except BaseException:  # there will be no targets
             handle.cancel()
+            raise
+        self._warm_up_socket = WarmUpConnection()
+        self._began = self._due = self._last = self._clock.nanos()
+        self._number, self._active = handle.id, True
+        self._connection.enter_block(handle, "arm.servo()")
+        handle.add_done_callback(self._on_end)
+        return self
+
+    def _wait_until_started(self, handle: MotionHandle) -> None:
+        """Wait until the motion runs and its start is known; raises what keeps it from that."""
+        if not handle.wait_started(_PATIENCE):
             raise Timeout(
                 f"the servo motion did not begin within {_PATIENCE:g} s",
                 hint="check in arm.state.safety whether the robot is ready to move, or paused",
@@ -547,17 +560,7 @@ class Servo(Block):
         self._start = self._connection.wait_for(
             lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
         )
-        try:
-            self._clear = self._check_of_targets()
-        except BaseException:  # of the model: there will be no targets
-            handle.cancel()
-            raise
-        self._warm_up_socket = WarmUpConnection()
-        self._began = self._due = self._last = self._clock.nanos()
-        self._number, self._active = handle.id, True
-        self._connection.enter_block(handle, "arm.servo()")
-        handle.add_done_callback(self._on_end)
-        return self
+        self._clear = self._check_of_targets()
 
     def _check_of_targets(self) -> ClearTargets | None:
         """What refuses targets near bodies; None: nothing."""

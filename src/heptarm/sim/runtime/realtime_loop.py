@@ -178,8 +178,7 @@ class RealtimeLoop:
         rest: Rest | None = None,
         at_once: int = 1,
     ) -> None:
-        self.allowed = at_once
-        self._at_once = min(at_once, max(1, int(speed))) if speed > 0 else at_once
+        self.allowed = self._at_once = min(at_once, max(1, int(speed))) if speed > 0 else at_once
         self._shared, self._rest, self._real_time = shared, rest, real_time
         self.is_real_time = False
         self._rested = 0
@@ -310,9 +309,10 @@ class RealtimeLoop:
             # who waits for every tick does so only after the last one's state
             is_early = gap == 0 and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
             early = int(self._early) if is_early else 0
-            start = max(due - early, end + gap)
+            planned = due - early
             if more and not (gap or is_early) and now < due:
-                start += min(more, max(0, int(header[HeaderWords.WAKE]) - moment) // TICK_NS) * period
+                planned += min(more, (int(header[HeaderWords.WAKE]) - moment) // TICK_NS) * period
+            start = max(planned, end + gap)
             if now < start:
                 exact = 0 if is_early else spin
                 if start - now > exact:
@@ -326,15 +326,18 @@ class RealtimeLoop:
                     continue
             begin, is_second = now_ns(), False
             awaited = awaited + 1 if header[HeaderWords.WAKE] <= moment else 0
-            self.allowed = 1 if gap else 1 + min(more, max(0, begin - due) // period)
+            ticks = 1
+            if more:
+                self.allowed = 1 if gap else 1 + min(more, max(0, begin - due) // period)
             self._tick()
             end = now_ns()
-            ticks = max(1, int(header[HeaderWords.NEWEST]) - moment // TICK_NS + 1) if more else 1
+            if more:
+                ticks = max(1, int(header[HeaderWords.NEWEST]) - moment // TICK_NS + 1)
             if is_early:
                 spare = due - WAKING_NS - end
                 self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
             moment += ticks * TICK_NS
-            self._record(begin - max(start, due - early), end - begin, ticks)
+            self._record(begin - planned, end - begin, ticks)
             due += ticks * period
             if rest is not None and rest.begins():
                 self._pass_rest(rest)
