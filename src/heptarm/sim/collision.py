@@ -396,7 +396,7 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: not pairs of names.
         """
-        view = self._copied()
+        view = self._copy()
         view._allowed = self._allowed | _pairs(pairs)
         view._distances = view._compiled(self._distances)
         return view
@@ -430,9 +430,16 @@ class CollisionModel(Sealed):
             instance(workpiece, (Workpiece, KnownTool), "workpiece")
         if at is not None:
             check_pose(at, "at")
-        view = self._copied()
+        view = self._copy()
         view._carried = _carried(tool, workpiece, at)
         view._distances = view._compiled(self._distances)
+        return view
+
+    def _copy(self) -> CollisionModel:
+        """A model whose later changes do not reach this one."""
+        view = copy(self)
+        view._lock = threading.Condition(threading.RLock())
+        view._held, view._added = dict(self._held), dict(self._added)
         return view
 
     # -------------------------------------------------------------------------------- other arms
@@ -479,7 +486,7 @@ class CollisionModel(Sealed):
         model = known(instance(robot, str, "robot")) if robot else self._robot
         posture = np.zeros(7) if q is None else array(q, 7, "q")
         model.check(posture, "q")
-        view = self._copied()
+        view = self._copy()
         view._arms = (*self._arms, OtherArm(name, model.name, place, _carried(tool, workpiece, None)))
         view._distances = view._compiled(self._distances)
         view._distances.set_arm(name, posture)
@@ -530,7 +537,7 @@ class CollisionModel(Sealed):
         self._robot.check(posture, "q")
         back = chosen.pose.inverse()
         others = (OtherArm(one.name, one.robot, back @ one.pose, one.carried) for one in self._arms)
-        view = self._copied()
+        view = self._copy()
         view._robot, view._carried, view._held = known(chosen.robot), chosen.carried, {}
         view._arms = (
             OtherArm(own, self._robot.name, back, self._carried),
@@ -614,13 +621,6 @@ class CollisionModel(Sealed):
                 free += max(_FAR, self._margin) if found is None else found[1]
             free -= (1.0 - at) * moved
         return None
-
-    def _copied(self) -> CollisionModel:
-        """A copy of which what is in the world can be changed."""
-        view = copy(self)
-        view._lock = threading.Condition(threading.RLock())
-        view._held, view._added = dict(self._held), dict(self._added)
-        return view
 
     def _check_free(self, name: str) -> None:
         instance(name, str, "body")
@@ -781,8 +781,8 @@ class _Models:
         tool_of: str = "",
     ) -> None:
         self._robot, self._boxes, self._scene = robot, boxes, scene
-        self._origin, self._tool_of = origin, tool_of
         self._lock = threading.Lock()  # models of the same world share this in several threads
+        self._origin, self._tool_of = origin, tool_of
         self._made: dict[tuple[object, ...], Any] = {}
 
     def site(self, name: str) -> Pose | None:
