@@ -241,6 +241,8 @@ REPORTS = (
         "Collision",
         "CompiledLaw",
         "Contact",
+        "Detour",
+        "FollowedPath",
         "ForeseenCollision",
         "Fri",
         "Gripper",

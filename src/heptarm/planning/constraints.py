@@ -91,7 +91,8 @@ class Constraints:
     def deviations(self, q: Array) -> Array:
         """Largest deviation at n joint positions, in tolerances: more than 1 violates a constraint; shape (n,)."""
         xyz, turns = self._tools(q)
-        return np.max([part.deviations(part.offsets(xyz, turns, q)) for part in self._parts], axis=0)
+        worst: Array = np.max([part.deviations(part.offsets(xyz, turns, q)) for part in self._parts], axis=0)
+        return worst
 
     def is_kept(self, q: Array) -> bool:
         """Whether joint positions keep that part of the tolerances which the search may use."""
