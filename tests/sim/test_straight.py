@@ -359,4 +359,3 @@ def test_stretched_upwards_with_a3_turned_wild_targets_end_nothing() -> None:
     for goal in [*goals, start @ Pose.xyz_abc(a=np.pi), start]:
         followed(plant, lambda goal=goal: goal, 30)  # type: ignore[misc]
     assert ear.causes == ["started"]
-
