@@ -55,143 +55,39 @@ class Meaning(NamedTuple):
 
 
 MEANINGS: dict[int, Meaning] = {
-    1: Meaning(
-        "LimitError",
-        "a number is NaN or infinite",
-        "send a finite number; only fields that say so accept NaN",
-    ),
-    2: Meaning(
-        "LimitError", "a value is outside its range", "keep the value within the range named in the message"
-    ),
-    3: Meaning(
-        "ShapeError",
-        "a text or a list has the wrong length",
-        "keep the length within the range named in the message",
-    ),
-    4: Meaning("ShapeError", "a quaternion is not of unit length", "divide it by its norm"),
-    5: Meaning(
-        "CommandRejected",
-        "the nodes of a condition do not form one expression",
-        "build conditions with heptarm.when",
-    ),
-    10: Meaning(
-        "RemoteProtocolError",
-        "bytes on the port are not a heptarm frame",
-        "check that the other side speaks heptarm",
-    ),
-    11: Meaning(
-        "RemoteProtocolError",
-        "the body of a frame cannot be decoded",
-        "check that both sides have the same version",
-    ),
-    12: Meaning(
-        "RemoteProtocolError",
-        "the message id is not known here",
-        "check that both sides have the same version",
-    ),
-    13: Meaning(
-        "RemoteProtocolError",
-        "the message is not legal in this state of the session",
-        "send Hello first, and send each handshake message once",
-    ),
-    14: Meaning(
-        "VersionMismatch",
-        "the major versions of the protocol differ",
-        "install matching versions: pip install heptarm, then heptarm install-cabinet",
-    ),
-    15: Meaning(
-        "ConnectFailed",
-        "the pre-shared key is wrong or missing",
-        "use the key that the cabinet's process data names",
-    ),
-    16: Meaning(
-        "ConnectFailed",
-        "the client's address is not on the cabinet's allow-list",
-        "add the address to the process data heptarm.allow",
-    ),
-    17: Meaning("ConnectFailed", "the cabinet serves as many clients as it can", "close another client"),
-    18: Meaning(
-        "ConnectionLost",
-        "the client does not read its subscribed state fast enough",
-        "subscribe at a lower rate or read faster",
-    ),
-    19: Meaning(
-        "ConnectionLost",
-        "nothing was received from the other side within the heartbeat time",
-        "check the network and the load of both machines",
-    ),
-    20: Meaning("ConnectionLost", "the cabinet application ends", "start it again on the smartPAD"),
-    21: Meaning(
-        "ConnectionLost",
-        "a frame was forged, changed, repeated, reordered or lost between the two sides",
-        "check who else is on the network, then connect again",
-    ),
-    30: Meaning("NotInControl", "this client does not control the robot", "take control first"),
-    31: Meaning(
-        "NotInControl", "another client controls the robot", "wait until it releases control, or observe"
-    ),
-    40: Meaning(
-        "CommandRejected",
-        "this cabinet cannot do that",
-        "see the capabilities of the cabinet, and install the option that is missing",
-    ),
-    41: Meaning(
-        "ModeConflict",
-        "something else is running",
-        'wait for it, cancel it, or use when="replace" or when="queue"',
-    ),
-    42: Meaning(
-        "CommandRejected",
-        "no frame, tool, signal or process data of that name",
-        "check the spelling of the name",
-    ),
-    43: Meaning(
-        "CommandRejected",
-        "no motion of that id is running or queued",
-        "it may have ended already; see its result",
-    ),
-    44: Meaning(
-        "ModeConflict",
-        "the control mode and the command do not go together",
-        "choose a combination that the guide lists",
-    ),
-    45: Meaning("ModeConflict", "too many programs are waiting", "wait for some of them to finish"),
-    50: Meaning(
-        "LimitError",
-        "a joint target is outside the robot's limits",
-        "keep each joint within the range named in the message",
-    ),
-    51: Meaning(
-        "LimitError",
-        "the target cannot be reached",
-        "bring the target nearer, or change its orientation or redundancy",
-    ),
-    52: Meaning(
-        "MotionAborted",
-        "the cabinet cannot plan the motion",
-        "check the path for limits and singularities, or use a PTP",
-    ),
-    53: Meaning(
-        "MotionAborted",
-        "the cabinet could not carry out the motion",
-        "read the cabinet's text; check load data, contact and limits",
-    ),
-    60: Meaning("NotReady", "the robot is not ready to move", "see the safety state"),
-    61: Meaning(
-        "NeedsOperator", "the operator has to act at the smartPAD", "follow the steps in the message"
-    ),
-    62: Meaning("SafetyStop", "a safety function stopped the robot", "clear its cause, then recover"),
-    63: Meaning(
-        "ConnectionLost",
-        "the controlling client was lost; the arm was stopped",
-        "connect again and take control; a client that is busy for longer needs a longer watchdog: connect(..., watchdog=2.0)",
-    ),
-    64: Meaning(
-        "Starved",
-        "no servo target arrived within its watchdog time",
-        "send targets more often, or allow a longer watchdog time",
-    ),
-    70: Meaning(
-        "MotionAborted", "the cabinet application met an unexpected error", "report it with the cabinet's log"
-    ),
+    1: Meaning('LimitError', 'a number is NaN or infinite', 'send a finite number; only fields that say so accept NaN'),
+    2: Meaning('LimitError', 'a value is outside its range', 'keep the value within the range named in the message'),
+    3: Meaning('ShapeError', 'a text or a list has the wrong length', 'keep the length within the range named in the message'),
+    4: Meaning('ShapeError', 'a quaternion is not of unit length', 'divide it by its norm'),
+    5: Meaning('CommandRejected', 'the nodes of a condition do not form one expression', 'build conditions with heptarm.when'),
+    10: Meaning('RemoteProtocolError', 'bytes on the port are not a heptarm frame', 'check that the other side speaks heptarm'),
+    11: Meaning('RemoteProtocolError', 'the body of a frame cannot be decoded', 'check that both sides have the same version'),
+    12: Meaning('RemoteProtocolError', 'the message id is not known here', 'check that both sides have the same version'),
+    13: Meaning('RemoteProtocolError', 'the message is not legal in this state of the session', 'send Hello first, and send each handshake message once'),
+    14: Meaning('VersionMismatch', 'the major versions of the protocol differ', 'install matching versions: pip install heptarm, then heptarm install-cabinet'),
+    15: Meaning('ConnectFailed', 'the pre-shared key is wrong or missing', "use the key that the cabinet's process data names"),
+    16: Meaning('ConnectFailed', "the client's address is not on the cabinet's allow-list", 'add the address to the process data heptarm.allow'),
+    17: Meaning('ConnectFailed', 'the cabinet serves as many clients as it can', 'close another client'),
+    18: Meaning('ConnectionLost', 'the client does not read its subscribed state fast enough', 'subscribe at a lower rate or read faster'),
+    19: Meaning('ConnectionLost', 'nothing was received from the other side within the heartbeat time', 'check the network and the load of both machines'),
+    20: Meaning('ConnectionLost', 'the cabinet application ends', 'start it again on the smartPAD'),
+    21: Meaning('ConnectionLost', 'a frame was forged, changed, repeated, reordered or lost between the two sides', 'check who else is on the network, then connect again'),
+    30: Meaning('NotInControl', 'this client does not control the robot', 'take control first'),
+    31: Meaning('NotInControl', 'another client controls the robot', 'wait until it releases control, or observe'),
+    40: Meaning('CommandRejected', 'this cabinet cannot do that', 'see the capabilities of the cabinet, and install the option that is missing'),
+    41: Meaning('ModeConflict', 'something else is running', 'wait for it, cancel it, or use when="replace" or when="queue"'),
+    42: Meaning('CommandRejected', 'no frame, tool, signal or process data of that name', 'check the spelling of the name'),
+    43: Meaning('CommandRejected', 'no motion of that id is running or queued', 'it may have ended already; see its result'),
+    44: Meaning('ModeConflict', 'the control mode and the command do not go together', 'choose a combination that the guide lists'),
+    45: Meaning('ModeConflict', 'too many programs are waiting', 'wait for some of them to finish'),
+    50: Meaning('LimitError', "a joint target is outside the robot's limits", 'keep each joint within the range named in the message'),
+    51: Meaning('LimitError', 'the target cannot be reached', 'bring the target nearer, or change its orientation or redundancy'),
+    52: Meaning('MotionAborted', 'the cabinet cannot plan the motion', 'check the path for limits and singularities, or use a PTP'),
+    53: Meaning('MotionAborted', 'the cabinet could not carry out the motion', "read the cabinet's text; check load data, contact and limits"),
+    60: Meaning('NotReady', 'the robot is not ready to move', 'see the safety state'),
+    61: Meaning('NeedsOperator', 'the operator has to act at the smartPAD', 'follow the steps in the message'),
+    62: Meaning('SafetyStop', 'a safety function stopped the robot', 'clear its cause, then recover'),
+    63: Meaning('ConnectionLost', 'the controlling client was lost; the arm was stopped', 'connect again and take control; a client that is busy for longer needs a longer watchdog: connect(..., watchdog=2.0)'),
+    64: Meaning('Starved', 'no servo target arrived within its watchdog time', 'send targets more often, or allow a longer watchdog time'),
+    70: Meaning('MotionAborted', 'the cabinet application met an unexpected error', "report it with the cabinet's log"),
 }
