@@ -10,7 +10,7 @@ from heptarm.sim.runtime import jvm
 
 
 @pytest.mark.parametrize(
-    ("release", "says", "is_taken"),
+    ("release", "output", "is_taken"),
     [
         ('IMPLEMENTOR="Debian"\nJAVA_VERSION="17.0.21"\n', "", True),
         ('JAVA_VERSION="25.0.2"\n', "", True),
@@ -23,12 +23,12 @@ from heptarm.sim.runtime import jvm
     ids=["17", "25", "11", "8", "21 without a release file", "8 without a release file", "something else"],
 )
 def test_a_java_that_is_new_enough_is_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, release: str | None, says: str, is_taken: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, release: str | None, output: str, is_taken: bool
 ) -> None:
-    """Its own file tells its version; where there is none, it is asked."""
+    """Its own file states its version; where there is none, Java is asked."""
     java = tmp_path / "bin" / "java"
     java.parent.mkdir()
-    java.write_text(f"#!/bin/sh\ncat >&2 <<END\n{says}\nEND\n" if says else "#!/bin/sh\nexit 1\n")
+    java.write_text(f"#!/bin/sh\ncat >&2 <<END\n{output}\nEND\n" if output else "#!/bin/sh\nexit 1\n")
     java.chmod(0o755)
     if release is not None:
         (tmp_path / "release").write_text(release)

@@ -16,7 +16,17 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, require
-from heptarm.values.checks import Array, array, finite_entries, frozen, instance, numbers, shown, within
+from heptarm.values.checks import (
+    Array,
+    array,
+    finite_entries,
+    frozen,
+    instance,
+    integer,
+    numbers,
+    shown,
+    within,
+)
 from heptarm.values.clearance import Clearance, ForeseenCollision, TouchOnPath
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose
@@ -195,9 +205,15 @@ class CollisionModel(Sealed):
 
         Returns:
             The revision now: the same if nothing has changed.
+
+        Raises:
+            ShapeError: not numbers.
+            LimitError: one is outside its range.
         """
+        before = integer(revision, "revision", 0, 2**63)
+        longest = within(timeout, "timeout", 0.0, 3600.0, unit="s")
         with self._lock:
-            self._lock.wait_for(lambda: self._revision != revision, timeout)
+            self._lock.wait_for(lambda: self._revision != before, longest)
             return self._revision
 
     @_changes
@@ -424,12 +440,6 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: wrong types.
         """
-        if tool is not None:
-            instance(tool, (Tool, KnownTool), "tool")
-        if workpiece is not None:
-            instance(workpiece, (Workpiece, KnownTool), "workpiece")
-        if at is not None:
-            check_pose(at, "at")
         view = self._copy()
         view._carried = _carried(tool, workpiece, at)
         view._distances = view._compiled(self._distances)
@@ -483,7 +493,8 @@ class CollisionModel(Sealed):
                 hint="for example at=heptarm.Pose.at(1.2, 0.0, 0.0)",
             )
         check_pose(place, "at")
-        model = known(instance(robot, str, "robot")) if robot else self._robot
+        instance(robot, str, "robot")
+        model = known(robot) if robot else self._robot
         posture = np.zeros(7) if q is None else array(q, 7, "q")
         model.check(posture, "q")
         view = self._copy()
@@ -583,6 +594,7 @@ class CollisionModel(Sealed):
         """
         from heptarm.sim.distances import Distances
 
+        instance(others, Mapping, "others")
         rows = {"q": _rows(q, "q")} | {name: _rows(one, name) for name, one in others.items()}
         times = finite_entries(numbers(t, "t", "times of shape (n,)"), "t")
         if any(times.shape != (len(one),) for one in rows.values()):
@@ -834,9 +846,19 @@ class _Models:
 def _carried(
     tool: Tool | KnownTool | None, workpiece: Workpiece | KnownTool | None, at: Pose | None
 ) -> tuple[CarriedShapes, ...]:
-    """The shapes of a tool and of what it holds, as they are on the flange."""
+    """The shapes of a tool and of what it holds, as they are on the flange.
+
+    Raises:
+        ShapeError: wrong types.
+    """
     from heptarm.sim.plant.carried import CarriedShapes
 
+    if tool is not None:
+        instance(tool, (Tool, KnownTool), "tool")
+    if workpiece is not None:
+        instance(workpiece, (Workpiece, KnownTool), "workpiece")
+    if at is not None:
+        check_pose(at, "at")
     origin = Pose.of((0.0, 0.0, 0.0))
     found = [] if tool is None else [CarriedShapes(tool.name, tool.shapes, origin, is_tool=True)]
     if workpiece is not None:

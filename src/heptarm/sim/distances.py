@@ -165,6 +165,16 @@ class Distances:
             self._data.qpos[address : address + 3], np.roll(self._data.qpos[address + 3 : address + 7], -1)
         )
 
+    def set_arm(self, name: str, q: Array) -> None:
+        """Put another arm into a posture, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        self._data.qpos[address : address + _JOINTS] = q
+
+    def posture_of(self, name: str) -> Array:
+        """The posture of another arm, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        return np.array(self._data.qpos[address : address + _JOINTS])
+
     def shapes_of(self, name: str) -> tuple[Shape, ...]:
         """Shapes of a body in its frame; those that are no box, cylinder, sphere or capsule are left out."""
         model = self._model
@@ -175,16 +185,6 @@ class Distances:
                 at = Pose.of(model.geom_pos[geom], np.roll(model.geom_quat[geom], -1))
                 found.append(Shape(kind, _size(kind, model.geom_size[geom]), at))
         return tuple(found)
-
-    def set_arm(self, name: str, q: Array) -> None:
-        """Put another arm into a posture, shape (7,) [rad]."""
-        address = self._arms_at[name]
-        self._data.qpos[address : address + _JOINTS] = q
-
-    def posture_of(self, name: str) -> Array:
-        """The posture of another arm, shape (7,) [rad]."""
-        address = self._arms_at[name]
-        return self._data.qpos[address : address + _JOINTS].copy()
 
     def hold(self, held: dict[str, Pose]) -> None:
         """Let the flange carry free bodies, and nothing else; their poses in the flange frame."""
