@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -16,6 +16,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import Arm, shapes
+from heptarm.values.motion.motion import Motion
 from tests.retry import held_up, retry
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
@@ -96,7 +97,7 @@ def test_programs_that_would_meet_are_refused_before_anything_moves(arms: ha.Arm
     for arm, q in zip(arms, before, strict=True):
         assert arm.state.q_cmd == pytest.approx(q, abs=1e-9) and not arm.state.safety.paused
     # one alone has room, and with a tool that reaches across there is none
-    turns = {left: meet[left], right: ha.hold(0.1)}
+    turns: dict[ha.Arm, Motion | Sequence[Motion]] = {left: meet[left], right: ha.hold(0.1)}
     rod = ha.Tool("rod", shapes=[shapes.cylinder(0.02, 0.9, at=ha.Pose.at(0.0, 0.0, 0.45))])
     assert ha.start_together(turns, collision_check=world).wait()[left].arrived
     with right.tool(rod), pytest.raises(ha.CollisionForeseen, match="right/rod"):

@@ -160,7 +160,10 @@ def test_constraints_are_combined_and_a_workspace_is_one() -> None:
     joints = np.array([IIWA.q_min, IIWA.q_max])
     joints[:, 3] = -1.7, -1.0
     box = ((0.0, -0.6, 0.0), (0.7, 0.6, ONE[2] + 0.02))
-    keep = [ha.Upright("z", within=0.3), ha.Workspace(box=box, joints=joints)]
+    keep: list[ha.Upright | ha.Workspace] = [
+        ha.Upright("z", within=0.3),
+        ha.Workspace(box=box, joints=joints),
+    ]
     path = planning.find_path(FREE, start=LEFT, goal=RIGHT, keep=keep, timeout=120.0)
     assert tilts(path) <= 0.3 and tips(path)[:, 2].max() <= ONE[2] + 0.02
     assert path.curve[:, 3].min() >= -1.7 and path.curve[:, 3].max() <= -1.0

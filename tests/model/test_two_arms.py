@@ -40,7 +40,9 @@ def least_of(q: Array, other: Array) -> float:
         for name in ("link_0", "right/link_0")
     )
     return min(
-        mujoco.mj_geomDistance(made, data, a, b, 5.0, None) for a in own.tolist() for b in others.tolist()
+        float(mujoco.mj_geomDistance(made, data, a, b, 5.0, None))
+        for a in own.tolist()
+        for b in others.tolist()
     )
 
 

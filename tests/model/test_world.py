@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +140,50 @@ def test_adding_a_body_leaves_the_others_where_they_are() -> None:
     assert before
     table.add("post", shapes.cylinder(0.02, 0.4), at=Pose.at(-0.5, 0.0, 0.2))
     assert [one for one in table.clearances(near, below=0.3) if one.second == "cube"] == before
+
+
+def test_changes_of_a_world_are_counted_and_waited_for(world: ha.CollisionModel) -> None:
+    before = world.revision
+    world.add("ball", shapes.sphere(0.1), at=Pose.at(1.0, 0.0, 0.5))
+    world.place("ball", Pose.at(1.0, 0.5, 0.5))
+    world.hold("ball", Pose.at(0.0, 0.0, 0.2))
+    world.release("ball")
+    view = world.carrying(None)
+    assert world.revision == view.revision == before + 4
+    world.remove("ball")
+    assert (world.revision, view.revision) == (before + 5, before + 4)
+    with pytest.raises(ha.CommandRejected):
+        world.remove("ball")
+    assert world.wait_for_change(before + 5, timeout=0.0) == before + 5  # a refused change is none
+    ended = threading.Thread(target=world.add_points, args=([[1.0, 0.0, 0.5]],))
+    ended.start()
+    assert world.wait_for_change(before + 5, timeout=60.0) == before + 6
+    ended.join()
+
+
+def test_a_world_is_changed_while_other_threads_check_it(world: ha.CollisionModel) -> None:
+    world.add("ball", shapes.sphere(0.1), at=Pose.at(0.0, 0.0, 1.4))
+    touch, free, q = Pose.at(0.0, 0.0, 1.4), Pose.at(0.0, 0.0, 3.0), np.zeros((20, 7))
+    ended = threading.Event()
+
+    def change() -> None:
+        for number in range(200):
+            world.place("ball", free if number % 2 == 0 else touch)
+            if number % 50 == 0:
+                world.add(
+                    f"post {number}", shapes.box(0.1, 0.1, 0.1), at=Pose.at(-1.0, 0.0, 0.5 + 0.001 * number)
+                )
+        ended.set()
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    seen = set()
+    while not ended.is_set():
+        distances = world.distances(q, below=0.05)
+        assert (distances == distances[0]).all()  # all of one check are of one world
+        seen.add(bool(np.isfinite(distances[0])))
+    thread.join()
+    assert seen and world.distances(q, below=0.05)[0] < 0.0
 
 
 def test_many_postures_at_once_agree_with_each_alone(world: ha.CollisionModel) -> None:

@@ -328,7 +328,7 @@ def test_moveits_names_are_offered_on_request_where_its_types_are_installed(
         monkeypatch.setattr(f"heptarm.ros.interface.{module}.is_installed", lambda _: is_there)
     for wanted_too in (True, False):
         table = offered(NodeConfiguration.of({"moveit": wanted_too}).values)
-        names = {row.name for row in (*table.topics, *table.services)}
+        names = {row.name for row in table.topics} | {row.name for row in table.services}
         names |= {row.name for row in offered_actions("heptarm", with_moveit=wanted_too)}
         assert ("collision_object" in names) is is_there
         for name in ("compute_ik", "move_action", "trajectory_execution_event"):

@@ -11,6 +11,8 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from math import inf
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar, overload
@@ -29,6 +31,7 @@ from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import load_check, program_request
+from heptarm.arm.motion.following import FollowedPath, FollowTerms, PathFollower
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
@@ -53,7 +56,7 @@ from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
 from heptarm.values.checks import array, callback, instance, integer, shown, within, word
-from heptarm.values.clearance import CarriesTools, CollisionCheck, PlanningWorld
+from heptarm.values.clearance import CarriesTools, ChangingWorld, CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -599,6 +602,84 @@ class ArmVerbs(Sealed):
             stop=stop,
             progress=progress,
         )
+
+    def follow(
+        self,
+        path: FoundPath,
+        *,
+        watch: ChangingWorld | None = None,
+        mode: Mode | None = None,
+        speed: float | None = None,
+        until: Condition | None = None,
+        then: Reaction | None = None,
+        timeout: float | None = None,
+        stop: Callable[[], bool] | None = None,
+        on_progress: Callable[[float], object] | None = None,
+    ) -> FollowedPath:
+        """Move along a path through a world that changes, and go around what comes into the way.
+
+        Another thread adds, places and removes bodies of `watch`. At each change the rest of the path is checked. Where
+        bodies would touch, the arm brakes on its path at once, holds its position, and goes on along a new path: to
+        the goal for which the first one was found, under the same constraint, with the same seed. What comes nearer
+        than the arm needs to brake, it cannot avoid. It is no safety function.
+
+        Args:
+            path: found by `find_path`, from where the arm rests.
+            watch: model of the bodies, such as a `heptarm.CollisionModel`; None: that of the path.
+            mode: see `move`.
+            speed: ceiling, (0, 1].
+            until: break condition, see `move`; it ends the whole.
+            then: see `move`.
+            timeout: longest time for all of it [s]; None: any.
+            stop: called again and again; the arm brakes on its path and stays when it returns true.
+            on_progress: called again and again with the completed fraction of the present path, [0, 1].
+
+        Returns:
+            How it ended, and the new paths.
+
+        Raises:
+            NoPath: there is no way any more, and the arm has braked; `reason` as in `find_path`.
+            MotionAborted: ended early, also while the arm held its position.
+            ModeConflict: another motion runs; or as in `move`.
+            Timeout: not ended in time; the arm was stopped.
+            CommandRejected: refused before anything moved, as in `move` and `find_path`.
+        """
+        instance(path, FoundPath, "path", hint="find one: arm.find_path(goal, avoid=world)")
+        world = path.world if watch is None else watch
+        if not isinstance(world, ChangingWorld):
+            raise ShapeError(
+                f"watch must be a model of bodies, got {shown(world)}",
+                parameter="watch",
+                value=world,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
+        limit = inf if timeout is None else check_timeout(timeout)
+        terms = self._terms(mode=mode, speed=speed, until=until, then=then)
+        link = self._connection
+        link.check_may_wait("arm.follow()")
+        link.check_no_block("arm.follow()")
+        search = partial(
+            self._foresight.find_path,
+            path.goal,
+            avoid=world,
+            keep=path.keep or None,
+            speed=terms.speed,
+            timeout=TIMEOUT,
+            states=STATES,
+            improve=0,
+            seed=path.stats.seed,
+            progress=None,
+        )
+        follow_terms = FollowTerms(
+            world=world,
+            search=search,
+            send=lambda motion, *, when: self._send((motion,), replace(terms, when=when)),
+            timeout=limit,
+            stop=(lambda: False) if stop is None else callback(stop, "stop"),
+            on_progress=(lambda _: None) if on_progress is None else callback(on_progress, "on_progress"),
+        )
+        with link.stopping_on_interrupt():
+            return PathFollower(link, self._tooling, follow_terms).follow(replace(path, world=world))
 
     def loaded(self, model: _Carrier) -> _Carrier:
         """A model of bodies with the shapes of what is attached to this arm, as its own checks and searches use it.

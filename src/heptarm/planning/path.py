@@ -58,7 +58,11 @@ class Sequential:
     __slots__ = ()
 
     line = None
-    keeps_a3 = False
+
+    @property
+    def keeps_a3(self) -> bool:
+        """See `JointPath`."""
+        return False
 
 
 class CartesianPath(Sequential):

@@ -137,6 +137,8 @@ def find_path(
         duration=spline.duration,
         clearance=search.nearest_on(spline.curve),
         stats=stats,
+        goal=tuple(_each(goal)),
+        keep=tuple(constraints_of(keep)),
         world=world,
     )
 

@@ -6,15 +6,27 @@ safety function: it knows only what its scene contains.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, require
-from heptarm.values.checks import Array, array, finite_entries, frozen, instance, numbers, shown, within
+from heptarm.values.checks import (
+    Array,
+    array,
+    finite_entries,
+    frozen,
+    instance,
+    integer,
+    numbers,
+    shown,
+    within,
+)
 from heptarm.values.clearance import Clearance, ForeseenCollision, TouchOnPath
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose
@@ -48,6 +60,31 @@ _MOST_SPHERES = 5000
 _PREFIXES = ("scene", "tool", "workpiece", "added")
 #: Compiled models that are kept, one for each tool and workpiece that was carried lately.
 _MOST_KEPT = 8
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
+
+def _alone(method: _Method) -> _Method:
+    """A method during which no other thread reads or changes the model: MuJoCo computes in one set of arrays."""
+
+    @wraps(method)
+    def alone(self: CollisionModel, *args: Any, **kwargs: Any) -> Any:
+        with self._lock:
+            return method(self, *args, **kwargs)
+
+    return cast(_Method, alone)
+
+
+def _changes(method: _Method) -> _Method:
+    """A method that changes the world, alone; threads that wait for a change wake."""
+
+    @wraps(method)
+    def changes(self: CollisionModel, *args: Any, **kwargs: Any) -> None:
+        with self._lock:
+            method(self, *args, **kwargs)
+            self._revision += 1
+            self._lock.notify_all()
+
+    return cast(_Method, changes)
 
 
 class CollisionModel(Sealed):
@@ -57,6 +94,8 @@ class CollisionModel(Sealed):
     where its file has them, unless you `place` or `hold` them; others can be added and removed while a program runs.
 
     A gripper counts as open, as wide as it gets.
+
+    Its methods may be called from any thread: one that watches a camera changes the world while another one plans.
 
     Args:
         robot: name of the robot, such as "iiwa14".
@@ -82,21 +121,16 @@ class CollisionModel(Sealed):
         instance(robot, str, "robot")
         instance(scene, str, "scene")
         texts = [instance(text, str, "boxes") for text in _listed(boxes, "boxes")]
-        pairs = [tuple(_listed(pair, "allowed")) for pair in _listed(allowed, "allowed")]
-        if any(len(pair) != 2 or not all(isinstance(name, str) for name in pair) for pair in pairs):
-            raise ShapeError(
-                f"allowed must be pairs of names of bodies, got {shown(allowed)}",
-                parameter="allowed",
-                value=allowed,
-                hint='for example [("tool", "table")]',
-            )
+        pairs = _pairs(allowed)
         require("mujoco", extra="sim")
         from heptarm.sim.plant.scene import Scene
         from heptarm.sim.plant.world import Box
 
         self._robot = known(robot)
         self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
-        self._allowed = frozenset(frozenset(pair) for pair in pairs)
+        self._allowed = pairs
+        self._lock = threading.Condition(threading.RLock())
+        self._revision = 0
         self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
         self._added: dict[str, Obstacle] = {}
         self._carried: tuple[CarriedShapes, ...] = ()
@@ -157,6 +191,32 @@ class CollisionModel(Sealed):
 
     # --------------------------------------------------------------------------------- the world
 
+    @property
+    def revision(self) -> int:
+        """Counts the changes of the world: bodies that were added, removed, placed, held or released."""
+        return self._revision
+
+    def wait_for_change(self, revision: int, *, timeout: float) -> int:
+        """Wait until the world has changed since a revision.
+
+        Args:
+            revision: as `revision` was.
+            timeout: longest wait [s].
+
+        Returns:
+            The revision now: the same if nothing has changed.
+
+        Raises:
+            ShapeError: not numbers.
+            LimitError: one is outside its range.
+        """
+        before = integer(revision, "revision", 0, 2**63)
+        longest = within(timeout, "timeout", 0.0, 3600.0, unit="s")
+        with self._lock:
+            self._lock.wait_for(lambda: self._revision != before, longest)
+            return self._revision
+
+    @_changes
     def add(self, name: str, shape: Shape | Mesh | Sequence[Shape | Mesh], *, at: Pose = ORIGIN) -> None:
         """Add a body to the world. It can be placed, held and removed.
 
@@ -176,6 +236,7 @@ class CollisionModel(Sealed):
         parts: tuple[Shape | Mesh, ...] = tuple(instance(one, (Shape, Mesh), "shape") for one in given)
         self._add(name, parts, np.zeros((0, 3)), 0.0, at)
 
+    @_changes
     def add_points(
         self, cloud: npt.ArrayLike, *, radius: float = POINT_RADIUS, name: str = "points", at: Pose = ORIGIN
     ) -> None:
@@ -257,6 +318,7 @@ class CollisionModel(Sealed):
                     hint="give its pose in the base of the arm [m], or leave out the points on the arm itself",
                 )
 
+    @_changes
     def remove(self, body: str) -> None:
         """Remove a body that was added.
 
@@ -270,6 +332,7 @@ class CollisionModel(Sealed):
         self._held.pop(body, None)
         self._distances = self._compiled(self._distances)
 
+    @_changes
     def place(self, body: str, pose: Pose) -> None:
         """Put a free body of the scene, or one that was added, somewhere: its pose in the base.
 
@@ -282,6 +345,7 @@ class CollisionModel(Sealed):
             self._distances.hold(self._held)
         self._distances.put(body, pose)
 
+    @_changes
     def hold(self, body: str, pose: Pose) -> None:
         """Let the arm hold a free body: from now on it moves with the flange, and may touch the tool.
 
@@ -297,6 +361,7 @@ class CollisionModel(Sealed):
         self._held[body] = pose
         self._distances.hold(self._held)
 
+    @_changes
     def release(self, body: str) -> None:
         """Let the arm hold a body no more; it stays where it was in the last check. See `place`.
 
@@ -307,6 +372,52 @@ class CollisionModel(Sealed):
         self._held.pop(body, None)
         self._distances.hold(self._held)
 
+    @_alone
+    def pose(self, body: str) -> Pose:
+        """Pose of a free body, or of one that was added, in the base; of one that is held: at the last check.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._distances.place_of(body)
+
+    @_alone
+    def held(self, body: str) -> Pose | None:
+        """Pose in the flange frame of a free body that the arm holds; None: the arm does not hold it.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._held.get(body)
+
+    @_alone
+    def shapes(self, body: str) -> tuple[Shape, ...]:
+        """Shapes of a free body, or of one that was added, in its frame; meshes are left out.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._distances.shapes_of(body)
+
+    @_alone
+    def allowing(self, pairs: Iterable[tuple[str, str]]) -> CollisionModel:
+        """The same model, with the world as it is now, in which more pairs of bodies may touch.
+
+        Args:
+            pairs: names of bodies, such as ("part_1", "table").
+
+        Raises:
+            ShapeError: not pairs of names.
+        """
+        view = self._copy()
+        view._allowed = self._allowed | _pairs(pairs)
+        view._distances = view._compiled(self._distances)
+        return view
+
+    @_alone
     def carrying(
         self,
         tool: Tool | KnownTool | None,
@@ -318,7 +429,8 @@ class CollisionModel(Sealed):
 
         Their shapes are bodies with their names, mounted on the flange. They, the flange and the link before it count
         as neighbours. Where the scene has a tool of its own, that one is on the flange, and the shapes of `tool` are
-        not used. An arm does this by itself with what is attached to it.
+        not used. An arm does this by itself with what is attached to it. Later changes of either do not reach the
+        other; its `revision` begins as that of the world it was made from.
 
         Args:
             tool: the tool; None: none.
@@ -328,12 +440,6 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: wrong types.
         """
-        if tool is not None:
-            instance(tool, (Tool, KnownTool), "tool")
-        if workpiece is not None:
-            instance(workpiece, (Workpiece, KnownTool), "workpiece")
-        if at is not None:
-            check_pose(at, "at")
         view = self._copy()
         view._carried = _carried(tool, workpiece, at)
         view._distances = view._compiled(self._distances)
@@ -342,11 +448,13 @@ class CollisionModel(Sealed):
     def _copy(self) -> CollisionModel:
         """A model whose later changes do not reach this one."""
         view = copy(self)
+        view._lock = threading.Condition(threading.RLock())
         view._held, view._added = dict(self._held), dict(self._added)
         return view
 
     # -------------------------------------------------------------------------------- other arms
 
+    @_alone
     def with_arm(
         self,
         name: str,
@@ -385,7 +493,8 @@ class CollisionModel(Sealed):
                 hint="for example at=heptarm.Pose.at(1.2, 0.0, 0.0)",
             )
         check_pose(place, "at")
-        model = known(instance(robot, str, "robot")) if robot else self._robot
+        instance(robot, str, "robot")
+        model = known(robot) if robot else self._robot
         posture = np.zeros(7) if q is None else array(q, 7, "q")
         model.check(posture, "q")
         view = self._copy()
@@ -397,6 +506,7 @@ class CollisionModel(Sealed):
         )  # MuJoCo has no distance of two bases, which never move
         return view
 
+    @_changes
     def set_arm(self, name: str, q: npt.ArrayLike) -> None:
         """Put another arm into a posture, such as the one of its newest state.
 
@@ -414,6 +524,7 @@ class CollisionModel(Sealed):
         known(other.robot).check(posture, "q")
         self._distances.set_arm(name, posture)
 
+    @_alone
     def seen_by(self, name: str, *, own: str, q: npt.ArrayLike | None = None) -> CollisionModel:
         """The same world for another arm in it: what it checks and plans is that arm, in whose base all poses are.
 
@@ -459,6 +570,7 @@ class CollisionModel(Sealed):
             raise _unknown(name, self.arms, "another arm of the world", "name")
         return found
 
+    @_alone
     def first_together(
         self, t: npt.ArrayLike, q: npt.ArrayLike, others: Mapping[str, npt.ArrayLike]
     ) -> ForeseenCollision | None:
@@ -482,6 +594,7 @@ class CollisionModel(Sealed):
         """
         from heptarm.sim.distances import Distances
 
+        instance(others, Mapping, "others")
         rows = {"q": _rows(q, "q")} | {name: _rows(one, name) for name, one in others.items()}
         times = finite_entries(numbers(t, "t", "times of shape (n,)"), "t")
         if any(times.shape != (len(one),) for one in rows.values()):
@@ -528,6 +641,7 @@ class CollisionModel(Sealed):
 
     # ------------------------------------------------------------------------------------ checks
 
+    @_alone
     def clearances(self, q: npt.ArrayLike, *, below: float = NEAR) -> tuple[Clearance, ...]:
         """Pairs of bodies that are near each other at joint positions, the nearest first.
 
@@ -543,6 +657,7 @@ class CollisionModel(Sealed):
         """
         return self._clearances(array(q, 7, "q"), within(below, "below", 0.0, 1.0, unit="m"))
 
+    @_alone
     def touching(self, q: npt.ArrayLike) -> tuple[Clearance, ...]:
         """Pairs of bodies that touch at joint positions: nearer than `margin`, and not allowed to; as `clearances`."""
         return tuple(
@@ -551,6 +666,7 @@ class CollisionModel(Sealed):
             if frozenset((one.first, one.second)) not in self._allowed
         )
 
+    @_alone
     def distances(self, q: npt.ArrayLike, *, below: float = NEAR) -> Array:
         """Distance of the nearest two bodies at each of many joint positions; pairs that may touch do not count.
 
@@ -567,6 +683,7 @@ class CollisionModel(Sealed):
         rows, bound = _rows(q, "q"), within(below, "below", 0.0, 1.0, unit="m")
         return self._distances.nearest(rows, bound)
 
+    @_alone
     def first_on(self, path: npt.ArrayLike) -> TouchOnPath | None:
         """The first place on a joint path at which two bodies touch.
 
@@ -676,6 +793,7 @@ class _Models:
         tool_of: str = "",
     ) -> None:
         self._robot, self._boxes, self._scene = robot, boxes, scene
+        self._lock = threading.Lock()  # models of the same world share this in several threads
         self._origin, self._tool_of = origin, tool_of
         self._made: dict[tuple[object, ...], Any] = {}
 
@@ -706,30 +824,41 @@ class _Models:
         from heptarm.sim.plant.world import compiled
 
         key = (carried, obstacles, arms)
-        model = self._made.pop(key, None)
-        if model is None:
-            model = compiled(
-                self._robot,
-                self._boxes,
-                self._scene,
-                carried=carried,
-                obstacles=obstacles,
-                arms=arms,
-                origin=self._origin,
-                tool_of=self._tool_of,
-            )
-        self._made[key] = model
-        for oldest in list(self._made)[:-_MOST_KEPT]:
-            self._made.pop(oldest, None)  # another thread may have done so
-        return model
+        with self._lock:
+            model = self._made.pop(key, None)
+            if model is None:
+                model = compiled(
+                    self._robot,
+                    self._boxes,
+                    self._scene,
+                    carried=carried,
+                    obstacles=obstacles,
+                    arms=arms,
+                    origin=self._origin,
+                    tool_of=self._tool_of,
+                )
+            self._made[key] = model
+            for oldest in list(self._made)[:-_MOST_KEPT]:
+                del self._made[oldest]
+            return model
 
 
 def _carried(
     tool: Tool | KnownTool | None, workpiece: Workpiece | KnownTool | None, at: Pose | None
 ) -> tuple[CarriedShapes, ...]:
-    """The shapes of a tool and of what it holds, as they are on the flange."""
+    """The shapes of a tool and of what it holds, as they are on the flange.
+
+    Raises:
+        ShapeError: wrong types.
+    """
     from heptarm.sim.plant.carried import CarriedShapes
 
+    if tool is not None:
+        instance(tool, (Tool, KnownTool), "tool")
+    if workpiece is not None:
+        instance(workpiece, (Workpiece, KnownTool), "workpiece")
+    if at is not None:
+        check_pose(at, "at")
     origin = Pose.of((0.0, 0.0, 0.0))
     found = [] if tool is None else [CarriedShapes(tool.name, tool.shapes, origin, is_tool=True)]
     if workpiece is not None:
@@ -766,6 +895,23 @@ def _rows(values: npt.ArrayLike, name: str) -> Array:
             hint="for example [[0, 0.5, 0, -1.5, 0, 1, 0], [0.3, 0.5, 0, -1.5, 0, 1, 0]]",
         )
     return points
+
+
+def _pairs(allowed: Iterable[tuple[str, str]]) -> frozenset[frozenset[str]]:
+    """Pairs of names of bodies that may touch.
+
+    Raises:
+        ShapeError: something else.
+    """
+    pairs = [tuple(_listed(pair, "allowed")) for pair in _listed(allowed, "allowed")]
+    if any(len(pair) != 2 or not all(isinstance(name, str) for name in pair) for pair in pairs):
+        raise ShapeError(
+            f"allowed must be pairs of names of bodies, got {shown(allowed)}",
+            parameter="allowed",
+            value=allowed,
+            hint='for example [("tool", "table")]',
+        )
+    return frozenset(frozenset(pair) for pair in pairs)
 
 
 def _listed(values: object, name: str) -> list[Any]:

@@ -15,10 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm._library import Unavailable, library
-from heptarm.sim.plant.carried import plain
+from heptarm.sim.plant.carried import GEOMS, plain
 from heptarm.sim.plant.native import mujoco_library
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
+from heptarm.values.shape import Shape, ShapeKind
 
 #: Where a shape belongs: what it may meet depends on it.
 _WORLD, _LINK, _TOOL, _HELD = range(4)
@@ -28,6 +29,8 @@ _MEETS[_WORLD, _WORLD] = _MEETS[_TOOL, _HELD] = _MEETS[_HELD, _TOOL] = False
 #: Shapes of a body that are tried one by one, not by a box around them.
 _FEW = 8
 _JOINTS = 7
+#: Kinds of shapes by MuJoCo's.
+_KINDS: dict[int, ShapeKind] = {int(geom): kind for kind, geom in GEOMS.items()}
 _POINTER, _WORD, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 #: MuJoCo's functions that are called in C.
 _CALLED = {"mj_kinematics": "kinematics", "mj_geomDistance": "distance"}
@@ -170,7 +173,18 @@ class Distances:
     def posture_of(self, name: str) -> Array:
         """The posture of another arm, shape (7,) [rad]."""
         address = self._arms_at[name]
-        return self._data.qpos[address : address + _JOINTS].copy()
+        return np.array(self._data.qpos[address : address + _JOINTS])
+
+    def shapes_of(self, name: str) -> tuple[Shape, ...]:
+        """Shapes of a body in its frame; those that are no box, cylinder, sphere or capsule are left out."""
+        model = self._model
+        found = []
+        for geom in np.flatnonzero([self._bodies[int(body)] == name for body in model.geom_bodyid]).tolist():
+            kind = _KINDS.get(int(model.geom_type[geom]))
+            if kind is not None:
+                at = Pose.of(model.geom_pos[geom], np.roll(model.geom_quat[geom], -1))
+                found.append(Shape(kind, _size(kind, model.geom_size[geom]), at))
+        return tuple(found)
 
     def hold(self, held: dict[str, Pose]) -> None:
         """Let the flange carry free bodies, and nothing else; their poses in the flange frame."""
@@ -373,6 +387,14 @@ def _quaternion(matrix: Array) -> Array:
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, matrix)
     return np.roll(quat, -1)
+
+
+def _size(kind: ShapeKind, size: Array) -> Array:
+    """The size of a shape, shape (3,) [m], from MuJoCo's half edges, or radius and half length."""
+    radius, half = float(size[0]), float(size[1])
+    if kind == "box":
+        return 2.0 * size
+    return np.array([radius, 0.0 if kind == "sphere" else 2.0 * half, 0.0])
 
 
 def _hulls(model: mujoco.MjModel) -> npt.NDArray[np.void]:

@@ -137,6 +137,7 @@ class Foresight:
         self,
         goal: Goal,
         *,
+        start: Array | None = None,
         avoid: PlanningWorld | None,
         keep: Keep | None,
         speed: float,
@@ -147,7 +148,7 @@ class Foresight:
         stop: Callable[[], bool] | None,
         progress: Callable[[int, float], object] | None,
     ) -> Path:
-        """Find a path from where the arm rests; see `Arm.find_path`."""
+        """Find a path; see `Arm.find_path`. It begins at `start`, shape (7,) [rad]; None: where the arm rests."""
         world = self.check if avoid is None else avoid
         if not isinstance(world, PlanningWorld):
             raise ShapeError(
@@ -166,7 +167,7 @@ class Foresight:
             )
         found = find_path(
             self._tooling.loaded(world),
-            start=self._rest(),
+            start=self._rest() if start is None else start,
             goal=goal,
             tcp=self._tooling.on_flange(TOOL),
             keep=keep,

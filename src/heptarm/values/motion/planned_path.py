@@ -48,6 +48,8 @@ class Path(JointSpline):
         duration: at the speed for which it was searched [s].
         clearance: the nearest two bodies on it; None: none are nearer than 0.2 m.
         stats: what the search took.
+        goal: what it was searched for: joint positions, poses or regions, of which it reaches one.
+        keep: constraints along it.
         world: the model of bodies that it keeps clear of, and against which it is checked again before it is sent.
     """
 
@@ -56,6 +58,8 @@ class Path(JointSpline):
     duration: float = field(kw_only=True)
     clearance: Clearance | None = field(kw_only=True)
     stats: SearchStats = field(kw_only=True)
+    goal: tuple[Array | Pose | Region, ...] = field(kw_only=True, repr=False)
+    keep: tuple[PathConstraint, ...] = field(kw_only=True)
     world: Any = field(kw_only=True, compare=False, repr=False)
 
     @property
