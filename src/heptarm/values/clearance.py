@@ -66,6 +66,9 @@ class CarriesTools(Protocol[_Model_co]):
 class CollisionCheck(Protocol):
     """What `Arm.collision_check` needs; `heptarm.CollisionModel` is one."""
 
+    def is_free(self, first: Array, last: Array) -> bool:
+        """Whether nothing touches on a straight joint path, both shape (7,) [rad]."""
+
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
 
