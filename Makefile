@@ -45,16 +45,19 @@ $(STAMPS)/browser: scripts/setup_browser.sh
 # Tests mostly wait for arms that move, and measure times: one processor is left for everything else.
 WORKERS ?= $(shell n=$$(nproc 2>/dev/null || echo 2); if [ $$n -gt 7 ]; then echo 6; elif [ $$n -gt 3 ]; then expr $$n - 1; else echo 2; fi)
 LONGEST := --durations=15 --durations-min=3
+# To import all tests for those few takes twelve seconds.
+ALONE = $(shell grep -rl 'mark\.alone' tests --include='test_*.py')
+PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 ROS2_PACKAGES := $(shell find ros2/interfaces ros2/heptarm_msgs -type f)
 
-$(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_requirements.txt $(wildcard scripts/lock/ros2.txt) $(ROS2_PACKAGES) $(STAMPS)/venv
+$(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_requirements.txt $(wildcard scripts/lock/ros2.txt) $(ROS2_PACKAGES) $(STAMPS)/demo
 	scripts/setup_ros2.sh
 	@mkdir -p $(STAMPS) && if [ -x build/ros2/bin/python ]; then touch $@; fi  # asked again where there is none
 
 ROS1_PACKAGES := $(shell find ros1/interfaces -type f)
 
-$(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(wildcard scripts/lock/ros1.txt scripts/lock/numpy.txt) $(ROS1_PACKAGES) $(ROS2_PACKAGES) $(STAMPS)/venv
+$(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(wildcard scripts/lock/ros1.txt scripts/lock/numpy.txt) $(ROS1_PACKAGES) $(ROS2_PACKAGES) $(STAMPS)/demo
 	scripts/setup_ros1.sh
 	@mkdir -p $(STAMPS) && if [ -x build/ros1/bin/python ]; then touch $@; fi
 
@@ -73,14 +76,23 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema, the diagram
 	$(PY) schema/generate.py --check
 	$(PY) scripts/diagrams.py --check
 
-# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it; then come
-# the ROS nodes. The one goes on when the other fails; both are shown at the end.
-test: setup $(STAMPS)/browser  ## everything; what takes long begins first
-	@{ nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing $(STAMPS)/ros2 $(STAMPS)/ros1; first=$$?; \
-		$(MAKE) --no-print-directory test-ros ROS_JOBS=2 && exit $$first; } > build/test-beside.log 2>&1 & beside=$$!; \
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
-	wait $$beside; beside=$$?; cat build/test-beside.log; exit $$((waiting + beside))
-	$(PY) -m pytest $(LONGEST) -m alone
+# Packages are unpacked on one processor while the other compiles. What installs system packages is all on one side: they
+# lock each other out. What fails of ROS is asked for again by its tests, and reported there.
+.PHONY: prepared
+prepared: $(STAMPS)/demo
+	@$(MAKE) --no-print-directory $(STAMPS)/venv & packages=$$!; \
+	$(MAKE) --no-print-directory native cabinet $(STAMPS)/browser; compiled=$$?; \
+	$(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1; \
+	wait $$packages && exit $$compiled
+
+# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it, to the
+# end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are shown at the end.
+test: prepared  ## everything; what takes long begins first
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
+	$(PY) -m pytest $(PARALLEL) $(LONGEST) -m "not computing and not alone"; failed=$$?; \
+	$(MAKE) --no-print-directory test-ros ROS_JOBS=2 || failed=1; \
+	wait $$beside || failed=1; cat build/test-beside.log; exit $$failed
+	$(PY) -m pytest $(LONGEST) -m alone $(ALONE)
 
 # Folders with tests that need no simulator; those in them that do are skipped as soon as they reach for it.
 FAST := tests/values tests/wire tests/model tests/fri tests/arm tests/record tests/ros tests/schema tests/transports tests/devices \
@@ -91,7 +103,7 @@ test-fast: $(STAMPS)/venv native  ## for every save: what needs neither JVM nor 
 
 # A compiler that gets a tenth of a processor beside all others is slow, and does not hang.
 test-computing: setup $(STAMPS)/browser  ## tests that mostly compute: values, protocols, kinematics, simulated steps, training, compilers, the site
-	$(PY) -m pytest --timeout 900 $(LONGEST) -m "computing and not alone"
+	$(PY) -m pytest $(PARALLEL) --timeout 900 $(LONGEST) -m "computing and not alone"
 
 # They mostly wait for arms that move, so the parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
 ROS_JOBS ?= 3
@@ -101,8 +113,8 @@ test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, parts of both 
 	$(SIDE_BY_SIDE) ros1-shared ros2-shared ros2-own ros1-own ros2-surface ros1-surface
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
-	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST) -m "not alone"
-	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone
+	LONG=1 $(PY) -m pytest $(PARALLEL) --timeout 3600 $(LONGEST) -m "not alone"
+	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone $(ALONE)
 	scripts/setup_rviz.sh
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance

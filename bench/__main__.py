@@ -21,7 +21,7 @@ from bench.fri import faults, guard, hold, loop  # noqa: F401
 from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark
 from bench.measure.store import Store
-from bench.motion import endpoints, inverse_kinematics, paths  # noqa: F401
+from bench.motion import endpoints, follow, inverse_kinematics, paths  # noqa: F401
 from bench.planning import search  # noqa: F401
 from bench.protocol import garbage, round_trip  # noqa: F401
 from bench.rl import deploy, training  # noqa: F401

@@ -39,8 +39,14 @@ class Jdk:
     @cached_property
     def version(self) -> int:
         """Feature release, 17 for example."""
-        done = subprocess.run([self.javac, "-version"], capture_output=True, text=True, check=True)
-        found = re.search(r"javac (?:1\.)?(\d+)", done.stdout + done.stderr)
+        try:
+            said = (self.home / "release").read_text(
+                encoding="utf-8"
+            )  # a hundred times faster than to ask javac
+        except OSError:
+            done = subprocess.run([self.javac, "-version"], capture_output=True, text=True, check=True)
+            said = done.stdout + done.stderr
+        found = re.search(r'(?:javac |JAVA_VERSION=")(?:1\.)?(\d+)', said)
         return int(found.group(1)) if found else 0
 
     @property

@@ -32,5 +32,5 @@ with ha.connect(os.environ.get("HEPTARM_TARGET_TO_GUIDE", "sim://iiwa14"), watch
     print(f"{whole.duration:.1f} s were recorded, {len(taught)} of {len(whole)} points are kept")
     with TemporaryDirectory() as folder:
         file = taught.save(Path(folder) / "taught.npz")
-        replay = arm.replay(ha.Trajectory.load(file), by="spline", speed_scaling=0.3)
+        replay = arm.replay(ha.Trajectory.load(file), by="spline", speed_scaling=0.5)
     print(f"{replay.result.cause.value}, {np.degrees(replay.deviation):.2f} deg largest deviation")

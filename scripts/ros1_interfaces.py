@@ -12,6 +12,7 @@ import importlib
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 #: Where Debian's packages keep the definitions of ROS' own messages.
@@ -44,12 +45,13 @@ def messages_of_action(name: str, text: str) -> dict[str, str]:
     return found
 
 
-def generate(source: Path, out: Path) -> int:
+def generate(source: Path, out: Path, others: Sequence[Path] = ()) -> int:
     """Generate one package.
 
     Args:
         source: folder with msg/, srv/, action/, named as the package.
         out: folder for the Python package.
+        others: folders of packages that it may refer to, besides those of Debian.
 
     Returns:
         How many messages and services it has.
@@ -73,6 +75,7 @@ def generate(source: Path, out: Path) -> int:
             for name, text in messages_of_action(path.stem, path.read_text(encoding="utf-8")).items():
                 (places["msg"] / f"{name}.msg").write_text(text, encoding="utf-8")
         search = {path.parent.name: [str(path)] for path in DEFINITIONS.glob("*/msg")}
+        search.update({path.name: [str(path / "msg")] for path in others if (path / "msg").is_dir()})
         search[package] = [str(places["msg"])]
         for kind, maker in (("msg", generator.MsgGenerator()), ("srv", generator.SrvGenerator())):
             files = sorted(str(path) for path in places[kind].glob(f"*.{kind}"))
@@ -94,7 +97,7 @@ def main() -> int:
     parser.add_argument("packages", nargs="+", type=Path)
     given = parser.parse_args()
     for source in given.packages:
-        print(f"{source.name}: {generate(source, given.out)} messages and services")
+        print(f"{source.name}: {generate(source, given.out, given.packages)} messages and services")
     return 0
 
 

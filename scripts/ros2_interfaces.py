@@ -31,7 +31,11 @@ DEPENDENCIES = (
     "builtin_interfaces",
     "std_msgs",
     "geometry_msgs",
+    "sensor_msgs",
+    "shape_msgs",
     "trajectory_msgs",
+    "object_recognition_msgs",
+    "octomap_msgs",
     "action_msgs",
     "service_msgs",
     "unique_identifier_msgs",
@@ -243,6 +247,12 @@ class Package:
         (index / self.name).touch()
 
 
+def _in_order(sources: Iterable[Path]) -> list[Path]:
+    """Put packages that others refer to before these."""
+    names = {name: place for place, name in enumerate(DEPENDENCIES)}
+    return sorted(sources, key=lambda source: names.get(source.resolve().name, len(names)))
+
+
 def main() -> int:
     """Installs the packages named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -250,7 +260,7 @@ def main() -> int:
     prefix = Path(sys.prefix)
     os.environ["AMENT_PREFIX_PATH"] = str(prefix)
     logging.disable(logging.WARNING)
-    for source in parser.parse_args().packages:
+    for source in _in_order(parser.parse_args().packages):
         with tempfile.TemporaryDirectory(prefix="rosidl_") as work:
             package = Package(source.resolve(), prefix, Path(work))
             package.install()

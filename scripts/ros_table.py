@@ -30,6 +30,7 @@ from heptarm.arm.motion.handle import MotionHandle  # noqa: E402
 from heptarm.arm.motion.servo import JointServo, PoseServo  # noqa: E402
 from heptarm.ros.interface.actions import ACTIONS  # noqa: E402
 from heptarm.ros.interface.names import PRESETS  # noqa: E402
+from heptarm.ros.interface.planning import moveit  # noqa: E402
 from heptarm.ros.interface.services import SERVICES  # noqa: E402
 from heptarm.ros.interface.topics import TOPICS  # noqa: E402
 from heptarm.ros.node.parameters import PARAMETERS, Parameter, joint_parameters  # noqa: E402
@@ -258,6 +259,23 @@ def page() -> str:
             f"| `{one_parameter.name}` | {_default(one_parameter)} | {_range(one_parameter)} | {text}.{live} |"
         )
     lines += [
+        "",
+        "## MoveIt's move_group",
+        "",
+        "With the parameter `moveit`, where `moveit_msgs` is installed, the node also offers these names, relative to",
+        "its namespace; see [Paths around bodies](../guide/ros2.md#paths-around-bodies).",
+        "",
+        "| name | what | type |",
+        "|---|---|---|",
+        *(
+            f"| `{row.name}` | {what} | `{row.type}` |"
+            for what, rows in (
+                ("subscribes", moveit.TOPICS),
+                ("service", moveit.SERVICES),
+                ("action", moveit.ACTIONS),
+            )
+            for row in rows
+        ),
         "",
         "## Names of other drivers",
         "",

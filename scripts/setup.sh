@@ -64,6 +64,8 @@ torch() { # A version for which there is a build without CUDA here; any newer on
 packages=".[$extras]"
 case $extras in
 dev | demo)
+    # Half of the time would go into compiling modules that are never imported; Python compiles the others when they are.
+    if [ "$extras" = dev ]; then export PIP_COMPILE=0; fi
     if [ "$extras" = dev ] && ! locked torch --no-index; then
         echo "the locked build of torch is not on this machine; another build is installed, without a checksum" >&2
         torch || true

@@ -5,9 +5,9 @@ set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros1
 python=/usr/bin/python3
-packages="python3-rospy python3-actionlib python3-roslaunch python3-sensor-msgs python3-trajectory-msgs python3-diagnostic-msgs
+packages="python3-rospy python3-actionlib python3-roslaunch python3-sensor-msgs python3-shape-msgs python3-trajectory-msgs python3-diagnostic-msgs
     python3-std-srvs python3-geometry-msgs python3-genpy python3-rostopic python3-rosservice ros-std-msgs ros-geometry-msgs
-    ros-trajectory-msgs ros-actionlib-msgs"
+    ros-sensor-msgs ros-shape-msgs ros-trajectory-msgs ros-actionlib-msgs"
 
 no() {
     echo "no ROS 1 here: $1; its tests will be skipped"
@@ -21,8 +21,8 @@ failed() {
 }
 
 complete() {
-    $python -c "import rospy, actionlib, roslaunch, sensor_msgs, trajectory_msgs, diagnostic_msgs, std_srvs, genpy, rostopic, rosservice" 2>/dev/null &&
-        [ -d /usr/share/trajectory_msgs/msg ] && [ -d /usr/share/actionlib_msgs/msg ] && command -v roscore >/dev/null
+    $python -c "import rospy, actionlib, roslaunch, sensor_msgs, shape_msgs, trajectory_msgs, diagnostic_msgs, std_srvs, genpy, rostopic, rosservice" 2>/dev/null &&
+        [ -d /usr/share/trajectory_msgs/msg ] && [ -d /usr/share/sensor_msgs/msg ] && [ -d /usr/share/shape_msgs/msg ] && [ -d /usr/share/actionlib_msgs/msg ] && command -v roscore >/dev/null
 }
 
 [ -x $python ] || no "there is no $python"

@@ -43,7 +43,7 @@ _LONG_FIRST = (
     "record",
 )
 #: Folders whose tests mostly compute.
-_COMPUTING = ("fri", "house", "model", "rl", "schema", "sim", "values", "wire")
+_COMPUTING = ("fri", "house", "laws", "model", "rl", "schema", "sim", "values", "wire")
 
 # no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None, max_examples=longer(40, 200))

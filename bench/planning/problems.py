@@ -172,7 +172,7 @@ def made(scene: str, searches: int) -> Iterator[Problem]:
 
 def _best(world: ha.CollisionModel, start: Array, goal: Array, searches: int) -> float | None:
     """Length of the shortest path that several searches find; None: none finds one."""
-    found = []
+    found: list[float] = []
     for seed in range(searches):
         try:
             path = planning.find_path(

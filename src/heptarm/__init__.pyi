@@ -17,6 +17,12 @@ from .arm.link.state_stream import (
 from .arm.link.target import (
     target_from_env as target_from_env,
 )
+from .arm.motion.following import (
+    Detour as Detour,
+)
+from .arm.motion.following import (
+    FollowedPath as FollowedPath,
+)
 from .arm.motion.handle import (
     MotionHandle as MotionHandle,
 )
@@ -79,6 +85,9 @@ from .errors import (
 )
 from .errors import (
     ConnectionLost as ConnectionLost,
+)
+from .errors import (
+    GraspFailed as GraspFailed,
 )
 from .errors import (
     HeptarmError as HeptarmError,
@@ -250,6 +259,12 @@ from .values.motion.line import (
 )
 from .values.motion.motion import (
     hold as hold,
+)
+from .values.motion.planned_path import (
+    OnLine as OnLine,
+)
+from .values.motion.planned_path import (
+    OnPlane as OnPlane,
 )
 from .values.motion.planned_path import (
     Path as Path,

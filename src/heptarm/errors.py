@@ -206,7 +206,8 @@ class NoPath(CommandRejected):
     """No path was found around the bodies of a world; nothing moves.
 
     Attributes:
-        reason: "start", "goal", "inverse kinematics", "constraint", "not connected" or "time".
+        reason: "start", "goal", "inverse kinematics", "constraint", "not connected" or "time"; of a pick or a place
+            also "approach": bodies are in the way on the straight lines there.
         clearance: the two bodies that are in the way at the start or at the goal; None: not for this reason.
         states: joint positions that the search has reached.
         nearest: distance between what is reached from the start and from the goals [rad]; infinite: nothing was.
@@ -288,6 +289,10 @@ class InsertionFailed(MotionError):
     def __init__(self, text: str, *, depth: float = 0.0, **details: Any) -> None:
         super().__init__(text, **details)
         self.depth = depth
+
+
+class GraspFailed(MotionError):
+    """A gripper was closed and holds nothing."""
 
 
 class ArrivalError(MotionError):

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import model, shapes
+from heptarm import model, planning, shapes
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
+from tests.long import longer
 from tests.simulators import FASTER
 
 IIWA = robot("iiwa14")
@@ -102,6 +103,18 @@ def test_a_path_begins_where_the_arm_is(arm: ha.Arm, wall: ha.CollisionModel) ->
     arm.move([ha.ptp(path.start), path])
 
 
+def test_a_path_of_another_robot_is_refused(arm: ha.Arm) -> None:
+    other = planning.find_path(ha.CollisionModel("iiwa7"), start=LEFT, goal=LEFT + 0.05)
+    with pytest.raises(
+        ha.CommandRejected, match="the path must be one of this robot, the iiwa14, got .* iiwa7"
+    ):
+        arm.move(other)
+    with pytest.raises(
+        ha.CommandRejected, match="the path must be one of this robot, the iiwa14, got .* iiwa7"
+    ):
+        arm.plan(other)
+
+
 def test_the_model_of_the_arm_is_avoided_unless_another_is_given(
     arm: ha.Arm, wall: ha.CollisionModel
 ) -> None:
@@ -118,3 +131,133 @@ def test_the_model_of_the_arm_is_avoided_unless_another_is_given(
         arm.find_path(RIGHT, avoid=ha.CollisionModel("iiwa7"))
     with pytest.raises(ha.NoPath, match="goal is in collision"):
         arm.find_path(deg(0, 60, 0, -80, 0, 50, 0))
+
+
+class Newcomer:
+    """Brings a ball into the way of an arm that has begun its path.
+
+    From then on the arm is slow until it moves along a new path, so that a slow machine has time as well.
+    """
+
+    def __init__(self, arm: ha.Arm, world: ha.CollisionModel, at: Pose, radius: float = 0.06) -> None:
+        self._arm, self._world, self._at, self._radius = arm, world, at, radius
+        self.is_there = self._is_slow = False
+
+    def __call__(self, progress: float) -> None:
+        if not self.is_there and progress > 0.05:
+            self._arm.set_override(0.02)
+            self._world.add("ball", shapes.sphere(self._radius), at=self._at)
+            self.is_there = self._is_slow = True
+        elif self._is_slow and progress < 0.05:
+            self._arm.set_override(1.0)
+            self._is_slow = False
+
+
+@pytest.fixture
+def full_speed(arm: ha.Arm) -> Iterator[None]:
+    yield
+    arm.set_override(1.0)
+
+
+def on_path(path: ha.Path, fraction: float) -> Pose:
+    """Where the flange is on a path."""
+    return Pose.of(model.forward(IIWA, path.curve[int(fraction * (len(path.curve) - 1))])[:3, 3])
+
+
+@pytest.mark.parametrize("seed", range(longer(2, 20)))
+def test_a_path_is_followed_around_what_comes_into_the_way(
+    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None, seed: int
+) -> None:
+    random = np.random.default_rng(seed)
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    ball = on_path(path, random.uniform(0.5, 0.8)).shifted(*random.uniform(-0.03, 0.03, 3))
+    first = arm.connection.feed.count
+    followed = arm.follow(path, on_progress=Newcomer(arm, wall, ball))
+    assert followed.result.cause is ha.Cause.FINISHED and "detour 1" in str(followed)
+    assert [one.clearance.second for one in followed.detours] == ["ball"]
+    assert np.abs(arm.state.q_cmd - RIGHT).max() < 1e-6
+    seen = [arm.connection.build(one) for one in arm.connection.feed.kept() if one.number > first]
+    commanded = np.array([one.q_cmd for one in seen])
+    assert wall.distances(commanded, below=0.05).min() > wall.margin - 1e-3
+
+
+def test_what_is_in_the_way_before_the_path_begins_is_gone_around(
+    arm: ha.Arm, wall: ha.CollisionModel
+) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    wall.add("ball", shapes.sphere(0.06), at=on_path(path, 0.6))
+    followed = arm.follow(path)
+    assert len(followed.detours) == 1 and wall.first_on(followed.detours[0].path.curve) is None
+    assert np.abs(arm.state.q_cmd - RIGHT).max() < 1e-6
+
+
+def test_what_is_not_in_the_way_changes_nothing(
+    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None
+) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    newcomer = Newcomer(arm, wall, Pose.at(-0.6, 0.0, 0.3))
+
+    def watched(progress: float) -> None:
+        newcomer(progress)
+        if newcomer.is_there:
+            arm.set_override(1.0)
+
+    followed = arm.follow(path, on_progress=watched)
+    assert newcomer.is_there and followed.detours == () and followed.result.cause is ha.Cause.FINISHED
+
+
+def test_an_arm_without_a_way_rests_before_what_came(
+    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None
+) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    with pytest.raises(ha.NoPath, match="goal is in collision.* ball") as error:
+        arm.follow(path, on_progress=Newcomer(arm, wall, on_path(path, 1.0)))
+    assert error.value.reason == "goal"
+    state = arm.wait_for_rest(timeout=30.0)
+    assert np.abs(state.q - RIGHT).max() > 0.1 and wall.touching(state.q) == ()
+
+
+def test_a_path_that_is_followed_ends_when_it_is_stopped(
+    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None
+) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    seen: list[float] = []
+    followed = arm.follow(path, stop=lambda: max(seen, default=0.0) > 0.1, on_progress=seen.append)
+    assert followed.result.cause is ha.Cause.CANCELLED
+    assert np.abs(arm.state.q_cmd - RIGHT).max() > 0.1
+    with pytest.raises(ha.Timeout, match="the end of the path was not reached within 0.2 s"):
+        arm.set_override(0.02)
+        arm.follow(arm.find_path(RIGHT, avoid=wall, timeout=60.0), timeout=0.2)
+
+
+def test_a_stop_while_another_path_is_searched_is_no_pause(
+    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None
+) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    newcomer = Newcomer(arm, wall, on_path(path, 0.6))
+
+    def stop() -> bool:
+        state = arm.state
+        rests = newcomer.is_there and bool(np.abs(state.dq).max() < 1e-6)
+        if rests and state.motion is not None and state.motion.active:
+            arm.stop()
+        return False
+
+    with pytest.raises(ha.MotionAborted, match="was stopped"):
+        arm.follow(path, stop=stop, on_progress=newcomer)
+    rest = arm.wait_for_rest(timeout=30.0).q_cmd
+    assert np.abs(rest - RIGHT).max() > 0.1
+
+
+def test_bad_values_of_following(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    with pytest.raises(ha.ShapeError, match="path must be"):
+        arm.follow(ha.ptp(RIGHT))  # type: ignore[arg-type]
+    with pytest.raises(ha.ShapeError, match="watch must be a model of bodies, got 3"):
+        arm.follow(path, watch=3)  # type: ignore[arg-type]
+    with pytest.raises(ha.LimitError, match="timeout must be in"):
+        arm.follow(path, timeout=-1.0)
+    arm.move(ha.ptp(LEFT + 0.05))
+    with pytest.raises(ha.CommandRejected, match="the path must begin where the arm is"):
+        arm.follow(path)
+    assert np.abs(arm.state.q_cmd - LEFT - 0.05).max() < 1e-6

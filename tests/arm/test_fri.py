@@ -213,6 +213,7 @@ def test_what_does_not_go_together_is_refused_here_as_it_is_there(
         ({"multiplier": 0}, "multiplier"),
         ({"timeout": 0.0}, "timeout"),
         ({"port": 70000}, "port"),
+        ({"host": "127.0.0.1\0"}, "host must have printable characters only"),
         ({"params": {"a": 1.0}}, "need a law"),
         ({"kind": "monitor", "law": swing}, "takes no law"),
         ({"mode": "soft"}, "mode"),

@@ -55,9 +55,15 @@ def test_the_weight_of_the_gripper_is_compensated_by_its_load_data(arm: ha.Arm) 
 
 
 def test_where_there_is_no_hole_insertion_fails(arm: ha.Arm) -> None:
-    arm.move(ha.ptp(ha.Pose.of((0.7, 0.0, 0.24), DOWN)))  # the fingertips 20 mm above the table
+    before = ha.Pose.of((0.7, 0.0, 0.24), DOWN)  # the fingertips 20 mm above the table
+    world = ha.CollisionModel("iiwa14", scene="table")
+    with pytest.raises(ha.ShapeError, match="world is that around which the arm moves to `before`"):
+        insert(arm, "z", depth=0.02, world=world)
+    with pytest.raises(ha.NoPath, match="goal is in collision"):
+        insert(arm, "z", depth=0.02, before=before.shifted(z=-0.05), world=world)
+    assert np.abs(arm.state.q_cmd - START).max() < 1e-6  # nothing moved
     with pytest.raises(ha.InsertionFailed, match="no hole within 1 mm") as failure:
-        insert(arm, "z", depth=0.02, search=ha.spiral(0.001), distance=0.03)
+        insert(arm, "z", depth=0.02, search=ha.spiral(0.001), distance=0.03, before=before, world=world)
     assert abs(failure.value.depth) < 1.5e-3
 
 

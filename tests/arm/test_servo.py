@@ -76,6 +76,19 @@ def test_poses_are_followed_and_one_out_of_reach_is_not_sent_but_reported(arm: h
     assert sv.stats.held == 1 and sv.stats.refused == 0 and sv.stats.slowdown.factor == 1.0
 
 
+def test_a_stream_whose_targets_are_all_held_warns_once_and_counts_them(
+    arm: ha.Arm, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level("WARNING", "heptarm.arm"), arm.servo("pose", rate=100, watchdog=2.0) as sv:
+        far = ha.Pose.of([3.0, 0, 0], sv.start.pose.quat)
+        for _ in range(5):
+            sv.tick()
+            sv.set(far)
+        assert sv.refused == 5
+    warnings = [record.getMessage() for record in caplog.records if "the arm is held" in record.getMessage()]
+    assert len(warnings) == 1 and "out of reach" in warnings[0]
+
+
 def test_a_pose_beyond_a_limit_names_the_axis(arm: ha.Arm) -> None:
     arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 115, 0)))
     with arm.servo("pose", rate=50, watchdog=2.0) as sv:

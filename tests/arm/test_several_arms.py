@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import Arm
+from heptarm import Arm, shapes
+from heptarm.values.motion.motion import Motion
 from tests.retry import held_up, retry
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
@@ -74,6 +75,38 @@ def test_a_program_that_cannot_be_planned_moves_nothing(arms: ha.Arms) -> None:
         arm.wait_until(lambda now: not now.safety.paused)
         assert arm.wait_for_rest().q == pytest.approx(state.q, abs=1e-5)
         assert arm.move(ha.hold(0.05)).arrived
+
+
+def facing(arms: ha.Arms) -> ha.CollisionModel:
+    """The world of the left arm, with the right one opposite to it."""
+    left, right = arms
+    opposite = ha.Pose.of((1.6, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+    return ha.CollisionModel(left.robot.name).with_arm("right", at=opposite, robot=right.robot.name)
+
+
+def test_programs_that_would_meet_are_refused_before_anything_moves(arms: ha.Arms) -> None:
+    left, right = arms
+    world = facing(arms)
+    before = [arm.wait_for_rest().q_cmd for arm in arms]
+    meet = {arm: [ha.lin_rel(x=0.2, frame="base"), ha.lin_rel(x=-0.2, frame="base")] for arm in arms}
+    with pytest.raises(
+        ha.CollisionForeseen, match=r"^left: link_\d is .* right/link_\d after \d\.\d\d s"
+    ) as error:
+        ha.start_together(meet, collision_check=world)
+    assert error.value.touch.clearance.second.startswith("right/") and error.value.touch.t > 0.0
+    for arm, q in zip(arms, before, strict=True):
+        assert arm.state.q_cmd == pytest.approx(q, abs=1e-9) and not arm.state.safety.paused
+    # one alone has room, and with a tool that reaches across there is none
+    turns: dict[ha.Arm, Motion | Sequence[Motion]] = {left: meet[left], right: ha.hold(0.1)}
+    rod = ha.Tool("rod", shapes=[shapes.cylinder(0.02, 0.9, at=ha.Pose.at(0.0, 0.0, 0.45))])
+    assert ha.start_together(turns, collision_check=world).wait()[left].arrived
+    with right.tool(rod), pytest.raises(ha.CollisionForeseen, match="right/rod"):
+        across = ha.ptp(ha.deg(0, 30, 0, -90, 0, -30, 0))
+        ha.start_together({left: ha.hold(0.1), right: across}, collision_check=world)
+    with pytest.raises(ha.CommandRejected, match="got a world with none for left, right"):
+        ha.start_together(meet, collision_check=ha.CollisionModel("iiwa14"))
+    with pytest.raises(ha.ShapeError, match="collision_check must be a world of several arms, got 3"):
+        ha.start_together(meet, collision_check=3)  # type: ignore[arg-type]
 
 
 def test_one_that_moves_already_is_not_joined(arms: ha.Arms) -> None:

@@ -209,6 +209,7 @@ def test_two_clients_of_one_process_are_distinguished(arm: Arm, cabinet: Running
             observer.move(ptp(HOME))
         mine, other = arm.connection.options.name, observer.connection.options.name
         assert mine != other and refused.value.text.startswith(f"{mine} controls the robot, not {other}")
+        assert str(refused.value).count("take control first") == 1 and "allowed" not in str(refused.value)
     with (
         ha.connect(cabinet.target, control=False, name=mine) as twin,
         pytest.raises(ha.NotInControl) as refused,

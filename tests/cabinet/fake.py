@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import shutil
@@ -20,6 +21,7 @@ import build  # noqa: E402
 import toolchain as toolchain  # noqa: E402
 
 
+@functools.cache
 def classes(folder: str = "java") -> str:
     """Class path of the cabinet's jars and the test's own classes, compiled where they have changed."""
     jars = [jar for jar in build.build() if folder != "java" or jar.name == "heptarm-core.jar"]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.sim.collision import CollisionModel
 from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.scene import Scene
@@ -39,6 +40,7 @@ class Canvas:
     """A viser server that draws nothing: its scene is itself."""
 
     shapes: dict[str, Drawing] = field(default_factory=dict)
+    labels: dict[str, Drawing] = field(default_factory=dict)
 
     @property
     def scene(self) -> Canvas:
@@ -48,6 +50,10 @@ class Canvas:
 
     def add_frame(self, name: str, **_: object) -> Drawing:
         return Drawing()
+
+    def add_label(self, name: str, text: str, **given: Any) -> Drawing:
+        self.labels[text] = Drawing(**given)
+        return self.labels[text]
 
     def add_mesh_simple(self, name: str, vertices: Any, faces: Any, **given: Any) -> Drawing:
         assert faces.max() < len(vertices)
@@ -80,6 +86,27 @@ def test_every_shape_of_arm_and_scene_is_drawn_and_moves_with_its_body(tmp_path:
     assert cube.position == pytest.approx((0.55, 0.0, 0.5), abs=1e-3)
     pad = canvas.shapes[f"/world/{model.geom('scene/left_pad').id}"]
     assert abs(float(pad.position[1])) > 0.04  # the simulator's gripper is open
+
+
+def test_bodies_of_the_scene_have_their_names_and_places_in_a_path(tmp_path: Path) -> None:
+    from heptarm.panel.drawing import DrawnWorld
+
+    plant, canvas, file = Plant(scene=Scene.of("table")), Canvas(), tmp_path / "positions"
+    world = DrawnWorld(canvas, "iiwa14", Scene.of("table"), file)
+    planned = CollisionModel("iiwa14", scene="table")
+    world.name_bodies(visible=True)
+    assert set(canvas.labels) == {"table", "cube", "block", "can"}, "those of the arm have none"
+    address = plant.model.jnt_qposadr[plant.model.body("scene/cube").jntadr[0]]
+    plant.data.qpos[address + 2] = 0.5
+    PositionsFile(file, plant.model.nq).write(plant.data.qpos)
+    world.show(np.zeros(7))
+    assert canvas.labels["cube"].position == pytest.approx((0.55, 0.0, 0.5), abs=1e-3)
+    assert set(world.places) == {"cube", "block", "can"}
+    for name, pose in world.places.items():
+        planned.place(name, pose)  # of the same names
+    assert world.places["cube"].xyz == pytest.approx((0.55, 0.0, 0.5), abs=1e-3)
+    world.name_bodies(visible=False)
+    assert all(one.is_removed for one in canvas.labels.values())
 
 
 def test_shapes_of_the_attached_tool_are_drawn_on_the_flange_until_it_is_off() -> None:
@@ -139,7 +166,10 @@ def test_a_virtual_cabinet_with_a_scene_serves_its_clients() -> None:
 @pytest.mark.parametrize(
     ("options", "because"),
     [
-        (("--scene", "nowhere"), "one of bins, cage, narrow-slot, peg-in-hole, shelf, table, table-and-post"),
+        (
+            ("--scene", "nowhere"),
+            "one of bins, cage, narrow-slot, peg-in-hole, shelf, table, table-and-post, two-arms",
+        ),
         (("--scene", "table", "--fri", "1.15"), "cannot be used with heptarm sim fri"),
     ],
 )

@@ -31,6 +31,7 @@ PARAMETERS: dict[str, Any] = {
     "publish_signals": True,
     "publish_tf": True,
     "speed": 0.6,
+    "moveit": True,
     "gripper__open": "Hand.Open",
     "gripper__close": "Hand.Shut",
     "gripper__is_open": "Hand.Opened",

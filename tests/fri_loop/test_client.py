@@ -332,6 +332,9 @@ def test_a_frame_that_is_asked_for_is_reported(client: Client) -> None:
 def test_a_taken_port_and_bad_arguments_are_refused_in_words(client: Client) -> None:
     with pytest.raises(ConnectFailed, match="another program"):
         Client(client.port, realtime=False)
+    for host in ("127.0.0.1\0", "\ud800"):
+        with pytest.raises(ShapeError, match="host must have printable characters only"):
+            Client(0, host=host)
     with pytest.raises(CommandRejected, match="got '1.9'"):
         Client(0, version="1.9")
     with pytest.raises(CommandRejected, match=r"history must be in \[16, 1048576\], got 1"):

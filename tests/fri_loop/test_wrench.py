@@ -11,6 +11,9 @@ import pytest
 
 from heptarm import model
 from heptarm.fri import RedundancyStrategy
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.loop.settings import LoopSettings
+from heptarm.fri.loop.user_api import State
 from heptarm.fri.loop.wrench import chain_of, external_wrench
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import SessionState
@@ -37,6 +40,17 @@ def test_the_wrench_of_its_torques_is_found_again(name: str) -> None:
         found = external_wrench(arm, q, jacobian.T @ WRENCH)
         assert found == pytest.approx(WRENCH, rel=0.02, abs=0.1)
         assert found.tolist() == oracle.wrench(tuple(q), tuple(jacobian.T @ WRENCH))
+
+
+def test_with_a_media_flange_it_acts_on_that_flange() -> None:
+    """A Touch is 26 mm above the plain flange: taken for plain, a push of 30 N across has a moment of 0.78 Nm more."""
+    touch, q = robot("iiwa14", flange="touch"), np.radians([10.0, 40.0, -20.0, -80.0, 30.0, 50.0, 20.0])
+    axis = model.forward(touch, q)[:3, 2]
+    push = 30.0 * np.cross(axis, [1.0, 0.0, 0.0]) / np.linalg.norm(np.cross(axis, [1.0, 0.0, 0.0]))
+    torques = model.jacobian(touch, q).T @ np.concatenate([push, np.zeros(3)])
+    found, plain = external_wrench(touch, q, torques), external_wrench(robot("iiwa14"), q, torques)
+    assert found == pytest.approx(np.concatenate([push, np.zeros(3)]), rel=0.02, abs=0.1)
+    assert np.linalg.norm(plain[3:]) == pytest.approx(0.026 * 30.0, abs=0.05)
 
 
 def test_in_a_singular_posture_it_stays_bounded() -> None:
@@ -67,6 +81,24 @@ def _with(datagram: bytes, wire: Version, **values: object) -> bytes:
     message = codec.decode_monitoring(datagram, wire)
     assert message.monitor is not None
     return codec.encode_monitoring(replace(message, monitor=replace(message.monitor, **values)), wire)  # type: ignore[arg-type]
+
+
+def test_the_loop_estimates_it_at_the_media_flange() -> None:
+    touch = robot("iiwa14", flange="touch")
+    bench = Bench(settings=LoopSettings(model=touch, policy=Policy(Missing.HOLD, patience=1e6), history=256))
+    bench.controller.__class__ = Pushed
+    bench.activate()
+    bench.run(20, SessionState.COMMANDING_ACTIVE)
+    words = bench.layout.states.newest()
+    assert words is not None
+    state = State(words)
+    place = (
+        0.026 * model.forward(touch, state.q)[:3, 2]
+    )  # from the plain flange, on which the torques' wrench acts
+    moment = np.array(WRENCH[3:]) - np.cross(place, WRENCH[:3])
+    assert state.is_wrench_estimated
+    assert state.wrench == pytest.approx(np.concatenate([WRENCH[:3], moment]), rel=0.02, abs=0.1)
+    assert np.abs(moment - WRENCH[3:]).max() > 0.15
 
 
 @pytest.mark.parametrize("wire", Version)

@@ -27,7 +27,7 @@ def copy(tmp_path: Path) -> Path:
     for name in ("Makefile", "scripts/setup_ros2.sh"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
-    for name in ("scripts/ros2_interfaces.py", "scripts/ros2_requirements.txt", "build/stamps/venv"):
+    for name in ("scripts/ros2_interfaces.py", "scripts/ros2_requirements.txt", "build/stamps/demo"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
     for name in ("ros1/interfaces", "ros2/interfaces", "ros2/heptarm_msgs"):
@@ -45,7 +45,7 @@ def platform(folder: Path, system: str, machine: str) -> None:
 
 def make(folder: Path) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(
-        ["make", "-o", "build/stamps/venv", "build/stamps/ros2"],
+        ["make", "-o", "build/stamps/demo", "build/stamps/ros2"],
         check=False,
         cwd=folder,
         env=os.environ | {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}"},

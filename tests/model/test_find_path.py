@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,116 @@ def test_a_glass_stays_upright(wall: ha.CollisionModel) -> None:
     )  # it would tilt otherwise
 
 
+def tips(path: ha.Path) -> Array:
+    """Origins of the flange on a path, shape (n, 3) [m]."""
+    return model.forward_batch(IIWA, path.curve)[:, :3, 3]
+
+
+FREE = ha.CollisionModel("iiwa14")
+#: Flange at the left and the right; the line between them is along y.
+ONE, TWO = (model.forward(IIWA, q)[:3, 3] for q in (LEFT, RIGHT))
+
+
+@pytest.mark.parametrize(
+    ("keep", "distance"),
+    [
+        (ha.OnPlane(ONE, (2.0, 0.0, 0.0), within=0.02), lambda xyz: np.abs(xyz[:, 0] - ONE[0]).max()),
+        (
+            ha.OnLine(ONE, TWO - ONE, within=0.005),
+            lambda xyz: np.linalg.norm(xyz[:, ::2] - ONE[::2], axis=1).max(),
+        ),
+    ],
+)
+def test_the_tool_frame_stays_on_a_plane_or_a_line(keep: Any, distance: Any) -> None:
+    path = planning.find_path(FREE, start=LEFT, goal=RIGHT, keep=keep, timeout=120.0)
+    assert distance(tips(path)) <= keep.within + 1e-6
+    bare = planning.find_path(FREE, start=LEFT, goal=RIGHT)
+    assert distance(tips(bare)) > keep.within  # it would leave it otherwise
+
+
+def test_constraints_are_combined_and_a_workspace_is_one() -> None:
+    joints = np.array([IIWA.q_min, IIWA.q_max])
+    joints[:, 3] = -1.7, -1.0
+    box = ((0.0, -0.6, 0.0), (0.7, 0.6, ONE[2] + 0.02))
+    keep: list[ha.Upright | ha.Workspace] = [
+        ha.Upright("z", within=0.3),
+        ha.Workspace(box=box, joints=joints),
+    ]
+    path = planning.find_path(FREE, start=LEFT, goal=RIGHT, keep=keep, timeout=120.0)
+    assert tilts(path) <= 0.3 and tips(path)[:, 2].max() <= ONE[2] + 0.02
+    assert path.curve[:, 3].min() >= -1.7 and path.curve[:, 3].max() <= -1.0
+
+
+def test_an_axis_may_be_turned_as_far_as_is_allowed_at_the_goal() -> None:
+    goal = LEFT + deg(0, 0, 0, 0, 0, 11.4, 0)  # 0.199 rad of 0.2
+    path = planning.find_path(FREE, start=LEFT, goal=goal, keep=ha.Upright("z", within=0.2), timeout=120.0)
+    assert 0.19 < tilts(path) <= 0.2 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("keep", "match"),
+    [
+        (
+            ha.OnPlane((0, 0, ONE[2] + 0.1)),
+            r"^start contradicts keep: .* 100\.0 mm from the plane, at most 5 mm",
+        ),
+        (ha.OnLine((0, 0, ONE[2]), (0, 1, 0)), r"^start contradicts keep: .* mm from the line, at most 5 mm"),
+        (ha.Workspace(box=((0, 0, 0), (1, 1, 1))), r"^start contradicts keep: .* mm outside of the box"),
+        (ha.OnPlane(TWO, (0, 1, 0.2)), r"^start contradicts keep: .* mm from the plane"),
+        (
+            ha.OnPlane((0, 0, 3.0)),
+            r"^keep contradicts itself: no joint positions obey OnPlane\(\(0, 0, 3\)\)$",
+        ),
+        (
+            [ha.OnPlane(ONE), ha.Workspace(box=((-1, -1, 0.5), (1, 1, 1)))],
+            r"^keep contradicts itself: no joint positions obey OnPlane\(.*\) and box$",
+        ),
+        (ha.OnPlane(ONE, (1, -1, 0)), r"^goal contradicts keep: .* mm from the plane"),
+    ],
+)
+def test_constraints_that_cannot_be_kept_are_refused_in_one_sentence(keep: Any, match: str) -> None:
+    with pytest.raises(ha.NoPath) as error:
+        planning.find_path(FREE, start=LEFT, goal=RIGHT, keep=keep)
+    assert error.value.reason == "constraint" and error.value.hint
+    assert re.search(match, error.value.text), error.value.text
+
+
+def test_a_point_is_touched_along_an_axis(wall: ha.CollisionModel) -> None:
+    point, axis = np.array((0.5, 0.3, 0.3)), np.array((0.0, 0.6, -0.8))
+    goal = ha.Region.touching(point, axis=3.0 * axis, gap=0.02)
+    tcp = Pose.at(0.0, 0.0, 0.1)
+    path = planning.find_path(wall, start=LEFT, goal=goal, tcp=tcp, timeout=60.0)
+    reached = tool_at(path.end, tcp)
+    assert reached.xyz == pytest.approx(point - 0.02 * axis, abs=1e-6)
+    assert reached.rotation[:, 2] == pytest.approx(axis, abs=1e-6)
+    up = ha.Region.touching(point, axis=(0, 0, 1)).pose.rotation[:, 2]
+    assert up == pytest.approx((0, 0, 1)) and ha.Region.touching(point).pose.rotation[:, 2] == pytest.approx(
+        (0, 0, -1)
+    )
+
+
+def test_a_path_is_improved_by_further_states(wall: ha.CollisionModel) -> None:
+    first, more, again = (
+        planning.find_path(wall, start=LEFT, goal=RIGHT, seed=3, improve=improve, timeout=120.0)
+        for improve in (0, 25, 25)
+    )
+    assert more.duration <= first.duration and more.stats.states >= first.stats.states + 25
+    assert more.points == again.points and is_free(wall, more)
+    seen: list[tuple[int, float]] = []
+    stopped = planning.find_path(
+        wall,
+        start=LEFT,
+        goal=RIGHT,
+        seed=3,
+        improve=10**6,
+        timeout=600.0,
+        progress=lambda states, nearest: seen.append((states, nearest)),
+        stop=lambda: seen[-1][0] > first.stats.states + 5,
+    )
+    assert stopped.duration <= first.duration  # what was found so far
+    assert [states for states, _ in seen] == sorted(states for states, _ in seen)
+
+
 def test_a_start_in_slight_contact_is_left() -> None:
     world = ha.CollisionModel("iiwa14", boxes=["0.6,0,0.1,0.4,0.8,0.2"])
     start = model.solve(IIWA, Pose.of((0.6, 0.0, 0.198), DOWN), near=LEFT.tolist())
@@ -223,7 +334,11 @@ def test_a_goal_that_contradicts_the_constraint_is_refused(wall: ha.CollisionMod
         ({"goal": "home"}, ha.ShapeError, "goal must be joint positions, a Pose, a Region"),
         ({"goal": []}, ha.ShapeError, "goal"),
         ({"goal": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
-        ({"keep": "z"}, ha.ShapeError, "keep"),
+        ({"keep": "z"}, ha.ShapeError, "keep must be Upright, OnPlane"),
+        ({"keep": [ha.Upright(), None]}, ha.ShapeError, "keep must be Upright, OnPlane"),
+        ({"keep": ha.Workspace(box=((0, 0, 0), (1, 1, 1)), frame="cell")}, ha.CommandRejected, "in the base"),
+        ({"keep": ha.Workspace(joints=(np.full(7, 5.0), np.full(7, 6.0)))}, ha.LimitError, "for A2"),
+        ({"improve": -1}, ha.LimitError, "improve"),
         ({"speed": 0.0}, ha.LimitError, "speed"),
         ({"timeout": 0.0}, ha.LimitError, "timeout"),
         ({"states": 1}, ha.LimitError, "states"),
@@ -242,6 +357,12 @@ def test_constraints_and_regions_are_checked() -> None:
         ha.Upright("w")  # type: ignore[arg-type]
     with pytest.raises(ha.LimitError, match="within"):
         ha.Upright("z", within=0.0)
+    with pytest.raises(ha.LimitError, match="normal must have a direction"):
+        ha.OnPlane((0.5, 0, 0.5), (0, 0, 0))
+    with pytest.raises(ha.LimitError, match="within"):
+        ha.OnLine((0.5, 0, 0.5), (1, 0, 0), within=0.0)
+    with pytest.raises(ha.LimitError, match="gap"):
+        ha.Region.touching((0.5, 0, 0.5), gap=-0.1)
     with pytest.raises(ha.LimitError, match="cone"):
         ha.Region.of(Pose.at(0.5, 0, 0.5), cone=4.0)
     with pytest.raises(ha.LimitError, match=r"box\[1\]"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -141,6 +142,50 @@ def test_adding_a_body_leaves_the_others_where_they_are() -> None:
     assert [one for one in table.clearances(near, below=0.3) if one.second == "cube"] == before
 
 
+def test_changes_of_a_world_are_counted_and_waited_for(world: ha.CollisionModel) -> None:
+    before = world.revision
+    world.add("ball", shapes.sphere(0.1), at=Pose.at(1.0, 0.0, 0.5))
+    world.place("ball", Pose.at(1.0, 0.5, 0.5))
+    world.hold("ball", Pose.at(0.0, 0.0, 0.2))
+    world.release("ball")
+    view = world.carrying(None)
+    assert world.revision == view.revision == before + 4
+    world.remove("ball")
+    assert (world.revision, view.revision) == (before + 5, before + 4)
+    with pytest.raises(ha.CommandRejected):
+        world.remove("ball")
+    assert world.wait_for_change(before + 5, timeout=0.0) == before + 5  # a refused change is none
+    ended = threading.Thread(target=world.add_points, args=([[1.0, 0.0, 0.5]],))
+    ended.start()
+    assert world.wait_for_change(before + 5, timeout=60.0) == before + 6
+    ended.join()
+
+
+def test_a_world_is_changed_while_other_threads_check_it(world: ha.CollisionModel) -> None:
+    world.add("ball", shapes.sphere(0.1), at=Pose.at(0.0, 0.0, 1.4))
+    touch, free, q = Pose.at(0.0, 0.0, 1.4), Pose.at(0.0, 0.0, 3.0), np.zeros((20, 7))
+    ended = threading.Event()
+
+    def change() -> None:
+        for number in range(200):
+            world.place("ball", free if number % 2 == 0 else touch)
+            if number % 50 == 0:
+                world.add(
+                    f"post {number}", shapes.box(0.1, 0.1, 0.1), at=Pose.at(-1.0, 0.0, 0.5 + 0.001 * number)
+                )
+        ended.set()
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    seen = set()
+    while not ended.is_set():
+        distances = world.distances(q, below=0.05)
+        assert (distances == distances[0]).all()  # all of one check are of one world
+        seen.add(bool(np.isfinite(distances[0])))
+    thread.join()
+    assert seen and world.distances(q, below=0.05)[0] < 0.0
+
+
 def test_many_postures_at_once_agree_with_each_alone(world: ha.CollisionModel) -> None:
     world.add("box", shapes.box(0.3, 0.3, 0.3), at=Pose.at(0.5, 0.2, 0.4))
     q = np.random.default_rng(1).uniform(IIWA.q_min, IIWA.q_max, (200, 7))
@@ -165,14 +210,18 @@ def test_a_line_is_free_where_no_first_touch_is_on_it() -> None:
         end = np.clip(start + random.uniform(-0.6, 0.6, 7), IIWA.q_min, IIWA.q_max)
         is_free, touch = world.is_free(start, end), world.first_on([start, end])
         assert is_free == (touch is None)
-        part = 1.0 if touch is None else max(0.0, touch.at - 1e-3)
-        many = start + np.linspace(0.0, part, 150)[:, None] * (end - start)
-        assert world.distances(many, below=world.margin).min() >= 0.5 * world.margin
+        many = start + np.linspace(0.0, 1.0, 150)[:, None] * (end - start)
+        if touch is None:
+            assert world.distances(many, below=world.margin).min() >= -1e-6
+        else:
+            assert touch.clearance == world.touching(touch.q)[0]
+            assert touch.q == pytest.approx(start + touch.at * (end - start))
         seen[is_free] += 1
     assert min(seen.values()) > 10
-    inside = flange_at(0.5, 0.0, 0.5)
-    world.add("crate", shapes.sphere(0.1), at=Pose.at(0.5, 0.0, 0.32))
-    assert world.touching(inside) and world.is_free(inside, flange_at(0.5, 0.0, 0.7))  # a contact may be left
+    bare, inside = ha.CollisionModel("iiwa14"), flange_at(0.5, 0.0, 0.5)
+    bare.add("ball", shapes.sphere(0.1), at=Pose.at(0.5, 0.0, 0.402))
+    assert bare.touching(inside) and bare.is_free(inside, flange_at(0.5, 0.0, 0.7))  # a contact may be left
+    assert not bare.is_free(inside, flange_at(0.5, 0.0, 0.45))
     with pytest.raises(ha.ShapeError, match="last"):
         world.is_free(inside, inside[:6])
     with pytest.raises(ha.LimitError, match="first"):

@@ -118,6 +118,8 @@ def test_the_first_free_port_is_taken() -> None:
     ("host", "port", "expected_text"),
     [
         ("127.0.0.1", 99999, r"port must be in \[0, 65535\], got 99999"),
+        ("127.0.0.1\0", 8080, "host must have printable characters only"),
+        ("\ud800", 8080, "host must have printable characters only"),
         ("127.0.0.1", -1, r"port must be in \[0, 65535\], got -1"),
         (
             "192.0.2.7",

@@ -14,7 +14,15 @@ import pytest
 
 import heptarm as ha
 from heptarm.arm.watchdog import TARGETS
-from heptarm.errors import CommandRejected, LimitError, ModeConflict, MotionAborted
+from heptarm.errors import (
+    CollisionForeseen,
+    CommandRejected,
+    LimitError,
+    ModeConflict,
+    MotionAborted,
+    NoPath,
+)
+from heptarm.model.kinematics import forward
 from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import PanelOptions, model_of
@@ -30,7 +38,9 @@ PATIENCE = 30.0
 @pytest.fixture(scope="module")
 def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PanelArm]:
     options = PanelOptions(
-        recordings=tmp_path_factory.mktemp("recordings"), gripper="open=MediaFlange.OutputX3Pin1"
+        recordings=tmp_path_factory.mktemp("recordings"),
+        gripper="open=MediaFlange.OutputX3Pin1",
+        scene="table",
     )
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -394,6 +404,32 @@ def test_the_motion_to_the_points_is_planned_and_shown(model: PanelArm, observer
     assert model.plan is None and model.plan_time == 0.0
 
 
+def test_a_path_to_the_handle_is_shown_first_and_driven_where_bodies_leave_it_free(
+    model: PanelArm, observer: ha.Arm
+) -> None:
+    there = HOME.copy()
+    there[0] = 0.7
+    goal = Pose.from_matrix(forward(model.arm.robot, there))
+    around = {"block": goal @ Pose.at(0.0, 0.0, 0.05)}  # in the palm of the gripper
+    with pytest.raises(NoPath, match="block"):
+        model.plan_to(goal, places=around)
+    with pytest.raises(CommandRejected, match="no path is shown"):
+        model.drive(places={})
+    away = {"block": Pose.at(0.0, 0.6, 0.3)}
+    model.plan_to(goal, places=away, speed=0.5)
+    assert model.has_path and model.plan is not None
+    message = model.poll().message
+    assert message is not None and "waypoint" in message.what
+    assert abs(resting(model, observer).q - HOME).max() < 1e-3, "a plan moves nothing"
+    with pytest.raises(CollisionForeseen, match="block"):
+        model.drive(places=around)
+    assert model.has_path
+    model.drive(places=away)
+    assert not model.has_path and model.plan is None
+    until(lambda: (found := model.poll().message) is not None and found.what == "Arrived at the handle")
+    assert resting(model, observer).pose.distance_to(goal) < 2e-3
+
+
 def test_the_gripper_opens_and_closes(model: PanelArm, observer: ha.Arm) -> None:
     def said(words: str) -> None:
         until(lambda: (m := model.poll().message) is not None and m.what == words)
@@ -496,6 +532,7 @@ def test_a_panel_that_only_shows_refuses_all_but_stop(model: PanelArm) -> None:
         shows.open_gripper,
         lambda: shows.operate("emergency_stop"),
         lambda: shows.jog(JointJog(np.zeros(7))),
+        lambda: shows.drive(places={}),
     )
     for action in actions:
         with pytest.raises(CommandRejected, match="only shows"):

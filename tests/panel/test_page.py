@@ -351,6 +351,16 @@ def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelAr
     until(is_dragged, "the handle was not dragged along its arrow")
     goal = model.goal
     assert goal is not None
+
+    # a path to it is shown first, and driven by a press of its own
+    page.press("Plan around bodies")
+    page.shows("nothing moves")
+    assert model.has_path and arm.state.pose.distance_to(start) < 2e-3
+    page.press("Drive the path")
+    page.shows("Arrived at the handle")
+    assert arm.wait_for_rest(timeout=PATIENCE).pose.distance_to(goal) < 2e-3
+    arm.move(ha.ptp(ha.deg(0, 25, 0, -90, 0, 65, 0)))
+
     with page.held("Hold: go to the handle"):
         arm.wait_until(lambda state: state.pose.distance_to(goal) < 2e-3, timeout=PATIENCE)
     assert arm.wait_for_rest(timeout=PATIENCE).pose.distance_to(goal) < 5e-3

@@ -10,6 +10,7 @@ import contextlib
 import math
 import os
 import socket
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -277,10 +278,13 @@ class Outside:
 
 def cut(arm: ha.Arm) -> None:
     """Cut the connection, as a pulled cable does to both sides."""
-    for name in os.listdir("/proc/self/fd"):
-        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(name))) as line:
-            if line.getpeername() == address(arm):
-                line.shutdown(socket.SHUT_RDWR)
+    for number in map(int, os.listdir("/proc/self/fd")):
+        with contextlib.suppress(OSError):
+            if not stat.S_ISSOCK(os.fstat(number).st_mode):  # else its copy would stay open
+                continue
+            with socket.socket(fileno=os.dup(number)) as line:
+                if line.getpeername() == address(arm):
+                    line.shutdown(socket.SHUT_RDWR)
 
 
 def address(arm: ha.Arm) -> tuple[str, int]:

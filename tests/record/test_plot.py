@@ -171,7 +171,7 @@ def test_a_spectrum_has_its_peak_where_the_signal_swings() -> None:
     assert np.nansum(line.y**2) * step == pytest.approx(3.0**2 / 2, rel=0.02)
 
 
-def test_a_histogram_shares_out_all_samples() -> None:
+def test_a_histogram_counts_all_samples() -> None:
     (row,) = recording().chart("wrench", kind="histogram").rows
     steps = row.lines[2]
     assert steps.y[1:-1:2].sum() == pytest.approx(100.0)

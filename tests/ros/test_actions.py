@@ -55,7 +55,7 @@ def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> No
 
 
 def test_names_of_actions_are_unique() -> None:
-    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 11
+    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 12
 
 
 def test_a_goal_of_the_gripper_reports_until_its_switches_confirm() -> None:

@@ -65,6 +65,9 @@ def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table: Any)
         "~/query_state",
         "~/controller_state",
         "~/gripper_cmd",  # of the class TwoSignalGripper, which is no member of the arm
+        "planning_scene",  # of CollisionModel, likewise
+        "collision_object",
+        "attached_collision_object",
         "forward_position_controller/commands",
         "forward_velocity_controller/commands",
         "/tf",

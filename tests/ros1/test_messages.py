@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import iiwa_msgs.msg
 import iiwa_msgs.srv
+import moveit_msgs.msg
 import pytest
 from control_msgs import msg, srv
 
@@ -59,3 +60,9 @@ IIWA_SUMS = {
 def test_sum_of_iiwa_stack(name: str) -> None:
     part, _, kind = name.partition(".")
     assert getattr(getattr(iiwa_msgs, part), kind)._md5sum == IIWA_SUMS[name]
+
+
+def test_sums_of_moveit() -> None:
+    """Each covers all the messages inside of it."""
+    assert moveit_msgs.msg.CollisionObject._md5sum == "dbba710596087da521c07564160dfccb"
+    assert moveit_msgs.msg.PlanningScene._md5sum == "acfc50bcfd6c7b978066bfa7c786002c"

@@ -11,7 +11,7 @@ import actionlib
 import pytest
 import rospy
 
-from tests.conformance import hands, surface
+from tests.conformance import hands, paths, surface
 from tests.conformance.stage import ROOT, Stage
 from tests.ros1.peer import NodeProcess, call, collect, publisher, until
 from tests.ros1.test_examples import run
@@ -107,10 +107,11 @@ def probe(ros: None, arena: Stage) -> Iterator[Client]:
     assert node.end() == 0, node.said
 
 
-CASES = surface.CASES | hands.CASES
+CASES = surface.CASES | hands.CASES | paths.CASES
 #: What takes longest: every run has it with the node of ROS 2.
 IN_LONG_RUN = {
     "a_collision_guard_stops_motions_and_makes_compliant",
+    "a_path_is_found_around_a_wall_and_moved_along",
     "a_trajectory_is_taught_and_replayed",
     "an_fri_session_is_opened_commanded_and_closed",
     "forward_controllers_are_followed",

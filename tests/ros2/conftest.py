@@ -119,7 +119,8 @@ def node(stage: Stage) -> Iterator[NodeProcess]:
     """The node of ROS 2 for most tests, active."""
     from tests.ros2.peer import PATIENT, NodeProcess
 
-    running = NodeProcess(stage.target, execution=os.environ.get("EXECUTION", "servo"), **PATIENT)
+    execution = os.environ.get("EXECUTION", "servo")
+    running = NodeProcess(stage.target, execution=execution, moveit=True, **PATIENT)
     yield running
     running.finish()
 

@@ -59,4 +59,4 @@ def test_the_command_line(client: Client) -> None:
 
 def test_the_commands_of_the_guide(client: Client) -> None:
     blocks = [body for kind, body in BLOCK.findall(GUIDE) if kind == "sh" and "ros2 launch" not in body]
-    assert len(shell.run(client.ros, "".join(blocks))) == 27
+    assert len(shell.run(client.ros, "".join(blocks))) == 28

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rclpy.action import ActionClient
 
-from tests.conformance import hands, surface
+from tests.conformance import hands, paths, surface
 from tests.conformance.stage import ROOT, Stage
 from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration
 from tests.ros2.test_examples import run
@@ -105,10 +105,15 @@ def probe(ros: Ros, arena: Stage) -> Iterator[Client]:
     node.finish()
 
 
-CASES = surface.CASES | hands.CASES
+CASES = surface.CASES | hands.CASES | paths.CASES
+#: Every run has it with the node of ROS 1, and test_moveit does nearly the same.
+IN_LONG_RUN = {"moveits_interface_plans_and_drives"}
+assert CASES.keys() >= IN_LONG_RUN
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(one, marks=[pytest.mark.long] if one in IN_LONG_RUN else []) for one in CASES]
+)
 def test_surface(probe: Client, arena: Stage, case: str) -> None:
     CASES[case](probe, arena)
 

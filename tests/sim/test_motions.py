@@ -181,3 +181,14 @@ def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(part: float) -> None
     assert (np.abs(np.diff(track.q_cmd, axis=0)) * 1e3 <= robot.dq_max * 1.01).all()
     assert (np.abs(track.acceleration) <= robot.ddq_max * 1.02).all()
     assert (np.abs(np.diff(track.acceleration, axis=0)) * 1e3 <= part * robot.dddq_max * 1.1).all()
+
+
+def test_no_axis_is_too_fast_between_the_samples_of_a_path() -> None:
+    """A random program found A1 at 1.0000076 of its speed, between two samples by which the path is timed."""
+    start = np.radians([43.232, 37.773, 23.685, -62.927, -15.449, 17.339, 37.122])
+    plant = Plant("iiwa14", q=tuple(start.tolist()))
+    goal = Pose.from_matrix(forward(plant.robot, np.radians([0, 30, -60, -90, 0, 45, -15])))
+    track = run(plant, MotionCommand(1, motions.lin(numbers(goal))))
+    fastest = float((np.abs(np.diff(track.q_cmd, axis=0)) * 1e3 / plant.robot.dq_max).max())
+    assert 0.999 < fastest <= 1.0
+    assert pose_of(plant).distance_to(goal) < 1e-3

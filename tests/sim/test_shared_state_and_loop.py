@@ -166,6 +166,41 @@ def test_a_tick_that_nobody_waits_for_begins_when_it_is_due() -> None:
     assert earliest >= 0 and not in_time
 
 
+_TOGETHER = """
+import sys, time
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.runtime.realtime_loop import RealtimeLoop
+from heptarm.planning.seam import TICK_NS, HeaderWords
+shared, ticks, early = SharedState(), [], []
+shared.header[HeaderWords.WAKE] = int(sys.argv[1])
+def tick():
+    shared.header[HeaderWords.NEWEST] += loop.allowed
+    newest = int(shared.header[HeaderWords.NEWEST])
+    early.append(int(shared.header[HeaderWords.ANCHOR]) + newest * TICK_NS // 10 - time.monotonic_ns())
+    ticks.append(loop.allowed)
+    loop.answer_gap = float(sys.argv[2])
+    if len(ticks) == 100:
+        loop.stop()
+loop = RealtimeLoop(shared, tick, speed=10.0, at_once=16)
+loop.run()
+print(max(ticks[1:]), max(early), loop.statistics.ticks - sum(ticks))
+"""
+
+
+@pytest.mark.parametrize(
+    ("wake", "gap", "most"), [(NEVER, 0.0, 10), (NEVER, 0.4, 1)], ids=["nobody waits", "FRI session"]
+)
+def test_faster_than_time_the_ticks_of_a_millisecond_are_one_call_unless_fri_answers_each(
+    wake: int, gap: float, most: int
+) -> None:
+    command = [sys.executable, "-c", _TOGETHER, str(wake), str(gap)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    called, earliest, uncounted = map(int, done.stdout.split())
+    assert called == most
+    assert earliest <= 0, "no tick runs ahead of time"
+    assert uncounted == 0
+
+
 _COLLECTIONS = """
 import gc
 from heptarm.sim.plant.shared_state import SharedState

@@ -11,11 +11,13 @@ import pytest
 from heptarm.model.kinematics import forward
 from heptarm.planning.geometry import Slerp
 from heptarm.planning.motion import PlanError
+from heptarm.planning.planner import plan
 from heptarm.planning.seam import PlantMotion
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import ROBOTS
 from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, numbers, run
@@ -133,3 +135,37 @@ def test_half_a_turn_that_no_direction_allows_is_refused() -> None:
     goal = Pose.from_matrix(forward(plant.robot, plant.snapshot.q)) @ Pose.xyz_abc(a=pi)
     with pytest.raises(PlanError, match="A7"):
         plant.submit(MotionCommand(1, motions.lin(numbers(goal))))
+
+
+@pytest.mark.parametrize("seed", [1, *range(2, longer(2, 20))])
+def test_a_line_on_which_a3_cannot_stay_jumps_nowhere(seed: int) -> None:
+    """Between lines on which A3 stays and refused ones, set-points took up to 360 times an axis' acceleration."""
+    arm, random = ROBOTS["iiwa14"], np.random.default_rng(seed)
+    planned, refused = 0, 0
+    for _ in range(longer(30, 60)):
+        start = random.uniform(0.9 * arm.q_min, 0.9 * arm.q_max)
+        end = np.clip(start + random.normal(0, 0.6, 7), 0.95 * arm.q_min, 0.95 * arm.q_max)
+        try:
+            found = plan(arm, motions.lin(numbers(Pose.from_matrix(forward(arm, end)))), start)
+        except PlanError as error:
+            refused += "where A3 cannot stay at its angle" in str(error)
+            continue
+        assert found.path is not None and found.timing is not None
+        planned, near, q = planned + 1, start, []
+        for time in np.arange(3e-4, found.duration, 1e-3).tolist():
+            near = found.path.at(found.timing.profile.at(time)[0], near)
+            q.append(near)
+        steps = np.diff(np.array(q), axis=0)
+        assert (np.abs(steps) * 1e3 / arm.dq_max).max() <= 1.0
+        assert (np.abs(np.diff(steps, axis=0)) * 1e6 / arm.ddq_max).max() <= 1.0
+    assert planned > 10 and refused > 1
+
+
+def test_with_an_e1_for_its_end_such_a_line_may_be_followed() -> None:
+    arm = ROBOTS["iiwa14"]
+    start, end = deg(143.2, 44.2, 13.8, -7.8, -10.3, 39.3, -83.6), deg(108.5, 114, 46.6, 12, -22.5, 32, -96)
+    goal = numbers(Pose.from_matrix(forward(arm, end)))
+    with pytest.raises(PlanError, match="where A3 cannot stay at its angle"):
+        plan(arm, motions.lin(goal), start)
+    found = plan(arm, motions.lin(goal, redundancy=(float(end[2]), -1, -1)), start)
+    assert found.end[2] == pytest.approx(end[2], abs=1e-6)

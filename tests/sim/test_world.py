@@ -10,7 +10,7 @@ import pytest
 
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.scene import Scene, Wiring, names
+from heptarm.sim.plant.scene import Scene, Wiring, is_mounted, names
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.sim.runtime.operator import SimulatedOperator
@@ -30,7 +30,8 @@ IS_OPEN, IS_CLOSED = "MediaFlange.InputX3Pin3", "MediaFlange.InputX3Pin4"
 
 def in_scene(name: str) -> Plant:
     plant = Plant(q=DOWN, scene=Scene.of(name))
-    plant.set_load_data(GRIPPER)
+    if is_mounted(plant.model):
+        plant.set_load_data(GRIPPER)
     return plant
 
 
@@ -185,7 +186,10 @@ def test_a_scene_of_your_own_may_include_the_ready_gripper_and_wire_it(tmp_path:
 @pytest.mark.parametrize(
     ("text", "because"),
     [
-        ("nowhere.xml", "one of bins, cage, narrow-slot, peg-in-hole, shelf, table, table-and-post"),
+        (
+            "nowhere.xml",
+            "one of bins, cage, narrow-slot, peg-in-hole, shelf, table, table-and-post, two-arms",
+        ),
         ("two-finger-gripper", "must be a file"),
         ("../scenes/table", "must be a file"),
     ],

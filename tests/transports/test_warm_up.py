@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import socket
 
 import pytest
@@ -26,3 +27,15 @@ def test_nothing_is_sent_without_a_loopback(monkeypatch: pytest.MonkeyPatch) -> 
     warm_up = WarmUpConnection()
     warm_up.send(b"target")
     warm_up.close()
+
+
+def test_without_a_file_descriptor_to_spare_nothing_is_sent() -> None:
+    """A servo motion that could not have the connection had begun already, and went on without its stream."""
+    limit, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))
+    try:
+        warm_up = WarmUpConnection()
+        warm_up.send(b"target")
+        warm_up.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (limit, hard))

@@ -42,6 +42,15 @@ def test_a_name_and_a_pose_mean_the_same_as_poses_in_the_base(name: str) -> None
     assert in_base(limited, FRAMES) == there.limited_to(0.3)
 
 
+def test_an_offset_in_the_axes_of_a_pose_is_that_in_its_axes() -> None:
+    start, offset = Pose.xyz_abc(0.4, -0.2, 0.5, *deg(20, 30, 150)), (0.1, 0.02, -0.05, *deg(10, -20, 30))
+    own = ha.lin_rel(*offset, frame=start.shifted(1.0, 2.0, 3.0))  # where its origin is does not count
+    assert own.frame == "base"
+    reached = Pose.of(start.xyz + own.offset.xyz, (own.offset @ Pose.of(np.zeros(3), start.quat)).quat)
+    assert reached.distance_to(start @ Pose.xyz_abc(*offset)) < 1e-12
+    assert reached.angle_to(start @ Pose.xyz_abc(*offset)) < 1e-7
+
+
 def test_arcs_and_ellipses_lie_in_the_frame() -> None:
     start = Pose.at(0.1, 0.0, 0.2)
     quarter = ha.arc(start, math.pi / 2, centre=(0, 0, 0.2), frame=TABLE)

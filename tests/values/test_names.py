@@ -25,6 +25,7 @@ NAMED: dict[str, Callable[[str], object]] = {
     "signal": SignalIs,
     "output": lambda name: SetOutput(name, True),
     "label": Notify,
+    "scene of a camera": lambda name: ha.Camera(scene=name),
     "client": lambda name: ha.connect("127.0.0.1:1", name=name, timeout=1.0),
 }
 

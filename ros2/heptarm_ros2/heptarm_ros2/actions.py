@@ -23,10 +23,12 @@ class ActionServers:
     thread of the executor; a coroutine that waits would be polled by all of them.
     """
 
-    def __init__(self, node: Node, context: NodeContext, names: str, group: Any) -> None:
+    def __init__(self, node: Node, context: NodeContext, group: Any) -> None:
         self._node = node
         self._dispatcher = ActionDispatcher(context)
-        self._servers = [self._server(row, group) for row in offered_actions(names)]
+        values = context.driver.configuration.values
+        rows = offered_actions(values["names"], with_moveit=values["moveit"])
+        self._servers = [self._server(row, group) for row in rows]
 
     def destroy(self) -> None:
         """Destroy the servers."""

@@ -31,14 +31,14 @@ class Commands:
                 f"{package} is not installed: topics and services with its types are left out"
             )
         at_once, one_service = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
-        one_topic = LeftAlone()
+        one_topic, one_scene = LeftAlone(), MutuallyExclusiveCallbackGroup()
         self._subscriptions = [
             node.create_subscription(
                 class_of(row.type, "msg"),
                 row.name,
                 self._on_message(row),
-                1,
-                callback_group=at_once if row.at_once else one_topic,
+                row.depth,
+                callback_group=at_once if row.at_once else one_scene if row.aside else one_topic,
                 qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             )
             for row in table.topics
@@ -85,7 +85,8 @@ class Commands:
 
     def _on_request(self, row: Service) -> Callable[[Any, Any], Any]:
         def callback(request: Any, response: Any) -> Any:
-            return self._requests.answer(row, request).fill(response)
+            # an empty one where its type cannot say that something failed
+            return self._requests.answer(row, request).fill(response) or response
 
         return callback
 

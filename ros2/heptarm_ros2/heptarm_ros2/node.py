@@ -172,7 +172,7 @@ class HeptarmNode(LifecycleNode):
         self._trajectories = TrajectoryAction(
             self, self.ros, self.driver, ("~/follow_joint_trajectory", *others), group
         )
-        self._actions = ActionServers(self, context, values["names"], group)
+        self._actions = ActionServers(self, context, group)
         self._commands = Commands(self, context)
         self._report_timer = self.create_timer(
             1.0 / values["diagnostics_rate"],

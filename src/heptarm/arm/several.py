@@ -23,14 +23,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Literal, TypeVar
 
+import numpy as np
+
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
 from heptarm.arm.motion.handle import MotionHandle, check_timeout
 from heptarm.arm.verbs import camera_feed
-from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
+from heptarm.errors import CollisionForeseen, CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
 from heptarm.values.checks import flag, instance, shown, within
+from heptarm.values.clearance import WorldOfArms
 from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
@@ -47,6 +50,10 @@ _PLANNING = 0.2
 _PAUSING = 0.5
 #: Longest wait for the state after the end of a motion [s].
 _SOON = 0.5
+#: Largest time between two samples of programs that are checked against each other [s].
+_STEP = 0.02
+#: Name of an arm without one in the worlds of the others.
+_UNNAMED = "this arm"
 #: Longest wait until a cabinet has taken up a program [s].
 _PATIENCE = 10.0
 
@@ -329,6 +336,7 @@ def start_together(
     mode: Mode | None = None,
     planning_time: float = _PLANNING,
     stop_others: bool = True,
+    collision_check: WorldOfArms | None = None,
 ) -> MotionOfArms:
     """Begin motions of several arms at the same moment, and return then.
 
@@ -341,11 +349,16 @@ def start_together(
         mode: control mode of all of them; see `Arm.start`.
         planning_time: time that the cabinets have to plan [s], 0 to 10.
         stop_others: if one arm fails, or its connection is lost, stop the others.
+        collision_check: the world of one of the arms, which has the others by their names, see
+            `heptarm.CollisionModel.with_arm`: before anything moves, the programs are planned, with what each arm
+            carries, and refused where arms would touch at any time. Other bodies are what `Arm.collision_check` is for.
+            It is no safety function, and the arms begin up to `skew` apart; give the world a margin. None: no check.
 
     Returns:
         The programs, all of them released.
 
     Raises:
+        CollisionForeseen: two arms would touch; nothing has moved.
         CommandRejected: a program was refused, or could not be planned; nothing has moved.
         ModeConflict: an arm has not come to rest.
         NotInControl: this client does not control an arm.
@@ -371,6 +384,8 @@ def start_together(
         except HeptarmError as error:
             _of(arm.name, error)
             raise
+    if collision_check is not None:
+        _check_together(collision_check, motions, speed=speed, mode=mode)
     handles: dict[Arm, MotionHandle] = {}
     try:
         _raise_first(_of_each(arms, Arm.pause))
@@ -397,6 +412,73 @@ def start_together(
         raise errors[0]
     skew = max(answered for _, answered in moments) - min(sent for sent, _ in moments)
     return MotionOfArms(handles, skew=skew, stops_others=stop_others)
+
+
+def _check_together(
+    world: WorldOfArms,
+    motions: Mapping[Arm, Motion | Sequence[Motion]],
+    *,
+    speed: float | None,
+    mode: Mode | None,
+) -> None:
+    """Plan the programs of all arms, and refuse them if two arms would touch at any time.
+
+    Raises:
+        CollisionForeseen: they would.
+        CommandRejected: a program cannot be planned, or the world has not all arms but one.
+    """
+    if not isinstance(world, WorldOfArms):
+        raise ShapeError(
+            f"collision_check must be a world of several arms, got {shown(world)}",
+            parameter="collision_check",
+            value=world,
+            hint='for example heptarm.CollisionModel("iiwa14", scene="two-arms").with_arm("right")',
+        )
+    own = [arm for arm in motions if arm.name not in world.arms]
+    if len(own) != 1:
+        given = ", ".join(arm.name or "an arm without a name" for arm in motions)
+        raise CommandRejected(
+            f"collision_check must have all arms but one, which it is made for, by their names: got a world with "
+            f"{', '.join(world.arms) or 'none'} for {given}",
+            parameter="collision_check",
+            hint="name the arms by connect_all(left=..., right=...), and add them by world.with_arm",
+        )
+    names = {arm: arm.name or _UNNAMED for arm in [*own, *(arm for arm in motions if arm not in own)]}
+    previews = {}
+    for arm in names:
+        try:
+            plan = arm.plan(motions[arm], speed=speed, mode=mode, step=_STEP)
+        except HeptarmError as error:
+            _of(arm.name, error)
+            raise
+        previews[arm] = (plan, plan.t / _override(arm))
+    t = np.unique(np.concatenate([times for _, times in previews.values()]))
+    paths = {
+        arm: np.stack([np.interp(t, times, column) for column in plan.q.T], axis=1)
+        for arm, (plan, times) in previews.items()
+    }
+    world, seen = own[0].loaded(world), own[0]
+    for arm in [*names][1:]:  # each gives it what it carries
+        world, seen = arm.loaded(world.seen_by(names[arm], own=names[seen])), arm
+    for arm in [*names][:-1]:
+        if arm is not seen:
+            world, seen = world.seen_by(names[arm], own=names[seen]), arm
+        others = {names[other]: path for other, path in paths.items() if other is not arm}
+        touch = world.first_together(t, paths[arm], others)
+        if touch is not None:
+            raise CollisionForeseen(
+                f"{names[arm]}: {touch.clearance} after {touch.t:.2f} s",
+                touch=touch,
+                parameter="motions",
+                value=round(touch.clearance.distance, 4),
+                hint="let one of the arms begin later, or choose another path, see Arm.find_path",
+            )
+
+
+def _override(arm: Arm) -> float:
+    """Speed override of an arm, by which its program takes longer, (0, 1]."""
+    motion = arm.state.motion
+    return 1.0 if motion is None else max(motion.override, 0.01)
 
 
 def _released(arm: Arm) -> tuple[float, float]:

@@ -11,6 +11,8 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from math import inf
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar, overload
@@ -29,6 +31,7 @@ from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection, StopWatch
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import load_check, program_request
+from heptarm.arm.motion.following import FollowedPath, FollowTerms, PathFollower
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
@@ -48,12 +51,12 @@ from heptarm.arm.motion.servo import (
 )
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
-from heptarm.planning.search import STATES, TIMEOUT, Goal
+from heptarm.planning.search import STATES, TIMEOUT, Goal, Keep
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
 from heptarm.values.checks import array, callback, instance, integer, shown, within, word
-from heptarm.values.clearance import CollisionCheck, PlanningWorld
+from heptarm.values.clearance import CarriesTools, ChangingWorld, CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -62,7 +65,6 @@ from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.planned_path import Path as FoundPath
-from heptarm.values.motion.planned_path import Upright
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import Body, RobotModel
@@ -87,6 +89,7 @@ _TOOL_PATIENCE = 5.0
 REAL_SPEED = 0.25
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 _Arm = TypeVar("_Arm", bound="ArmVerbs")
+_Carrier = TypeVar("_Carrier")
 OnCollision: TypeAlias = Callable[[Collision], None] | None
 #: Guards of the blocks that `guarded` has begun, which FRI sessions obey, and what is called at a collision; at most
 #: one for an arm, since two would contradict each other.
@@ -548,12 +551,14 @@ class ArmVerbs(Sealed):
         goal: Goal,
         *,
         avoid: PlanningWorld | None = None,
-        keep: Upright | None = None,
+        keep: Keep | None = None,
         speed: float | None = None,
         timeout: float = TIMEOUT,
         states: int = STATES,
+        improve: int = 0,
         seed: int = 0,
         stop: Callable[[], bool] | None = None,
+        progress: Callable[[int, float], object] | None = None,
     ) -> FoundPath:
         """Find a path around bodies, from where the arm rests, with what is attached to it. Nothing moves.
 
@@ -567,12 +572,15 @@ class ArmVerbs(Sealed):
                 or several of these, of which the path reaches one.
             avoid: model of the bodies, such as a `heptarm.CollisionModel`, whose margin is kept; None:
                 `arm.collision_check`.
-            keep: constraint along the path, such as `Upright("z", within=0.1)`; None: none.
+            keep: constraint along the path, such as `Upright("z", within=0.1)`, or several of them; None: none.
             speed: ceiling for which its duration is computed, (0, 1]; the lower one of this and `arm.speed`.
             timeout: longest search [s].
             states: most joint positions that the search reaches.
+            improve: joint positions that it reaches after that in search of faster paths.
             seed: of its random numbers: the same one finds the same path in the same world.
             stop: called again and again; the search ends when it returns true.
+            progress: called again and again with the joint positions reached so far, and how near start and goal came
+                [rad].
 
         Raises:
             NoPath: none was found; the text has the bodies in the way, or how near it came.
@@ -589,9 +597,105 @@ class ArmVerbs(Sealed):
             speed=terms.speed,
             timeout=timeout,
             states=states,
+            improve=improve,
             seed=seed,
             stop=stop,
+            progress=progress,
         )
+
+    def loaded(self, model: _Carrier) -> _Carrier:
+        """A model of bodies with the shapes of what is attached to this arm, as its own checks and searches use it.
+
+        Args:
+            model: such as a `heptarm.CollisionModel`; it stays as it is.
+
+        Raises:
+            ShapeError: not a model that carries tools.
+        """
+        if not isinstance(model, CarriesTools):
+            raise ShapeError(
+                f"model must be a model of bodies that carries tools, got {shown(model)}",
+                parameter="model",
+                value=model,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
+        return self._tooling.loaded(model)
+
+    def follow(
+        self,
+        path: FoundPath,
+        *,
+        watch: ChangingWorld | None = None,
+        mode: Mode | None = None,
+        speed: float | None = None,
+        until: Condition | None = None,
+        then: Reaction | None = None,
+        timeout: float | None = None,
+        stop: Callable[[], bool] | None = None,
+        on_progress: Callable[[float], object] | None = None,
+    ) -> FollowedPath:
+        """Move along a path through a world that changes, and go around what comes into the way.
+
+        Another thread adds, places and removes bodies of `watch`. At each change the rest of the path is checked. Where
+        bodies would touch, the arm brakes on its path at once, holds its position, and goes on along a new path: to
+        the goal for which the first one was found, under the same constraint, with the same seed. What comes nearer
+        than the arm needs to brake, it cannot avoid. It is no safety function.
+
+        Args:
+            path: found by `find_path`, from where the arm rests.
+            watch: model of the bodies, such as a `heptarm.CollisionModel`; None: that of the path.
+            mode: see `move`.
+            speed: ceiling, (0, 1].
+            until: break condition, see `move`; it ends the whole.
+            then: see `move`.
+            timeout: longest time for all of it [s]; None: any.
+            stop: called again and again; the arm brakes on its path and stays when it returns true.
+            on_progress: called again and again with the completed fraction of the present path, [0, 1].
+
+        Returns:
+            How it ended, and the new paths.
+
+        Raises:
+            NoPath: there is no way any more, and the arm has braked; `reason` as in `find_path`.
+            MotionAborted: ended early, also while the arm held its position.
+            ModeConflict: another motion runs; or as in `move`.
+            Timeout: not ended in time; the arm was stopped.
+            CommandRejected: refused before anything moved, as in `move` and `find_path`.
+        """
+        instance(path, FoundPath, "path", hint="find one: arm.find_path(goal, avoid=world)")
+        world = path.world if watch is None else watch
+        if not isinstance(world, ChangingWorld):
+            raise ShapeError(
+                f"watch must be a model of bodies, got {shown(world)}",
+                parameter="watch",
+                value=world,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
+        limit = inf if timeout is None else check_timeout(timeout)
+        terms = self._terms(mode=mode, speed=speed, until=until, then=then)
+        link = self._connection
+        link.check_may_wait("arm.follow()")
+        link.check_no_block("arm.follow()")
+        search = partial(
+            self._foresight.find_path,
+            path.goal,
+            avoid=world,
+            keep=path.keep,
+            speed=terms.speed,
+            timeout=TIMEOUT,
+            states=STATES,
+            seed=path.stats.seed,
+        )
+        follow_terms = FollowTerms(
+            world=world,
+            search=search,
+            send=lambda motion, *, when: self._send((motion,), replace(terms, when=when)),
+            timeout=limit,
+            stop=(lambda: False) if stop is None else callback(stop, "stop"),
+            on_progress=(lambda _: None) if on_progress is None else callback(on_progress, "on_progress"),
+        )
+        with link.stopping_on_interrupt():
+            return PathFollower(link, self._tooling, follow_terms).follow(replace(path, world=world))
 
     @property
     def workspace(self) -> Workspace | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from math import pi, radians, sin
+from math import isnan, pi, radians, sin
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -267,7 +267,7 @@ def replay(
     ] = "servo",
     speed_scaling: Annotated[
         float,
-        Parameter(help="By servo: factor on the recorded speed; by spline: fraction of the full speed."),
+        Parameter(help="Factor on the recorded speed: 0.5 takes twice the time."),
     ] = 0.5,
     rate: Annotated[
         float, Parameter(help="Rows per second of a table that has no column of times [Hz].")
@@ -286,13 +286,14 @@ def replay(
     with access.target.connect() as arm:
         if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        with progress(arm, seconds=trajectory.duration / speed_scaling if by == "servo" else None):
+        with progress(arm, seconds=trajectory.duration / speed_scaling):
             done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
     if access.as_json:
         emit({"cause": done.result.cause.value, "deviation_rad": done.deviation, "lag_s": done.lag})
     else:
         off = np.degrees(done.deviation)
-        print(f"{done.result.cause.value} after {done.result.duration:.1f} s, {off:.2f} deg off at most")
+        lag = "" if isnan(done.lag) else f", {1e3 * done.lag:.0f} ms behind it"
+        print(f"{done.result.cause.value} after {done.result.duration:.1f} s, {off:.2f} deg off at most{lag}")
     return 0
 
 

@@ -11,7 +11,7 @@ from heptarm.cli.options import Json, Overwrite
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.record import plot as plots
-from heptarm.record.plot.chart import Style
+from heptarm.record.plot.content import Style
 from heptarm.record.plot.signals import Kind
 from heptarm.record.recording import load
 from heptarm.values.files import refuse_existing

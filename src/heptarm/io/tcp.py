@@ -181,24 +181,28 @@ class WarmUpConnection:
     __slots__ = ("_far", "_near")
 
     def __init__(self) -> None:
-        self._near = self._far = socket.socket()
+        self._near: socket.socket | None = None
+        self._far: socket.socket | None = None
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", 0)) as server:
-            self._near.connect(server.getsockname())
-            self._far = server.accept()[0]
+            self._near = socket.create_connection(server.getsockname())
             self._near.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._near.setblocking(False)
-        self._far.setblocking(False)
+            self._near.setblocking(False)
+            self._far = server.accept()[0]
+            self._far.setblocking(False)
 
     def send(self, data: bytes) -> None:
         """Send data and receive it again."""
+        if self._near is None or self._far is None:
+            return
         with contextlib.suppress(OSError):
             self._near.send(data)
             self._far.recv(_WARM_UP_BYTES)
 
     def close(self) -> None:
         """Close the connection. Closing twice is allowed."""
-        self._near.close()
-        self._far.close()
+        for end in (self._near, self._far):
+            if end is not None:
+                end.close()
 
 
 def _interval(seconds: float) -> bytes | int:

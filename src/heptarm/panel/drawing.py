@@ -12,7 +12,7 @@ import numpy as np
 from heptarm.io.plan_box import PlanOutline
 from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.carried import GEOMS, mujoco_size
-from heptarm.sim.plant.scene import Scene, is_mounted
+from heptarm.sim.plant.scene import PREFIX, Scene, is_mounted, plain
 from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
@@ -75,6 +75,7 @@ class DrawnWorld:
         self._scene, self._root, self._has_tool = server.scene, root, is_mounted(self._model)
         self._carried: tuple[tuple[Shape, Pose], ...] = ()
         self._carried_handles: list[Any] = []
+        self._names: list[tuple[int, Any]] = []
 
     def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
         """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
@@ -108,9 +109,47 @@ class DrawnWorld:
         for index, handle in self._handles:
             mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
             handle.position, handle.wxyz = self._data.geom_xpos[index].copy(), quat.copy()
+        for body, handle in self._names:
+            handle.position = self._data.xpos[body].copy()
         flange = self.flange
         mujoco.mju_mat2Quat(quat, flange.xmat)
         self._flange.position, self._flange.wxyz = flange.xpos.copy(), quat.copy()
+
+    @property
+    def places(self) -> dict[str, Pose]:
+        """Where the free bodies of the scene were shown last, in the base, by their names in the scene."""
+        found = {}
+        for body in self._standing:
+            if self._model.body_jntnum[body]:
+                w, x, y, z = self._data.xquat[body].tolist()
+                name = plain(str(self._model.body(body).name))
+                found[name] = Pose.of(self._data.xpos[body].copy(), (x, y, z, w))
+        return found
+
+    def name_bodies(self, *, visible: bool) -> None:
+        """Draw the names of the bodies of the scene, or draw them no more."""
+        for _, handle in self._names:
+            handle.remove()
+        self._names = []
+        if visible:
+            self._names = [
+                (
+                    body,
+                    self._scene.add_label(
+                        f"{self._root}/name/{body}",
+                        plain(str(self._model.body(body).name)),
+                        position=self._data.xpos[body].copy(),
+                    ),
+                )
+                for body in self._standing
+            ]
+
+    @property
+    def _standing(self) -> list[int]:
+        """The bodies of the scene that stand by themselves, not on the arm."""
+        model = self._model
+        bases = [body for body in range(1, model.nbody) if not model.body_parentid[body]]
+        return [body for body in bases if model.body(body).name.startswith(PREFIX)]
 
     @property
     def flange(self) -> Any:

@@ -23,6 +23,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.values.checks import integer
+from heptarm.values.frames import check_printable
 
 LAST_PORT = 65535
 #: Makes an answer, in a thread of its own: status, media type, text.
@@ -64,10 +65,12 @@ def free_port(host: str, port: int) -> int:
         port: TCP port, [0, 65535].
 
     Raises:
+        ShapeError: the address cannot be printed.
         LimitError: there is no such port.
         CommandRejected: this machine does not have that address, or no port from there on is free.
     """
     integer(port, "port", 0, LAST_PORT)
+    check_printable(host, "host")
     for one in range(port, LAST_PORT + 1):
         try:
             with socket.create_server((host, one), family=_family(host)):

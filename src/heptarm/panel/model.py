@@ -10,7 +10,7 @@ import itertools
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,8 +21,10 @@ from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionEr
 from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
+from heptarm.sim.collision import CollisionModel
 from heptarm.values.checks import Array, Value, within
 from heptarm.values.io import SignalValue
+from heptarm.values.motion.planned_path import Path as PlannedPath
 from heptarm.values.pose import Pose
 from heptarm.values.state import GROUP_NAMES, Safety, State
 
@@ -38,6 +40,8 @@ HISTORY = 10.0
 _MOST_FORCES, _MOST_PLACES = 1000, 1500
 #: The path gets a new point when the motion frame is this far from the last one [m].
 _STEP = 0.002
+#: Name of the place where a path to the handle ends.
+_HANDLE = "the handle"
 #: For so long a ghost stays at the end of its plan [s].
 _PAUSE = 1.0
 #: What a person does about a reason why the arm stands, and on a virtual robot.
@@ -125,6 +129,7 @@ class PanelArm:
         may_control: whether this panel may do more than look and stop.
         folder: where recordings go.
         gripper: that its buttons open and close; None: there is none.
+        scene: bodies around which it plans paths, as of `heptarm.CollisionModel`; empty: none.
 
     Attributes:
         plan: that a ghost of the arm shows; None: there is none.
@@ -139,8 +144,13 @@ class PanelArm:
         may_control: bool = True,
         folder: Path = Path(),
         gripper: Gripper | None = None,
+        scene: str = "",
     ) -> None:
         self.arm = arm
+        self._scene = scene
+        self._planning = threading.Lock()
+        self._world: CollisionModel | None = None
+        self._found: tuple[PlannedPath, float] | None = None
         self.gripper = gripper
         self.plan: PlanOutline | None = None
         self._plan_since = 0.0
@@ -363,11 +373,11 @@ class PanelArm:
     def show_plan(self, plan: PlanOutline) -> None:
         """Let a ghost of the arm move along a plan, again and again."""
         self._plan_since = time.monotonic()
-        self.plan = plan
+        self.plan, self._found = plan, None
 
     def hide_plan(self) -> None:
         """Show no plan."""
-        self.plan = None
+        self.plan = self._found = None
 
     @property
     def plan_time(self) -> float:
@@ -393,6 +403,62 @@ class PanelArm:
         found = self.arm.plan(self.points.motions(chosen), speed=speed)
         self.show_plan(found.outline())
         self._say(f"Planned: {found.duration:.1f} s; {found.closest('velocity')}")
+
+    @property
+    def has_path(self) -> bool:
+        """Whether the plan that is shown is a path that `drive` moves along."""
+        return self._found is not None
+
+    def plan_to(self, goal: Pose, *, places: Mapping[str, Pose], speed: float = 0.1) -> None:
+        """Find a path to a pose of the motion frame, around the bodies of the scene, and show it; nothing moves.
+
+        Args:
+            goal: in the base.
+            places: where free bodies of the scene are in the base, by name.
+            speed: fraction of the full speed, (0, 1].
+
+        Raises:
+            NoPath: none was found; the text has the bodies in the way.
+            ModeConflict: the arm moves, or a search runs.
+        """
+        if not self._planning.acquire(blocking=False):
+            raise ModeConflict("a search runs", parameter="goal", hint="wait until it has ended")
+        try:
+            world = self._placed(places)
+            found = self.arm.find_path(goal, avoid=world, speed=speed)
+            self.show_plan(self.arm.plan(found, speed=speed).outline())
+            self._found = found, speed
+            self._say(f"Path: {found}")
+        finally:
+            self._planning.release()
+
+    def drive(self, *, places: Mapping[str, Pose]) -> None:
+        """Move along the path that is shown, if it is free of the bodies as they are now; returns at once.
+
+        Args:
+            places: as of `plan_to`.
+
+        Raises:
+            CommandRejected: no path is shown; NotInControl, CollisionForeseen.
+            ModeConflict: the arm moves.
+        """
+        self._check_allowed()
+        if self._found is None:
+            raise CommandRejected("no path is shown", parameter="path", hint="plan one to the handle first")
+        if self._jogger.is_moving:
+            raise ModeConflict("the arm is being jogged", parameter="path", hint="release the button first")
+        path, speed = self._found
+        self._placed(places)
+        self._visit((_HANDLE,), self.arm.start(path, speed=speed, when="reject"))
+        self.hide_plan()
+
+    def _placed(self, places: Mapping[str, Pose]) -> CollisionModel:
+        """The bodies of the scene where they are now."""
+        if self._world is None:
+            self._world = CollisionModel(self.arm.robot.name, scene=self._scene)
+        for name, pose in places.items():
+            self._world.place(name, pose)
+        return self._world
 
     # ----------------------------------------------------------------------------------- gripper
 
@@ -467,10 +533,13 @@ class PanelArm:
         if self._jogger.is_moving:
             raise ModeConflict("the arm is being jogged", parameter="points", hint="release the button first")
         self._check_tool(chosen)
-        handle = self.arm.start(self.points.motions(chosen), speed=speed, when="reject")
-        self._visiting, self._handle = tuple(chosen), handle
+        self._visit(chosen, self.arm.start(self.points.motions(chosen), speed=speed, when="reject"))
+
+    def _visit(self, names: tuple[str, ...], handle: MotionHandle) -> None:
+        """Remember and report a motion to places of these names."""
+        self._visiting, self._handle = names, handle
         handle.add_done_callback(self._on_done)
-        self._say(f"Moving to {', '.join(chosen)}")
+        self._say(f"Moving to {', '.join(names)}")
 
     def _chosen(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Names of points, none: all of them; refused if there are none."""

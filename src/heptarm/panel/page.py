@@ -141,6 +141,8 @@ class ArmPage:
         _put(self._plan, texts.plan(model.plan))
         if self._hide.visible != (model.plan is not None):
             self._hide.visible = model.plan is not None
+        if model.may_control and self._drive.visible != model.has_path:
+            self._drive.visible = model.has_path
         _put(self._joints, texts.joints(state, model.arm.robot))
         _put(self._place, texts.place(readout.tcp, state))
         _put(self._wrench, texts.wrench(state))
@@ -293,6 +295,11 @@ class ArmPage:
         )
         self._wide()
         self._go = self._held("Hold: go to the handle", self._goal_jog, color="orange", visible=False)
+        self._plan_path = self._button(
+            "Plan around bodies", self._find_path, color="gray", visible=False, hint="a path to the handle"
+        )
+        self._drive = self._gui.add_button("Drive the path", color="orange", visible=False)
+        self._drive.on_click(self._runner(lambda: self.model.drive(places=self._world.places)))
         self._follows.visible = False
         self._gizmo = self._server.scene.add_transform_controls(
             f"{self._root}/handle", scale=0.22, visible=False, depth_test=False
@@ -330,8 +337,13 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        self._gizmo.visible = self._go.visible = self._follows.visible = shown
+        for one in (self._gizmo, self._go, self._follows, self._plan_path):
+            one.visible = shown
+        self._world.name_bodies(visible=shown)
         self.model.goal = None
+
+    def _find_path(self) -> None:
+        self.model.plan_to(self._gizmo_pose(), places=self._world.places, speed=self._fraction())
 
     async def _on_gizmo(self, event: Any) -> None:
         self.model.goal = self._gizmo_pose()

@@ -321,6 +321,7 @@ def model_of(
         operate=operate,
         may_control=options.may_control,
         folder=options.recordings,
+        scene=options.scene,
     )
 
 

@@ -85,9 +85,11 @@ class CompositePath:
     Attributes:
         marks: s at which each segment begins, and 1.
         line: see `JointPath`; it is not asked for one.
+        keeps_a3: see `JointPath`; its segments are asked.
     """
 
     line = None
+    keeps_a3 = False
 
     def __init__(self, segments: list[Segment]) -> None:
         self.segments = segments
@@ -134,6 +136,11 @@ class SubPath:
         """See `JointPath`."""
         whole = self._path.line
         return None if whole is None else (whole[0] + self._first * whole[1], self._span * whole[1])
+
+    @property
+    def keeps_a3(self) -> bool:
+        """See `JointPath`."""
+        return self._path.keeps_a3
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad]."""

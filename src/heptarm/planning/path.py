@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from math import nan, pi, remainder
+from math import isnan, nan, pi, remainder
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +23,10 @@ class JointPath(Protocol):
     def line(self) -> tuple[Array, Array] | None:
         """Joint positions at s = 0 and their span up to s = 1, shape (7,) each [rad]; None: it is no straight line."""
 
+    @property
+    def keeps_a3(self) -> bool:
+        """Whether A3 stays as far as it can: no E1 is given for the end."""
+
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad].
 
@@ -37,6 +41,7 @@ class JointLine:
     __slots__ = ("line",)
 
     line: tuple[Array, Array]
+    keeps_a3 = False
 
     def __init__(self, start: Array, end: Array) -> None:
         self.line = (start, end - start)
@@ -53,6 +58,11 @@ class Sequential:
     __slots__ = ()
 
     line = None
+
+    @property
+    def keeps_a3(self) -> bool:
+        """See `JointPath`."""
+        return False
 
 
 class CartesianPath(Sequential):
@@ -80,6 +90,11 @@ class CartesianPath(Sequential):
         self.status, self._start = status_of(robot, start.tolist()), float(start[2])
         self._turn = 0.0 if e1 is None else remainder(e1, 2 * pi) - self._start
         self._a3 = self._free if e1 is None else self._linear
+
+    @property
+    def keeps_a3(self) -> bool:
+        """See `JointPath`."""
+        return isnan(self._a3(0.0))
 
     def _linear(self, s: float) -> float:
         return self._start + s * self._turn

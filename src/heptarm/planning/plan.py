@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf, isnan
+from math import ceil, inf, isnan
 
 import numpy as np
 
+from heptarm.errors import Unreachable
 from heptarm.planning import seam
-from heptarm.planning.composite_path import CompositePath, constraints, sample
+from heptarm.planning.composite_path import CompositePath, PathSamples, constraints, sample
+from heptarm.planning.motion import PlanError
 from heptarm.planning.path import JointPath, PathLengths
 from heptarm.planning.table import MotionTable
 from heptarm.planning.time_scaling import PathTiming
@@ -19,6 +21,12 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
 _NEVER = 1e9
+#: An axis that accelerates by more than this fraction of its maximum jumps between two arm positions.
+_JUMPS = 2.0
+#: A3 that moves by less stays [rad].
+_STAYS = 1e-9
+#: Time between two set-points that are tried [s], and most of them.
+_TICK, _MOST_TICKS = 1e-3, 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +110,47 @@ def timed(
     edges = [0, *(index + 1 for index in rests)]
     sections = tuple(constraints(robot, path, samples, a, b) for a, b in pairwise(edges))
     timing = PathTiming(tuple(path.marks[edge] for edge in edges[1:]), sections)
+    _check_jumps(robot, path, samples, timing)
     fractions = [
         np.linspace(low, high, len(q)) for q, (low, high) in zip(samples.q, pairwise(path.marks), strict=True)
     ]
     lengths = PathLengths.through(np.concatenate(fractions), np.concatenate(samples.positions))
     table = MotionTable.of(path, timing.profile)
     return Plan(motion, start, samples.q[-1][-1], path, timing, lengths, tuple(marks), table)
+
+
+def _check_jumps(robot: RobotModel, path: CompositePath, samples: PathSamples, timing: PathTiming) -> None:
+    """Refuse a path on which A3 cannot stay, if set-points would then jump between two arm positions.
+
+    There each joint position depends on the one before, so the few samples of the path do not show the jumps.
+
+    Raises:
+        PlanError: a set-point jumps, or has no joint position next to the one before.
+    """
+    if not any(
+        segment.path.keeps_a3 and np.ptp(q[:, 2]) > _STAYS
+        for segment, q in zip(path.segments, samples.q, strict=True)
+    ):
+        return
+    profile = timing.profile
+    count = min(max(2, ceil(profile.duration / _TICK)), _MOST_TICKS)
+    times = np.linspace(0.0, profile.duration, count + 1)
+    places = [profile.at(time)[0] for time in times.tolist()]
+    joints, axis, failed = np.zeros((count + 1, len(samples.q[0][0]))), 3, 0
+    near = samples.q[0][0]
+    try:
+        for index, s in enumerate(places):
+            failed = index
+            joints[index] = near = path.at(s, near)
+    except Unreachable:
+        pass
+    else:
+        jumps = np.abs(np.diff(joints, 2, axis=0)) / (times[1] ** 2 * robot.ddq_max)
+        if jumps.max() <= _JUMPS:
+            return
+        failed, axis = (int(n) + 1 for n in np.unravel_index(int(jumps.argmax()), jumps.shape))
+    raise PlanError(
+        "planning",
+        f"Can not plan motion: A{axis} would have to jump at {100 * places[failed]:.0f} % of the path, where A3 cannot "
+        "stay at its angle (singularity); move there by a PTP, or give the end an E1",
+    )

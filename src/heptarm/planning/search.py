@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import NoPath, ShapeError, require
-from heptarm.model.batch import forward_batch, solve_batch
-from heptarm.model.kinematics import forward, jacobian
-from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
+from heptarm.model.batch import solve_batch
+from heptarm.planning.constraints import Constraints, constraints_of
+from heptarm.values.checks import Array, array, frozen, integer, shown, within
 from heptarm.values.clearance import Clearance, PlanningWorld
-from heptarm.values.motion.planned_path import Path, Region, SearchStats, Upright
+from heptarm.values.motion.planned_path import Path, PathConstraint, Region, SearchStats
 from heptarm.values.motion.ptp import Ptp
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import RobotModel
@@ -31,8 +31,8 @@ TIMEOUT, STATES = 5.0, 20_000
 _ORIGIN = Pose.of((0.0, 0.0, 0.0))
 #: Bodies at the start may overlap by so much: the arm then leaves them first [m].
 _SLIGHT = 0.005
-#: Longest step of a tree [rad], of all joints together; under a constraint.
-_STEP, _SHORT_STEP = 1.2, 0.15
+#: Longest step of a tree [rad], of all joints together; under constraints they are shorter.
+_STEP = 1.2
 #: Steps that joint positions reach at which bodies are in the way; targets that are drawn at a time.
 _REACH, _DRAWN = 1.7, 32
 #: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
@@ -43,16 +43,20 @@ _MOST_GOALS = 24
 _INSIDE = 0.02
 #: Shortcuts that are tried.
 _SHORTCUTS = 40
-#: Part of a constraint's tolerance that the search uses; the spline may use the rest.
-_USED = 0.7
 #: Times that points are added until the spline is as free as the straight lines.
 _REFINEMENTS = 12
 #: Samples of the spline between two of its points.
 _SAMPLES = 16
+#: Name of a search that needed no trees.
+_STRAIGHT = "straight"
+#: A tolerance that is exceeded by this fraction is kept.
+_ROUNDING = 1e-9
 #: Clearances up to this are reported [m].
 _REPORTED = 0.2
 
 Goal = npt.ArrayLike | Pose | Region | Sequence["npt.ArrayLike | Pose | Region"]
+#: What holds along the whole path: one constraint, or several at once.
+Keep = PathConstraint | Sequence[PathConstraint]
 
 
 def find_path(
@@ -61,12 +65,14 @@ def find_path(
     start: npt.ArrayLike,
     goal: Goal,
     tcp: Pose = _ORIGIN,
-    keep: Upright | None = None,
+    keep: Keep | None = None,
     speed: float = 1.0,
     timeout: float = TIMEOUT,
     states: int = STATES,
+    improve: int = 0,
     seed: int = 0,
     stop: Callable[[], bool] | None = None,
+    progress: Callable[[int, float], object] | None = None,
 ) -> Path:
     """Find a path around the bodies of a world; no arm is needed, and nothing moves.
 
@@ -78,12 +84,17 @@ def find_path(
         goal: joint positions; a pose of the tool frame, with any elbow; a `Region`; or several of these, of which the
             path reaches one.
         tcp: pose of the tool frame in the flange frame.
-        keep: constraint along the whole path; None: none.
+        keep: constraint along the whole path, or several of them: `Upright`, `OnPlane`, `OnLine`, a `Workspace` in the
+            base; None: none.
         speed: fraction of each joint's maximum for which the path is timed, (0, 1].
         timeout: longest time [s], up to 3600.
         states: most joint positions that it reaches, 10 to 1,000,000.
+        improve: joint positions that it reaches after that in search of shorter paths, 0 to 1,000,000: of all that it
+            finds before `timeout`, the fastest one is the result.
         seed: of its random numbers, 0 to 2^32 - 1.
         stop: called again and again; the search ends when it returns true.
+        progress: called again and again with the joint positions reached so far, and how near start and goal came
+            [rad].
 
     Raises:
         NoPath: none was found; `reason`, and the text, have the bodies in the way or how near it came.
@@ -98,8 +109,6 @@ def find_path(
             value=world,
             hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
         )
-    if keep is not None:
-        instance(keep, Upright, "keep")
     begin = array(start, 7, "start")
     world.robot.check(begin, "start")
     check_pose(tcp, "tcp")
@@ -108,16 +117,20 @@ def find_path(
         within(timeout, "timeout", 0.0, 3600.0, above=True, unit="s"),
         integer(states, "states", 10, 10**6),
         stop,
+        progress,
     )
+    more = integer(improve, "improve", 0, 10**6)
     random = np.random.default_rng(integer(seed, "seed", 0, 2**32 - 1))
     require("ruckig", extra="sim")
     checks = world.checks
-    search = _Search(world, begin, tcp, keep, limits, random)
+    search = _Search(world, begin, tcp, constraints_of(keep), limits, random)
     search.check_start()
     goals = search.goals(goal)
     points, planner = search.connected(goals)
-    points = search.shortened(points)
-    spline = search.smoothed(points, fraction)
+    spline = search.smoothed(search.shortened(points), fraction)
+    if planner != _STRAIGHT and more:
+        limits.states = limits.reached + more
+        spline = search.improved(goals, spline, fraction)
     stats = SearchStats(planner, seed, limits.reached, world.checks - checks, limits.elapsed)
     return Path(
         tuple(Ptp(frozen(point)) for point in spline.points[1:]),
@@ -126,6 +139,8 @@ def find_path(
         duration=spline.duration,
         clearance=search.nearest_on(spline.curve),
         stats=stats,
+        goal=tuple(_each(goal)),
+        keep=tuple(constraints_of(keep)),
         world=world,
     )
 
@@ -134,17 +149,30 @@ class _Budget:
     """What a search may take, and has taken.
 
     Attributes:
+        states: most joint positions that may be reached.
         reached: joint positions so far.
     """
 
-    def __init__(self, timeout: float, states: int, stop: Callable[[], bool] | None) -> None:
-        self._begin, self._timeout, self.states, self._stop = time.monotonic(), timeout, states, stop
-        self.reached = 0
+    def __init__(
+        self,
+        timeout: float,
+        states: int,
+        stop: Callable[[], bool] | None,
+        progress: Callable[[int, float], object] | None,
+    ) -> None:
+        self._begin, self._timeout, self.states = time.monotonic(), timeout, states
+        self._stop, self._progress = stop, progress
+        self.reached, self._is_stopped = 0, False
 
     @property
     def elapsed(self) -> float:
         """Time since the search began [s]."""
         return time.monotonic() - self._begin
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it is used up, or the search was stopped."""
+        return self.is_late or self._is_stopped or self.reached >= self.states
 
     @property
     def is_late(self) -> bool:
@@ -157,10 +185,12 @@ class _Budget:
         Raises:
             NoPath: it has.
         """
-        is_late = self.is_late
-        is_stopped = self._stop is not None and self._stop()
-        if not (is_late or is_stopped or self.reached >= self.states):
+        if self._progress is not None:
+            self._progress(self.reached, nearest)
+        self._is_stopped = self._is_stopped or (self._stop is not None and self._stop())
+        if not self.is_over:
             return
+        is_late, is_stopped = self.is_late, self._is_stopped
         why = "stopped" if is_stopped else f"not found in {self._timeout:g} s" if is_late else "not connected"
         near = "" if nearest == inf else f", nearest {nearest:.2f} rad"
         raise NoPath(
@@ -252,14 +282,14 @@ class _Search:
         world: PlanningWorld,
         start: Array,
         tcp: Pose,
-        keep: Upright | None,
+        keep: Sequence[PathConstraint],
         budget: _Budget,
         random: np.random.Generator,
     ) -> None:
         self._world, self._robot, self._start = world, world.robot, start
         self._tcp, self._budget, self._random = tcp, budget, random
-        self._cone = None if keep is None else _Cone(world.robot, tcp, keep, start)
-        self._step = _STEP if keep is None else _SHORT_STEP
+        self._keep = Constraints(keep, world.robot, tcp, start) if keep else None
+        self._step = _STEP if self._keep is None else self._keep.step
 
     # -------------------------------------------------------------------------- start and goals
 
@@ -291,17 +321,18 @@ class _Search:
                 parameter="goal",
                 hint="bring it nearer, change its orientation, or give a Region",
             )
-        if self._cone is not None:
-            kept = np.array([self._cone.excess(row) <= 0.0 for row in rows])
-            if not kept.any():
+        if self._keep is not None:
+            deviations = self._keep.deviations(rows)
+            least = float(deviations.min())
+            if least > 1.0 + _ROUNDING:
                 raise NoPath(
-                    f"goal contradicts keep: the {self._cone.keep.axis} axis of the tool frame would be turned by "
-                    f"{min(map(self._cone.tilt, rows)):.3f} rad, at most {self._cone.keep.within:g} rad are allowed",
+                    f"goal contradicts keep: {self._keep.described(rows[deviations.argmin()])}",
                     reason="constraint",
                     parameter="goal",
-                    hint="give a goal with that axis as at the start, or a larger angle",
+                    hint="give a goal that obeys it, or allow more",
                 )
-            rows = rows[kept]
+            self._keep.allow(least)
+            rows = rows[[self._keep.is_kept(row) for row in rows]]
         order = np.abs((rows - self._start) / self._robot.dq_max).max(axis=1).argsort(kind="stable")
         free: list[Array] = []
         blocked: list[Array] = []
@@ -355,14 +386,22 @@ class _Search:
             line = self._line(self._start, goal)
             if line is not None:
                 self._budget.reached += len(line)
-                return [self._start, *line], "straight"
-        name = "RRT-Connect" if self._cone is None else "CBiRRT"
+                return [self._start, *line], _STRAIGHT
+        return self._grown(goals, inf)
+
+    def _grown(self, goals: Array, longest: float) -> tuple[list[Array], str]:
+        """As `connected`, by two trees, through joint positions on paths that are not longer than one known [rad]."""
+        name = "RRT-Connect" if self._keep is None else "CBiRRT"
         one, other, is_swapped, nearest = _Tree(self._start[None]), _Tree(goals), False, inf
         low = np.minimum(np.minimum(self._robot.q_min + _INSIDE, self._start), goals.min(axis=0))
         high = np.maximum(np.maximum(self._robot.q_max - _INSIDE, self._start), goals.max(axis=0))
         while True:
             self._budget.check(nearest)
-            target = one.target(self._random, low, high)
+            target = (
+                one.target(self._random, low, high)
+                if longest == inf
+                else np.clip(self._near(goals, longest), low, high)
+            )
             if target is None:
                 continue
             new = self._extend(one, target, steps=1)
@@ -381,9 +420,28 @@ class _Search:
                     return [*first[0].back(first[1])[::-1], *last[0].back(last[1])[1:]], name
             one, other, is_swapped = other, one, not is_swapped
 
+    def _near(self, goals: Array, longest: float) -> Array:
+        """Joint positions on paths to a goal that are not longer than so much (Gammell et al. 2014), shape (7,) [rad].
+
+        They are in an ellipsoid with the start and the goal as its foci.
+        """
+        gaps = goals - self._start
+        lengths = np.linalg.norm(gaps, axis=1)
+        near = np.flatnonzero(lengths < longest)
+        chosen = int(self._random.choice(near)) if len(near) else int(lengths.argmin())
+        ball = self._random.normal(size=7)
+        ball *= self._random.uniform() ** (1.0 / 7.0) / np.linalg.norm(ball)
+        along = gaps[chosen] / max(float(lengths[chosen]), 1e-9)
+        across = np.sqrt(max(longest**2 - lengths[chosen] ** 2, 0.0))
+        part = ball @ along
+        found: Array = self._start + 0.5 * (
+            gaps[chosen] + longest * part * along + across * (ball - part * along)
+        )
+        return found
+
     def _line(self, first: Array, last: Array) -> list[Array] | None:
         """Joint positions behind the first on the way to the last: under a constraint several; None: it is not free."""
-        if self._cone is None:
+        if self._keep is None:
             return [last] if self._world.is_free(first, last) else None
         tree = _Tree(first[None])
         end = self._extend(tree, last, steps=1000)
@@ -401,14 +459,14 @@ class _Search:
             if length < 1e-9:
                 return index
             there = target if length <= self._step else here + self._step / length * gap
-            if self._cone is not None:
+            if self._keep is not None:
                 obeying = self._projected(here, there, target)
                 if obeying is None:
                     return result
                 there = obeying
             if not self._world.is_free(here, there):
                 half = 0.5 * (here + there)  # nearer to the bodies in the way, but not against them
-                if self._cone is None and self._world.is_free(here, half):
+                if self._keep is None and self._world.is_free(here, half):
                     self._budget.reached += 1
                     return tree.add(half, index)
                 return result
@@ -418,13 +476,13 @@ class _Search:
 
     def _projected(self, here: Array, there: Array, target: Array) -> Array | None:
         """A step that obeys the constraint; None: there is none that gets nearer."""
-        assert self._cone is not None
-        found = self._cone.projected(there)
-        if found is None or (found < self._robot.q_min).any() or (found > self._robot.q_max).any():
+        assert self._keep is not None
+        found = self._keep.projected(there)
+        if found is None:
             return None
         step = float(np.linalg.norm(found - here))
         is_away = np.linalg.norm(target - found) >= np.linalg.norm(target - here) - 1e-6
-        if is_away or step > 2.0 * self._step or self._cone.excess(0.5 * (here + found)) > 0.0:
+        if is_away or step > 2.0 * self._step or not self._keep.is_kept(0.5 * (here + found)):
             return None
         return found
 
@@ -463,7 +521,7 @@ class _Search:
         for place, index in ((low, first), (high, min(last, len(steps) - 1))):
             part = (place - marks[index]) / steps[index]
             ends.append(points[index] + part * (points[index + 1] - points[index]))
-        if self._cone is not None and any(self._cone.excess(end) > 0.0 for end in ends):
+        if self._keep is not None and not all(map(self._keep.is_kept, ends)):
             return points
         line = self._line(ends[0], ends[1])
         if line is None:
@@ -512,13 +570,16 @@ class _Search:
                 wrong = np.arange(len(points) - 1)
             near = np.unique(np.clip(np.concatenate([wrong - 1, wrong, wrong + 1]), 0, len(points) - 2))
             middles = 0.5 * (points[near] + points[near + 1])
+            if self._keep is not None:
+                obeying = [self._keep.projected(middle) for middle in middles]
+                middles = np.array([a if b is None else b for a, b in zip(middles, obeying)])
             points = np.insert(points, near + 1, middles, axis=0)
 
     def _wrong(self, curve: Array) -> npt.NDArray[np.int64]:
         """Pieces between two points on which a curve is not free; the first ones, empty: it is free."""
         outside = ((curve < self._robot.q_min) | (curve > self._robot.q_max)).any(axis=1)
-        if self._cone is not None:
-            outside |= self._cone.tilts(curve) > self._cone.keep.within
+        if self._keep is not None:
+            outside |= self._keep.deviations(curve) > 1.0 + _ROUNDING
         if outside.any():
             return np.unique(np.maximum(np.flatnonzero(outside) - 1, 0) // _SAMPLES)
         touch = self._world.first_on(curve)
@@ -528,6 +589,23 @@ class _Search:
         place = int(np.searchsorted(moves, touch.at * moves[-1])) - 1
         return np.array([max(place, 0) // _SAMPLES])
 
+    def improved(self, goals: Array, best: _Spline, speed: float) -> _Spline:
+        """The fastest of a spline and those of further searches, until the budget is used up.
+
+        Constraints make paths longer, so that only without them the length of a path bounds where a shorter one is.
+        """
+        while True:
+            longest = float(np.linalg.norm(np.diff(best.curve, axis=0), axis=1).sum())
+            try:
+                points, _ = self._grown(goals, longest if self._keep is None else inf)
+                found = self.smoothed(self.shortened(points), speed)
+            except NoPath:
+                if self._budget.is_over:
+                    return best
+                continue  # no smooth curve beside these lines
+            if found.duration < best.duration:
+                best = found
+
     def nearest_on(self, curve: Array) -> Clearance | None:
         """The nearest two bodies on a curve; None: none are near."""
         distances = self._world.distances(curve[:: _SAMPLES // 4], below=_REPORTED)
@@ -535,56 +613,6 @@ class _Search:
         found = self._world.clearances(worst, below=_REPORTED) if np.isfinite(distances).any() else ()
         allowed = [one for one in found if one.distance >= distances.min() - 1e-9]
         return allowed[0] if allowed else None
-
-
-class _Cone:
-    """The constraint that an axis of the tool frame keeps its direction.
-
-    Args:
-        robot: the robot.
-        tcp: pose of the tool frame in the flange frame.
-        keep: the axis and its tolerance.
-        start: joint positions at which the axis has its direction, shape (7,) [rad].
-    """
-
-    def __init__(self, robot: RobotModel, tcp: Pose, keep: Upright, start: Array) -> None:
-        self.keep, self._robot = keep, robot
-        self._axis = tcp.rotation[:, keep.column]  # in the flange frame
-        self._up = forward(robot, start)[:3, :3] @ self._axis
-
-    def tilts(self, q: Array) -> Array:
-        """Angles of the axis from its direction at n joint positions, shape (n,) [rad]."""
-        axes = forward_batch(self._robot, q)[:, :3, :3] @ self._axis
-        return np.asarray(np.arctan2(np.linalg.norm(np.cross(axes, self._up), axis=1), axes @ self._up))
-
-    def tilt(self, q: Array) -> float:
-        """Angle of the axis from its direction [rad]."""
-        return float(self.tilts(q[None])[0])
-
-    def excess(self, q: Array) -> float:
-        """By how much the search would leave its part of the tolerance [rad]; not positive: it does not."""
-        return self.tilt(q) - self.keep.within * 0.5 * (1.0 + _USED)
-
-    def projected(self, q: Array) -> Array | None:
-        """Joint positions nearby that obey the constraint, by Newton's method; None: there are none.
-
-        The rotation that turns the axis back moves the joints by the pseudo-inverse of the Jacobian's part across it.
-        """
-        for _ in range(20):
-            axis = forward(self._robot, q)[:3, :3] @ self._axis
-            turn = np.cross(axis, self._up)
-            sine = float(np.linalg.norm(turn))
-            angle = float(np.arctan2(sine, axis @ self._up))
-            most = self.keep.within * _USED
-            if angle <= most:
-                return q
-            if sine < 1e-9:
-                return None
-            wanted = turn / sine * (angle - 0.9 * most)
-            rows = jacobian(self._robot, q)[3:]
-            across = np.eye(3) - np.outer(axis, axis)  # a turn about the axis itself does not count
-            q = q + np.linalg.pinv(across @ rows, rcond=1e-3) @ wanted
-        return None
 
 
 def _sampled(region: Region, random: np.random.Generator) -> list[Pose]:

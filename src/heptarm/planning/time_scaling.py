@@ -85,6 +85,12 @@ class PathConstraints:
     braking: Array
     braking_jerk: Array
 
+    @property
+    def steepest(self) -> Array:
+        """Bounds of |dq/ds| around the samples, shape (n, m): between two of them it may lie beyond their chord."""
+        before, after = np.diff(self.s, prepend=self.s[0]), np.diff(self.s, append=self.s[-1])
+        return np.abs(self.first) + np.abs(self.third) * (np.maximum(before, after) ** 2 / 8)[:, None]
+
     def stop_limits(self, s: float, speed: float) -> ProfileLimits:
         """Limits of s for coming to rest from a place and a speed ds/dt."""
         low = max(0, int(np.searchsorted(self.s, s, side="right")) - 1)
@@ -228,7 +234,8 @@ def time_optimal(path: PathConstraints) -> TimeLaw:
     Raises:
         CommandRejected: an axis would have to move infinitely fast.
     """
-    first, second, third = (np.abs(x) + _TINY for x in (path.first, path.second, path.third))
+    second, third = (np.abs(x) + _TINY for x in (path.second, path.third))
+    first = path.steepest + _TINY
     fastest = np.minimum(path.fastest, (path.velocity / first).min(axis=1))
     simple, excess = _simple_profile(path, fastest, first)
     if simple is not None and excess <= _TOLERANCE:
@@ -268,13 +275,13 @@ def _axis_excess(path: PathConstraints, profile: JerkProfile, limits: ProfileLim
     s, speed, acceleration = np.array([profile.at(time) for time in times.tolist()]).T
     v, a = speed[:, None], acceleration[:, None]
     j = np.gradient(acceleration, times)[:, None]
-    first, second, third = (
+    steepest, first, second, third = (
         np.column_stack([np.interp(s, path.s, column) for column in x.T[:_AXES]])
-        for x in (path.first, path.second, path.third)
+        for x in (path.steepest, path.first, path.second, path.third)
     )
     velocity, most, jerk = (x[0, :_AXES] for x in (path.velocity, path.acceleration, path.jerk))
     return max(
-        float((np.abs(first) * v / velocity).max()),
+        float((steepest * v / velocity).max()),
         sqrt(float((np.abs(first * a + second * v**2) / most).max())),
         float(np.cbrt((np.abs(first * j + 3 * second * v * a + third * v**3) / jerk).max())),
     )
@@ -409,12 +416,12 @@ def _excess(path: PathConstraints, step: float, speed: Array) -> tuple[Array, Ar
     place = path.s[0] + place * ((path.s[-1] - path.s[0]) / place[-1])
     v, acceleration = speed[:, None], np.gradient(speed, step)
     a, j = acceleration[:, None], np.gradient(acceleration, step)[:, None]
-    first, second, third = (
+    steepest, first, second, third = (
         np.column_stack([np.interp(place, path.s, column) for column in x.T])
-        for x in (path.first, path.second, path.third)
+        for x in (path.steepest, path.first, path.second, path.third)
     )
     at = np.clip(np.searchsorted(path.s, place), 0, len(path.s) - 1)
-    fast = np.maximum((np.abs(first) * v / path.velocity[at]).max(axis=1), speed / path.fastest[at])
+    fast = np.maximum((steepest * v / path.velocity[at]).max(axis=1), speed / path.fastest[at])
     hard = np.abs(first * a + second * v**2) / path.acceleration[at]
     sudden = np.abs(first * j + 3 * second * v * a + third * v**3) / path.jerk[at]
     result = np.zeros((3, len(path.s)))

@@ -17,7 +17,7 @@ from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout, image_data
 from heptarm.record.mcap_file import ARM, BEGIN, END
 from heptarm.record.pictures import Pictures
 from heptarm.record.plot import Chart, chart_of
-from heptarm.record.plot.chart import Style
+from heptarm.record.plot.content import Style
 from heptarm.record.plot.signals import Kind
 from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
 from heptarm.record.samples import signals_of
@@ -59,7 +59,7 @@ class Recording(RecordedData):
 
         Args:
             signals: names as in `names`, or "path"; none: the usual ones.
-            kind: "time"; "histogram": the share of the samples at each value; "spectrum": amplitude spectral density.
+            kind: "time"; "histogram": fraction of the samples at each value; "spectrum": amplitude spectral density.
 
         Raises:
             CommandRejected: no such signal, or nothing to draw.

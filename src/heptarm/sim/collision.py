@@ -6,17 +6,19 @@ safety function: it knows only what its scene contains.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
+from functools import wraps
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, require
-from heptarm.values.checks import Array, array, finite_entries, instance, numbers, shown, within
-from heptarm.values.clearance import Clearance, TouchOnPath
+from heptarm.values.checks import Array, array, finite_entries, frozen, instance, numbers, shown, within
+from heptarm.values.clearance import Clearance, ForeseenCollision, TouchOnPath
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import RobotModel
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from heptarm.sim.distances import Distances
     from heptarm.sim.plant.carried import CarriedShapes
     from heptarm.sim.plant.obstacles import Obstacle
+    from heptarm.sim.plant.other_arm import OtherArm
     from heptarm.sim.plant.scene import Scene
     from heptarm.sim.plant.world import Box
 
@@ -44,8 +47,35 @@ _LEAST_MARGIN = 1e-3
 _FAR = 0.05
 #: Most spheres of a cloud.
 _MOST_SPHERES = 5000
+#: First parts of names in compiled models, which no arm may have.
+_PREFIXES = ("scene", "tool", "workpiece", "added")
 #: Compiled models that are kept, one for each tool and workpiece that was carried lately.
 _MOST_KEPT = 8
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
+
+def _alone(method: _Method) -> _Method:
+    """A method during which no other thread reads or changes the model: MuJoCo computes in one set of arrays."""
+
+    @wraps(method)
+    def alone(self: CollisionModel, *args: Any, **kwargs: Any) -> Any:
+        with self._lock:
+            return method(self, *args, **kwargs)
+
+    return cast(_Method, alone)
+
+
+def _changes(method: _Method) -> _Method:
+    """A method that changes the world, alone; threads that wait for a change wake."""
+
+    @wraps(method)
+    def changes(self: CollisionModel, *args: Any, **kwargs: Any) -> None:
+        with self._lock:
+            method(self, *args, **kwargs)
+            self._revision += 1
+            self._lock.notify_all()
+
+    return cast(_Method, changes)
 
 
 class CollisionModel(Sealed):
@@ -55,6 +85,8 @@ class CollisionModel(Sealed):
     where its file has them, unless you `place` or `hold` them; others can be added and removed while a program runs.
 
     A gripper counts as open, as wide as it gets.
+
+    Its methods may be called from any thread: one that watches a camera changes the world while another one plans.
 
     Args:
         robot: name of the robot, such as "iiwa14".
@@ -80,24 +112,20 @@ class CollisionModel(Sealed):
         instance(robot, str, "robot")
         instance(scene, str, "scene")
         texts = [instance(text, str, "boxes") for text in _listed(boxes, "boxes")]
-        pairs = [tuple(_listed(pair, "allowed")) for pair in _listed(allowed, "allowed")]
-        if any(len(pair) != 2 or not all(isinstance(name, str) for name in pair) for pair in pairs):
-            raise ShapeError(
-                f"allowed must be pairs of names of bodies, got {shown(allowed)}",
-                parameter="allowed",
-                value=allowed,
-                hint='for example [("tool", "table")]',
-            )
+        pairs = _pairs(allowed)
         require("mujoco", extra="sim")
         from heptarm.sim.plant.scene import Scene
         from heptarm.sim.plant.world import Box
 
         self._robot = known(robot)
         self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
-        self._allowed = frozenset(frozenset(pair) for pair in pairs)
+        self._allowed = pairs
+        self._lock = threading.Condition(threading.RLock())
+        self._revision = 0
         self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
         self._added: dict[str, Obstacle] = {}
         self._carried: tuple[CarriedShapes, ...] = ()
+        self._arms: tuple[OtherArm, ...] = ()
         try:
             made = [Box.of(text) for text in texts]
             self._models = _Models(robot, made, Scene.of(scene) if scene else None)
@@ -108,15 +136,17 @@ class CollisionModel(Sealed):
             raise CommandRejected(str(error), parameter="scene" if scene else "boxes") from None
 
     def _compiled(self, before: Distances | None = None) -> Distances:
-        """The distances of the present world; free bodies are where they were before."""
+        """The distances of the present world; free bodies and other arms are where they were before."""
         from heptarm.sim.distances import Distances
 
-        model = self._models.carrying(self._carried, tuple(self._added.values()))
+        model = self._models.compiled(self._carried, tuple(self._added.values()), self._arms)
         made = Distances(model, self._allowed)
         if before is not None:
             for name in made.free:
                 if name in before.free:
                     made.put(name, before.place_of(name))
+            for name in set(made.arms) & set(before.arms):
+                made.set_arm(name, before.posture_of(name))
         made.hold(self._held)
         return made
 
@@ -141,12 +171,37 @@ class CollisionModel(Sealed):
         return self._distances.names
 
     @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the other arms in the world, see `with_arm`."""
+        return tuple(one.name for one in self._arms)
+
+    @property
     def checks(self) -> int:
         """Postures whose distances were computed since the world was changed last."""
         return self._distances.checks
 
     # --------------------------------------------------------------------------------- the world
 
+    @property
+    def revision(self) -> int:
+        """Counts the changes of the world: bodies that were added, removed, placed, held or released."""
+        return self._revision
+
+    def wait_for_change(self, revision: int, *, timeout: float) -> int:
+        """Wait until the world has changed since a revision.
+
+        Args:
+            revision: as `revision` was.
+            timeout: longest wait [s].
+
+        Returns:
+            The revision now: the same if nothing has changed.
+        """
+        with self._lock:
+            self._lock.wait_for(lambda: self._revision != revision, timeout)
+            return self._revision
+
+    @_changes
     def add(self, name: str, shape: Shape | Mesh | Sequence[Shape | Mesh], *, at: Pose = ORIGIN) -> None:
         """Add a body to the world. It can be placed, held and removed.
 
@@ -166,6 +221,7 @@ class CollisionModel(Sealed):
         parts: tuple[Shape | Mesh, ...] = tuple(instance(one, (Shape, Mesh), "shape") for one in given)
         self._add(name, parts, np.zeros((0, 3)), 0.0, at)
 
+    @_changes
     def add_points(
         self, cloud: npt.ArrayLike, *, radius: float = POINT_RADIUS, name: str = "points", at: Pose = ORIGIN
     ) -> None:
@@ -206,15 +262,8 @@ class CollisionModel(Sealed):
     ) -> None:
         from heptarm.sim.plant.obstacles import Obstacle
 
-        instance(name, str, "name")
+        self._check_new(name)
         check_pose(at, "at")
-        if not name or "/" in name or name in ("world", *self._distances.names):
-            raise CommandRejected(
-                f"name must be a new name without a slash, got {shown(name)}",
-                parameter="name",
-                value=name,
-                hint="remove the body of that name first, or place it: bodies are listed in `bodies`",
-            )
         self._added[name] = Obstacle(name, parts, at, points, radius)
         try:
             made = self._compiled(self._distances)
@@ -225,6 +274,17 @@ class CollisionModel(Sealed):
                 raise
             raise CommandRejected(f"{name} is no body: {error}", parameter="shape", value=name) from None
         self._distances = made
+
+    def _check_new(self, name: str) -> None:
+        """Refuse a name of a body or an arm that is no new one."""
+        instance(name, str, "name")
+        if not name or "/" in name or name in ("world", *_PREFIXES, *self._distances.names, *self.arms):
+            raise CommandRejected(
+                f"name must be a new name without a slash, got {shown(name)}",
+                parameter="name",
+                value=name,
+                hint="remove the body of that name first, or place it: bodies are listed in `bodies`, arms in `arms`",
+            )
 
     def _check_base(self, made: Distances, name: str) -> None:
         """Refuse a body inside the base of the arm.
@@ -243,6 +303,7 @@ class CollisionModel(Sealed):
                     hint="give its pose in the base of the arm [m], or leave out the points on the arm itself",
                 )
 
+    @_changes
     def remove(self, body: str) -> None:
         """Remove a body that was added.
 
@@ -256,6 +317,7 @@ class CollisionModel(Sealed):
         self._held.pop(body, None)
         self._distances = self._compiled(self._distances)
 
+    @_changes
     def place(self, body: str, pose: Pose) -> None:
         """Put a free body of the scene, or one that was added, somewhere: its pose in the base.
 
@@ -268,6 +330,7 @@ class CollisionModel(Sealed):
             self._distances.hold(self._held)
         self._distances.put(body, pose)
 
+    @_changes
     def hold(self, body: str, pose: Pose) -> None:
         """Let the arm hold a free body: from now on it moves with the flange, and may touch the tool.
 
@@ -283,6 +346,7 @@ class CollisionModel(Sealed):
         self._held[body] = pose
         self._distances.hold(self._held)
 
+    @_changes
     def release(self, body: str) -> None:
         """Let the arm hold a body no more; it stays where it was in the last check. See `place`.
 
@@ -293,6 +357,52 @@ class CollisionModel(Sealed):
         self._held.pop(body, None)
         self._distances.hold(self._held)
 
+    @_alone
+    def pose(self, body: str) -> Pose:
+        """Pose of a free body, or of one that was added, in the base; of one that is held: at the last check.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._distances.place_of(body)
+
+    @_alone
+    def held(self, body: str) -> Pose | None:
+        """Pose in the flange frame of a free body that the arm holds; None: the arm does not hold it.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._held.get(body)
+
+    @_alone
+    def shapes(self, body: str) -> tuple[Shape, ...]:
+        """Shapes of a free body, or of one that was added, in its frame; meshes are left out.
+
+        Raises:
+            CommandRejected: there is no free body of that name.
+        """
+        self._check_free(body)
+        return self._distances.shapes_of(body)
+
+    @_alone
+    def allowing(self, pairs: Iterable[tuple[str, str]]) -> CollisionModel:
+        """The same model, with the world as it is now, in which more pairs of bodies may touch.
+
+        Args:
+            pairs: names of bodies, such as ("part_1", "table").
+
+        Raises:
+            ShapeError: not pairs of names.
+        """
+        view = self._copied()
+        view._allowed = self._allowed | _pairs(pairs)
+        view._distances = view._compiled(self._distances)
+        return view
+
+    @_alone
     def carrying(
         self,
         tool: Tool | KnownTool | None,
@@ -304,7 +414,8 @@ class CollisionModel(Sealed):
 
         Their shapes are bodies with their names, mounted on the flange. They, the flange and the link before it count
         as neighbours. Where the scene has a tool of its own, that one is on the flange, and the shapes of `tool` are
-        not used. An arm does this by itself with what is attached to it.
+        not used. An arm does this by itself with what is attached to it. Later changes of either do not reach the
+        other; its `revision` begins as that of the world it was made from.
 
         Args:
             tool: the tool; None: none.
@@ -320,10 +431,196 @@ class CollisionModel(Sealed):
             instance(workpiece, (Workpiece, KnownTool), "workpiece")
         if at is not None:
             check_pose(at, "at")
-        view = copy(self)
-        view._held, view._added = dict(self._held), dict(self._added)
+        view = self._copied()
         view._carried = _carried(tool, workpiece, at)
         view._distances = view._compiled(self._distances)
+        return view
+
+    # -------------------------------------------------------------------------------- other arms
+
+    @_alone
+    def with_arm(
+        self,
+        name: str,
+        *,
+        at: Pose | None = None,
+        robot: str = "",
+        q: npt.ArrayLike | None = None,
+        tool: Tool | KnownTool | None = None,
+        workpiece: Workpiece | KnownTool | None = None,
+    ) -> CollisionModel:
+        """The same model, with the world as it is now, and another arm in it: its bodies are "NAME/link_3" and so on.
+
+        Checks and paths keep clear of it in the posture that `set_arm` gives it. `seen_by` is the same world for it.
+
+        Args:
+            name: of the arm, as of `connect_all`: a new name without a slash.
+            at: pose of its base in the base of this arm; None: where the scene has a site of that name.
+            robot: its name, such as "iiwa7"; "": as this one.
+            q: its posture, shape (7,) [rad]; None: all joints at 0.
+            tool: its tool, whose shapes it carries; None: none.
+            workpiece: what the tool holds; None: nothing.
+
+        Raises:
+            ShapeError: wrong types.
+            CommandRejected: the name is not new, no such robot, no place, or its base would be inside this one's.
+        """
+        from heptarm.sim.plant.other_arm import OtherArm
+
+        self._check_new(name)
+        place = self._models.site(name) if at is None else at
+        if place is None:
+            raise CommandRejected(
+                f"at must be the pose of the base of {name}: the scene has no site of that name, got None",
+                parameter="at",
+                value=None,
+                hint="for example at=heptarm.Pose.at(1.2, 0.0, 0.0)",
+            )
+        check_pose(place, "at")
+        model = known(instance(robot, str, "robot")) if robot else self._robot
+        posture = np.zeros(7) if q is None else array(q, 7, "q")
+        model.check(posture, "q")
+        view = self._copied()
+        view._arms = (*self._arms, OtherArm(name, model.name, place, _carried(tool, workpiece, None)))
+        view._distances = view._compiled(self._distances)
+        view._distances.set_arm(name, posture)
+        view._check_base(
+            view._distances, f"{name}/link_1"
+        )  # MuJoCo has no distance of two bases, which never move
+        return view
+
+    @_changes
+    def set_arm(self, name: str, q: npt.ArrayLike) -> None:
+        """Put another arm into a posture, such as the one of its newest state.
+
+        Args:
+            name: of the arm.
+            q: joint positions, shape (7,) [rad].
+
+        Raises:
+            CommandRejected: there is no arm of that name.
+            ShapeError: not seven numbers.
+            LimitError: beyond the limits of its joints.
+        """
+        other = self._arm(name)
+        posture = array(q, 7, "q")
+        known(other.robot).check(posture, "q")
+        self._distances.set_arm(name, posture)
+
+    @_alone
+    def seen_by(self, name: str, *, own: str, q: npt.ArrayLike | None = None) -> CollisionModel:
+        """The same world for another arm in it: what it checks and plans is that arm, in whose base all poses are.
+
+        Bodies that this arm holds stay where they are, and do not move with it there.
+
+        Args:
+            name: of the other arm.
+            own: name under which this arm is in that world.
+            q: posture of this arm there, shape (7,) [rad]; None: all joints at 0.
+
+        Raises:
+            CommandRejected: there is no arm of that name, or `own` is not a new one.
+            ShapeError: wrong types.
+            LimitError: beyond the limits of the joints.
+        """
+        from heptarm.sim.plant.other_arm import OtherArm
+
+        chosen = self._arm(name)
+        self._check_new(own)
+        posture = np.zeros(7) if q is None else array(q, 7, "q")
+        self._robot.check(posture, "q")
+        back = chosen.pose.inverse()
+        others = (OtherArm(one.name, one.robot, back @ one.pose, one.carried) for one in self._arms)
+        view = self._copied()
+        view._robot, view._carried, view._held = known(chosen.robot), chosen.carried, {}
+        view._arms = (
+            OtherArm(own, self._robot.name, back, self._carried),
+            *(one for one in others if one.name != name),
+        )
+        view._models = self._models.seen_by(name, view._robot.name, back, own)
+        view._distances = view._compiled()
+        view._distances.set_arm(own, posture)
+        for one in view.arms[1:]:
+            view._distances.set_arm(one, self._distances.posture_of(one))
+        for body in self._distances.free:
+            view._distances.put(body, back @ self._distances.place_of(body))
+        return view
+
+    def _arm(self, name: str) -> OtherArm:
+        instance(name, str, "name")
+        found = next((one for one in self._arms if one.name == name), None)
+        if found is None:
+            raise _unknown(name, self.arms, "another arm of the world", "name")
+        return found
+
+    @_alone
+    def first_together(
+        self, t: npt.ArrayLike, q: npt.ArrayLike, others: Mapping[str, npt.ArrayLike]
+    ) -> ForeseenCollision | None:
+        """The first time at which this arm and another one touch, when all move; other bodies do not count.
+
+        Between two times the joints move straight. As in `first_on`, the arms are checked where they could have met,
+        by the largest movement of any point of both, so that they never meet between two checks.
+
+        Args:
+            t: times, shape (n,) [s].
+            q: joint positions of this arm at these times, shape (n, 7) [rad].
+            others: likewise of other arms, by their names; those that are not named stay as they are.
+
+        Returns:
+            The time and the nearest bodies then; None: nothing touches. Other arms are where they were then, or at the
+            end.
+
+        Raises:
+            ShapeError: wrong shapes.
+            CommandRejected: there is no arm of that name.
+        """
+        from heptarm.sim.distances import Distances
+
+        rows = {"q": _rows(q, "q")} | {name: _rows(one, name) for name, one in others.items()}
+        times = finite_entries(numbers(t, "t", "times of shape (n,)"), "t")
+        if any(times.shape != (len(one),) for one in rows.values()):
+            raise ShapeError(
+                f"t and all joint positions must have the same length, got {times.shape} and "
+                f"{[len(one) for one in rows.values()]}",
+                parameter="t",
+            )
+        path = rows.pop("q")
+        movers: dict[str, Distances] = {
+            name: Distances(_Models(self._arm(name).robot, [], None).compiled(self._arm(name).carried), ())
+            for name in rows
+        }
+        free = -1.0  # bound on the movement until which nothing can meet [m]
+        for k in range(max(1, len(path) - 1)):
+            last = min(k + 1, len(path) - 1)
+            moved = self._distances.moved(path[last] - path[k])
+            moved += max(
+                (one.moved(rows[name][last] - rows[name][k]) for name, one in movers.items()), default=0.0
+            )
+            at = 0.0
+            while free < (1.0 - at) * moved or free < 0.0 or (last == len(path) - 1 and at < 1.0):
+                at = min(1.0, at + max(free, 0.0) / moved) if moved else 1.0
+                for name, row in rows.items():
+                    self._distances.set_arm(name, row[k] + at * (row[last] - row[k]))
+                here = path[k] + at * (path[last] - path[k])
+                found = self._distances.nearest_of_arms(here, max(_FAR, self._margin))
+                if found is not None and found[1] < self._margin:
+                    return ForeseenCollision(
+                        Clearance(*found[0], found[1]),
+                        float(times[k] + at * (times[last] - times[k])),
+                        0,
+                        frozen(here),
+                    )
+                free = max(self._margin, _LEAST_MARGIN)
+                free += max(_FAR, self._margin) if found is None else found[1]
+            free -= (1.0 - at) * moved
+        return None
+
+    def _copied(self) -> CollisionModel:
+        """A copy of which what is in the world can be changed."""
+        view = copy(self)
+        view._lock = threading.Condition(threading.RLock())
+        view._held, view._added = dict(self._held), dict(self._added)
         return view
 
     def _check_free(self, name: str) -> None:
@@ -333,6 +630,7 @@ class CollisionModel(Sealed):
 
     # ------------------------------------------------------------------------------------ checks
 
+    @_alone
     def clearances(self, q: npt.ArrayLike, *, below: float = NEAR) -> tuple[Clearance, ...]:
         """Pairs of bodies that are near each other at joint positions, the nearest first.
 
@@ -348,6 +646,7 @@ class CollisionModel(Sealed):
         """
         return self._clearances(array(q, 7, "q"), within(below, "below", 0.0, 1.0, unit="m"))
 
+    @_alone
     def touching(self, q: npt.ArrayLike) -> tuple[Clearance, ...]:
         """Pairs of bodies that touch at joint positions: nearer than `margin`, and not allowed to; as `clearances`."""
         return tuple(
@@ -356,6 +655,7 @@ class CollisionModel(Sealed):
             if frozenset((one.first, one.second)) not in self._allowed
         )
 
+    @_alone
     def distances(self, q: npt.ArrayLike, *, below: float = NEAR) -> Array:
         """Distance of the nearest two bodies at each of many joint positions; pairs that may touch do not count.
 
@@ -372,6 +672,7 @@ class CollisionModel(Sealed):
         rows, bound = _rows(q, "q"), within(below, "below", 0.0, 1.0, unit="m")
         return self._distances.nearest(rows, bound)
 
+    @_alone
     def first_on(self, path: npt.ArrayLike) -> TouchOnPath | None:
         """The first place on a joint path at which two bodies touch.
 
@@ -411,7 +712,8 @@ class CollisionModel(Sealed):
         at = fraction if further else at + fraction * (1.0 - at)
         return TouchOnPath(self.touching(q)[0], _place(points, piece + further, at), q)
 
-    def is_free(self, first: Array, last: Array) -> bool:
+    @_alone
+    def is_free(self, first: npt.ArrayLike, last: npt.ArrayLike) -> bool:
         """Whether nothing touches on a straight joint path: as `first_on`, and faster where something does.
 
         Args:
@@ -421,10 +723,7 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: not seven numbers.
         """
-        line = np.array([first, last], float)
-        if line.shape != (2, 7) or not isfinite(line.sum()):
-            array(first, 7, "first")
-            array(last, 7, "last")
+        line = np.array([_joints(first, "first"), _joints(last, "last")])
         free = self._distances.is_free(line, **self._steps)
         # a pair that touches at the beginning may be left
         return self.first_on(line) is None if free is None else free
@@ -489,24 +788,68 @@ class _Models:
         robot: its name.
         boxes: fixed boxes around it.
         scene: what else is around it; None: nothing.
+        origin: pose of boxes, scene and floor in the base of the arm.
+        tool_of: the other arm that has the tool of the scene; "": this one.
     """
 
-    def __init__(self, robot: str, boxes: list[Box], scene: Scene | None) -> None:
+    def __init__(
+        self,
+        robot: str,
+        boxes: list[Box],
+        scene: Scene | None,
+        *,
+        origin: Pose = ORIGIN,
+        tool_of: str = "",
+    ) -> None:
         self._robot, self._boxes, self._scene = robot, boxes, scene
-        self._made: dict[tuple[tuple[CarriedShapes, ...], tuple[Obstacle, ...]], Any] = {}
+        self._origin, self._tool_of = origin, tool_of
+        self._lock = threading.Lock()  # models of the same world share this in several threads
+        self._made: dict[tuple[object, ...], Any] = {}
 
-    def carrying(self, carried: tuple[CarriedShapes, ...], obstacles: tuple[Obstacle, ...]) -> Any:
-        """The model of an arm that carries shapes, among bodies that were added; the last ones are kept."""
+    def site(self, name: str) -> Pose | None:
+        """Where the scene has a site of that name, in the base of the arm; None: it has none."""
+        found = None if self._scene is None else self._scene.place_of(name)
+        return None if found is None else self._origin @ found
+
+    def seen_by(self, name: str, robot: str, back: Pose, own: str) -> _Models:
+        """Models of the same world for another arm in it.
+
+        Args:
+            name: of that arm.
+            robot: its robot.
+            back: pose of the base of this arm in its base.
+            own: name of this arm there.
+        """
+        tool_of = {"": own, name: ""}.get(self._tool_of, self._tool_of)
+        return _Models(robot, self._boxes, self._scene, origin=back @ self._origin, tool_of=tool_of)
+
+    def compiled(
+        self,
+        carried: tuple[CarriedShapes, ...],
+        obstacles: tuple[Obstacle, ...] = (),
+        arms: tuple[OtherArm, ...] = (),
+    ) -> Any:
+        """The model of an arm that carries shapes, among added bodies and other arms; the last ones are kept."""
         from heptarm.sim.plant.world import compiled
 
-        key = (carried, obstacles)
-        model = self._made.pop(key, None)
-        if model is None:
-            model = compiled(self._robot, self._boxes, self._scene, carried=carried, obstacles=obstacles)
-        self._made[key] = model
-        for oldest in list(self._made)[:-_MOST_KEPT]:
-            del self._made[oldest]
-        return model
+        key = (carried, obstacles, arms)
+        with self._lock:
+            model = self._made.pop(key, None)
+            if model is None:
+                model = compiled(
+                    self._robot,
+                    self._boxes,
+                    self._scene,
+                    carried=carried,
+                    obstacles=obstacles,
+                    arms=arms,
+                    origin=self._origin,
+                    tool_of=self._tool_of,
+                )
+            self._made[key] = model
+            for oldest in list(self._made)[:-_MOST_KEPT]:
+                del self._made[oldest]
+            return model
 
 
 def _carried(
@@ -523,11 +866,11 @@ def _carried(
     return tuple(one for one in found if one.shapes)
 
 
-def _unknown(name: str, known: tuple[str, ...], what: str) -> CommandRejected:
+def _unknown(name: str, known: tuple[str, ...], what: str, parameter: str = "body") -> CommandRejected:
     listed = ", ".join(known) or "none"
     return CommandRejected(
-        f"body must be {what}, one of {listed}; got {shown(name)}",
-        parameter="body",
+        f"{parameter} must be {what}, one of {listed}; got {shown(name)}",
+        parameter=parameter,
         value=name,
         allowed=listed,
     )
@@ -535,6 +878,18 @@ def _unknown(name: str, known: tuple[str, ...], what: str) -> CommandRejected:
 
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].
 _NEARER = 1e-4
+
+
+def _joints(values: npt.ArrayLike, name: str) -> Array:
+    """Joint positions of shape (7,); those of a search, which asks often, need no more than a look."""
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == float
+        and values.shape == (7,)
+        and isfinite(values.sum())
+    ):
+        return values
+    return array(values, 7, name)
 
 
 def _place(points: Array, piece: int, at: float) -> float:
@@ -557,6 +912,23 @@ def _rows(values: npt.ArrayLike, name: str) -> Array:
             hint="for example [[0, 0.5, 0, -1.5, 0, 1, 0], [0.3, 0.5, 0, -1.5, 0, 1, 0]]",
         )
     return points
+
+
+def _pairs(allowed: Iterable[tuple[str, str]]) -> frozenset[frozenset[str]]:
+    """Pairs of names of bodies that may touch.
+
+    Raises:
+        ShapeError: something else.
+    """
+    pairs = [tuple(_listed(pair, "allowed")) for pair in _listed(allowed, "allowed")]
+    if any(len(pair) != 2 or not all(isinstance(name, str) for name in pair) for pair in pairs):
+        raise ShapeError(
+            f"allowed must be pairs of names of bodies, got {shown(allowed)}",
+            parameter="allowed",
+            value=allowed,
+            hint='for example [("tool", "table")]',
+        )
+    return frozenset(frozenset(pair) for pair in pairs)
 
 
 def _listed(values: object, name: str) -> list[Any]:

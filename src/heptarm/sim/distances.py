@@ -15,10 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm._library import Unavailable, library
-from heptarm.sim.plant.carried import plain
+from heptarm.sim.plant.carried import GEOMS, plain
 from heptarm.sim.plant.native import mujoco_library
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
+from heptarm.values.shape import Shape, ShapeKind
 
 #: Where a shape belongs: what it may meet depends on it.
 _WORLD, _LINK, _TOOL, _HELD = range(4)
@@ -28,6 +29,8 @@ _MEETS[_WORLD, _WORLD] = _MEETS[_TOOL, _HELD] = _MEETS[_HELD, _TOOL] = False
 #: Shapes of a body that are tried one by one, not by a box around them.
 _FEW = 8
 _JOINTS = 7
+#: Kinds of shapes by MuJoCo's.
+_KINDS: dict[int, ShapeKind] = {int(geom): kind for kind, geom in GEOMS.items()}
 _POINTER, _WORD, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 #: MuJoCo's functions that are called in C.
 _CALLED = {"mj_kinematics": "kinematics", "mj_geomDistance": "distance"}
@@ -89,6 +92,7 @@ class Distances:
 
     Attributes:
         names: of all bodies, without the world.
+        arms: names of the other arms.
         free: names of the free bodies of the world.
         checks: postures computed so far.
     """
@@ -106,11 +110,19 @@ class Distances:
             if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
         }
         self.free = tuple(self._free_at)
+        self._arms_at = {
+            name.removesuffix("/link_0"): int(model.jnt_qposadr[model.joint(name.replace("link_0", "A1")).id])
+            for name in names
+            if name.endswith("/link_0") and plain(name) == name
+        }
+        self.arms = tuple(self._arms_at)
         self.checks = 0
         root = int(model.body("link_0").id)  # the arm and what is mounted on it are of the tree of the base
         bodies = model.geom_bodyid.astype(int)
         is_own = model.body_rootid[bodies] == root
         is_tool = np.array([names[body] != self._bodies[body] for body in bodies.tolist()])
+        roots = [int(model.body(f"{name}/link_0").id) for name in self.arms]
+        self._is_of_arm = np.isin(model.body_rootid[bodies], roots)
         self._fixed_group = np.where(is_own, np.where(is_tool, _TOOL, _LINK), _WORLD)
         self._geom_names = [
             (self._bodies[body] if body else plain(str(model.geom(geom).name))) or "world"
@@ -149,6 +161,27 @@ class Distances:
         return Pose.of(
             self._data.qpos[address : address + 3], np.roll(self._data.qpos[address + 3 : address + 7], -1)
         )
+
+    def set_arm(self, name: str, q: Array) -> None:
+        """Put another arm into a posture, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        self._data.qpos[address : address + _JOINTS] = q
+
+    def posture_of(self, name: str) -> Array:
+        """The posture of another arm, shape (7,) [rad]."""
+        address = self._arms_at[name]
+        return np.array(self._data.qpos[address : address + _JOINTS])
+
+    def shapes_of(self, name: str) -> tuple[Shape, ...]:
+        """Shapes of a body in its frame; those that are no box, cylinder, sphere or capsule are left out."""
+        model = self._model
+        found = []
+        for geom in np.flatnonzero([self._bodies[int(body)] == name for body in model.geom_bodyid]).tolist():
+            kind = _KINDS.get(int(model.geom_type[geom]))
+            if kind is not None:
+                at = Pose.of(model.geom_pos[geom], np.roll(model.geom_quat[geom], -1))
+                found.append(Shape(kind, _size(kind, model.geom_size[geom]), at))
+        return tuple(found)
 
     def hold(self, held: dict[str, Pose]) -> None:
         """Let the flange carry free bodies, and nothing else; their poses in the flange frame."""
@@ -274,6 +307,15 @@ class Distances:
         self.checks += checks.value
         return None if free < 0 else free > 0
 
+    def nearest_of_arms(self, q: Array, below: float) -> tuple[tuple[str, str], float] | None:
+        """The nearest bodies of this arm and another one, their distance [m]; None: none are nearer than `below`."""
+        geoms, distances = self.pairs(q, below)
+        counts = self._is_of_arm[geoms].any(axis=1) & self._counts(geoms)
+        if not counts.any():
+            return None
+        index = int(np.where(counts, distances, np.inf).argmin())
+        return self.named(*geoms[index].tolist()), float(distances[index])
+
     def named(self, first: int, second: int) -> tuple[str, str]:
         """Names of the bodies of two shapes, that of the arm first; both of the arm: in the order of the alphabet."""
         groups = int(self._group[first]), int(self._group[second])
@@ -357,6 +399,14 @@ def _quaternion(matrix: Array) -> Array:
     quat = np.zeros(4)
     mujoco.mju_mat2Quat(quat, matrix)
     return np.roll(quat, -1)
+
+
+def _size(kind: ShapeKind, size: Array) -> Array:
+    """The size of a shape, shape (3,) [m], from MuJoCo's half edges, or radius and half length."""
+    radius, half = float(size[0]), float(size[1])
+    if kind == "box":
+        return 2.0 * size
+    return np.array([radius, 0.0 if kind == "sphere" else 2.0 * half, 0.0])
 
 
 def _hulls(model: mujoco.MjModel) -> npt.NDArray[np.void]:

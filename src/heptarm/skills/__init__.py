@@ -3,8 +3,19 @@
 They use only the public methods of `Arm`, so each is an example of how to build one; `Arm` offers some as methods.
 """
 
+from heptarm.skills.grasping import Grasp, grasps, pick, place
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
 from heptarm.skills.insertion import Insertion, insert
 from heptarm.skills.teleoperation import teleoperate
 
-__all__ = ["Gripper", "Insertion", "TwoSignalGripper", "insert", "teleoperate"]
+__all__ = [
+    "Grasp",
+    "Gripper",
+    "Insertion",
+    "TwoSignalGripper",
+    "grasps",
+    "insert",
+    "pick",
+    "place",
+    "teleoperate",
+]

@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
-from heptarm.errors import InsertionFailed, MotionAborted, Timeout
+from heptarm.errors import InsertionFailed, MotionAborted, ShapeError, Timeout
+from heptarm.skills.grasping import PATIENCE
 from heptarm.values.checks import Array, Value, instance, within
+from heptarm.values.clearance import PlanningWorld
 from heptarm.values.condition.contact import axis_of
 from heptarm.values.condition.force import force as force_signal
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.compliance import pressing
 from heptarm.values.mode.impedance import STIFFEST
 from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.search import Spiral, spiral
 from heptarm.values.motion.spline import spline
-from heptarm.values.pose import Pose
+from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Cause
 from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
@@ -88,6 +91,8 @@ def insert(
     distance: float = 0.02,
     frame: str = TOOL,
     timeout: float = 60.0,
+    before: Pose | None = None,
+    world: PlanningWorld | None = None,
 ) -> Insertion:
     """Insert a part: approach the surface, search the hole with a spiral under force, push the part in.
 
@@ -106,18 +111,30 @@ def insert(
         distance: largest distance to the surface [m].
         frame: whose axes: "tool" (the motion frame's own), "base", or the name of a frame.
         timeout: longest time for the search, and for pushing [s].
+        before: pose of the motion frame before the hole, to which the arm moves first; None: it is there.
+        world: model of the bodies around which it moves there, such as a `heptarm.CollisionModel`; None: it moves there
+            by a PTP. What is inserted touches what it has to: the rest is not checked against it.
 
     Returns:
         Depth, offset and pose of the part.
 
     Raises:
+        NoPath: there is no way to `before`; nothing has moved.
+        ShapeError: a world without `before`, or wrong types.
         InsertionFailed: the hole was not found within the pattern or in time, or the part got stuck.
         MotionAborted: a motion ended early.
         LimitError: a value outside its range.
     """
     axis = axis_of(direction)
     instance(search, Spiral, "search", hint="make one with heptarm.spiral(radius)")
-    return _Insertion(
+    if world is not None and before is None:
+        raise ShapeError(
+            "world is that around which the arm moves to `before`, but this is not given",
+            parameter="before",
+            value=before,
+            hint="give before=, the pose of the motion frame before the hole, or leave out world",
+        )
+    task = _Insertion(
         arm,
         direction,
         axis,
@@ -126,7 +143,11 @@ def insert(
         force=within(force, "force", 0.0, _STRONGEST, above=True, unit="N"),
         distance=within(distance, "distance", 0.0, 0.5, above=True, unit="m"),
         timeout=within(timeout, "timeout", 0.0, 1e6, above=True, unit="s"),
-    ).run(search)
+    )
+    if before is not None:
+        check_pose(before, "before")
+        arm.move(ptp(before) if world is None else arm.find_path(before, avoid=world, timeout=PATIENCE))
+    return task.run(search)
 
 
 @dataclass(frozen=True, slots=True)

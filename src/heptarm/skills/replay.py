@@ -16,6 +16,7 @@ from heptarm.values.checks import Array, Value, callback, instance, within, word
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.ptp import ptp
+from heptarm.values.motion.spline import JointSpline
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.result import Cause, Result
 from heptarm.values.robot import RobotModel, known_robot
@@ -27,6 +28,10 @@ _SETTLE = 2.0
 _SETTLED, _STILL = 5e-3, 0.02
 #: The arm is at the start of the trajectory when no joint deviates more than this [rad].
 _AT_START = 1e-4
+#: A target of a stream is reached so long after the next one comes, so that the arm does not brake for a late one [s].
+_OVERLAP = 0.005
+#: Of a spline: the relative difference in duration that is none, and how many plans may be made for it.
+_SAME_TIME, _PLANS = 0.005, 10
 #: Points of a trajectory with which a position is compared.
 _DENSE = 2001
 
@@ -74,9 +79,10 @@ def replay(
     Args:
         arm: in control.
         trajectory: the taught trajectory; best trimmed and thinned.
-        by: "servo": with the taught timing, as a stream of targets; "spline": as one smooth motion with the cabinet's
-            timing, which needs no stream and stops on its path.
-        speed_scaling: by servo: factor on the taught speed; by spline: fraction of each axis' maximum, (0, 1].
+        by: "servo": with the taught timing, as a stream of targets; "spline": as one smooth motion of the taught
+            duration with the cabinet's timing between its ends, which needs no stream and stops on its path.
+        speed_scaling: factor on the taught speed: 0.5 takes twice the taught time. By spline a shorter time than the
+            limits of the joints and `arm.speed` allow becomes the shortest one that they allow.
         approach: speed of the motion to its start, a fraction of each axis' maximum in (0, 1].
         rate: targets per second [Hz].
         watchdog: by servo: longest gap between two targets; a longer one stops the arm [s]; None: five periods, at
@@ -100,9 +106,8 @@ def replay(
     if on_progress is not None:
         callback(on_progress, "on_progress")
     arm.servo(rate=rate, watchdog=watchdog, mode=mode, until=until)  # raises before anything moves
-    if by == "spline":
-        within(speed_scaling, "speed_scaling", 0.0, 1.0, above=True)
-    elif within(speed_scaling, "speed_scaling", 0.0, 100.0, above=True):
+    within(speed_scaling, "speed_scaling", 0.0, 100.0, above=True)
+    if by == "servo":
         _check_speed(trajectory, speed_scaling, arm.robot.dq_max * arm.speed)
         period = 1.0 / within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
         watchdog = REPLAY.time(watchdog, period=period)
@@ -125,10 +130,11 @@ class _Run:
 
     def by_spline(self) -> Replay:
         """Follow it as one spline."""
+        spline = self.trajectory.spline()
         handle = self.arm.start(
-            self.trajectory.spline(),
+            spline,
             mode=self.mode,
-            speed=self.speed_scaling,
+            speed=self._speed_of(spline),
             until=self.until,
             when="reject",
         )
@@ -144,9 +150,20 @@ class _Run:
         deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)
         return Replay(result, deviation)
 
+    def _speed_of(self, spline: JointSpline) -> float:
+        """The speed, a fraction of each axis' maximum, at which a spline takes the wanted time; 1: it takes longer."""
+        wanted, speed = self.trajectory.duration / self.speed_scaling, 1.0
+        for _ in range(_PLANS):
+            duration = self.arm.plan(spline, speed=speed).duration
+            if abs(duration / wanted - 1.0) < _SAME_TIME or (speed == 1.0 and duration > wanted):
+                break
+            speed = min(1.0, speed * duration / wanted)  # but for its ramps the duration goes with 1 / speed
+        return speed
+
     def by_servo(self, rate: float, watchdog: float | None) -> Replay:
         """Follow it by a stream of targets."""
         trajectory, per_second = self.trajectory, self.speed_scaling * self.arm.real_time_factor
+        ahead = 1.0 / rate + _OVERLAP
         seen: list[tuple[float, Array]] = []
         due = 0
         with self.arm.servo(
@@ -157,15 +174,16 @@ class _Run:
             acceleration=1.0,
             mode=self.mode,
             until=self.until,
+            min_trajectory_time=ahead,
         ) as servo:
             while servo.tick():
                 t = servo.t * per_second
-                servo.set(*trajectory.at(t + servo.period * per_second))
+                servo.set(*trajectory.at(t + ahead * per_second))  # where it will be when the arm gets there
                 try:
                     state = self.arm.state
                 except StaleState:
                     continue  # the stream goes on without feedback
-                seen.append((t, state.q))
+                seen.append((t - state.age * per_second, state.q))
                 self._report(min(1.0, t / trajectory.duration))
                 if t < trajectory.duration:
                     continue

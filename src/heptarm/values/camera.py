@@ -9,6 +9,7 @@ import numpy as np
 
 from heptarm.errors import LimitError, ShapeError
 from heptarm.values.checks import Array, array, instance, integer, shown, within, word
+from heptarm.values.frames import check_printable
 from heptarm.values.pose import Pose
 
 #: Farthest place of a camera from its frame's origin along each axis, shortest distance to what it looks at [m].
@@ -75,7 +76,7 @@ class Camera:
         )
         object.__setattr__(self, "rate", within(self.rate, "rate", 0.0, FASTEST, above=True, unit="Hz"))
         word(self.frame, "frame", FRAMES)
-        instance(self.scene, str, "scene")
+        check_printable(instance(self.scene, str, "scene"), "scene")
 
     @property
     def pose(self) -> Pose:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, runtime_checkable
 
 from heptarm.values.checks import Array, Value
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
+from heptarm.values.shape import Shape
 from heptarm.values.tool import KnownTool, Workpiece
 
 _Model_co = TypeVar("_Model_co", covariant=True)
@@ -66,9 +68,6 @@ class CarriesTools(Protocol[_Model_co]):
 class CollisionCheck(Protocol):
     """What `Arm.collision_check` needs; `heptarm.CollisionModel` is one."""
 
-    def is_free(self, first: Array, last: Array) -> bool:
-        """Whether nothing touches on a straight joint path, both shape (7,) [rad]."""
-
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
 
@@ -113,8 +112,83 @@ class PlanningWorld(Protocol):
     def touching(self, q: Array) -> tuple[Clearance, ...]:
         """Pairs of bodies that touch at joint positions, shape (7,) [rad]."""
 
+    def is_free(self, first: Array, last: Array) -> bool:
+        """Whether nothing touches on a straight joint path, both shape (7,) [rad]."""
+
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
+
+
+@runtime_checkable
+class WorldOfArms(Protocol):
+    """What a check of programs of several arms needs; `heptarm.CollisionModel` is one."""
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the other arms in the world."""
+
+    def carrying(
+        self,
+        tool: KnownTool | None,
+        workpiece: Workpiece | KnownTool | None = None,
+        *,
+        at: Pose | None = None,
+    ) -> WorldOfArms:
+        """The same world, of an arm that carries a tool and a workpiece."""
+
+    def seen_by(self, name: str, *, own: str) -> WorldOfArms:
+        """The same world for another arm in it, where this one has the name `own`."""
+
+    def first_together(self, t: Array, q: Array, others: Mapping[str, Array]) -> ForeseenCollision | None:
+        """The first time at which this arm and another one touch, when they move; None: nothing touches."""
+
+
+@runtime_checkable
+class ChangingWorld(PlanningWorld, Protocol):
+    """What `Arm.follow` needs; `heptarm.CollisionModel` is one."""
+
+    @property
+    def revision(self) -> int:
+        """Counts the changes of the world."""
+
+    def wait_for_change(self, revision: int, *, timeout: float) -> int:
+        """Wait up to `timeout` [s] until the world has changed since a revision; the revision now."""
+
+
+@runtime_checkable
+class GraspWorld(PlanningWorld, Protocol):
+    """What picking and placing need; `heptarm.CollisionModel` is one."""
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of all bodies."""
+
+    def pose(self, body: str) -> Pose:
+        """Pose of a free body in the base."""
+
+    def held(self, body: str) -> Pose | None:
+        """Pose in the flange frame of a free body that the arm holds; None: the arm does not hold it."""
+
+    def shapes(self, body: str) -> tuple[Shape, ...]:
+        """Shapes of a free body in its frame."""
+
+    def place(self, body: str, pose: Pose) -> None:
+        """Put a free body somewhere: its pose in the base."""
+
+    def hold(self, body: str, pose: Pose) -> None:
+        """Let the flange carry a free body; its pose in the flange frame."""
+
+    def allowing(self, pairs: Iterable[tuple[str, str]]) -> GraspWorld:
+        """The same model, in which more pairs of bodies may touch."""
+
+    def carrying(
+        self,
+        tool: KnownTool | None,
+        workpiece: Workpiece | KnownTool | None = None,
+        *,
+        at: Pose | None = None,
+    ) -> GraspWorld:
+        """The same model, of an arm that carries a tool and a workpiece; see `CarriesTools`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -99,7 +99,7 @@ class SimulatorOptions:
         default="",
         metadata=_about(
             "what is around the arm and on its flange: table, peg-in-hole, bins, shelf, table-and-post, cage, "
-            "narrow-slot, or a file (MJCF)",
+            "narrow-slot, two-arms, or a file (MJCF)",
             metavar="NAME|FILE",
             in_target=True,
         ),

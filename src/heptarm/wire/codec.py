@@ -9,6 +9,8 @@ from math import inf, isnan
 from struct import Struct
 from typing import Any, TypeVar
 
+from heptarm.errors import ShapeError
+
 E = TypeVar("E", bound=enum.IntEnum)
 
 _U16 = Struct(">H")
@@ -108,8 +110,17 @@ def read_str(data: bytes, pos: int) -> tuple[str, int]:
 
 
 def put_str(value: str) -> bytes:
-    """Write UTF-8 text after its length; cut it at a character if it exceeds 65535 bytes."""
-    encoded = value.encode()
+    """Write UTF-8 text after its length; cut it at a character if it exceeds 65535 bytes.
+
+    Raises:
+        ShapeError: it has half of a surrogate pair, which UTF-8 cannot carry.
+    """
+    try:
+        encoded = value.encode()
+    except UnicodeEncodeError:
+        raise ShapeError(
+            f"a text that is sent must have printable characters only, got {value[:100]!a}", value=value
+        ) from None
     if len(encoded) > 65535:
         encoded = encoded[:65535].decode(errors="ignore").encode()
     return _U16.pack(len(encoded)) + encoded

@@ -24,11 +24,12 @@ class ActionServers:
 
     Args:
         names: the parameter of that name.
+        with_moveit: the parameter `moveit`.
     """
 
-    def __init__(self, names: str) -> None:
+    def __init__(self, names: str, *, with_moveit: bool) -> None:
         self._dispatcher: ActionDispatcher | None = None
-        self._servers = [self._server(row) for row in offered_actions(names)]
+        self._servers = [self._server(row) for row in offered_actions(names, with_moveit=with_moveit)]
         for server in self._servers:
             server.start()
 

@@ -44,7 +44,8 @@ def _subscriber(topics: TopicDispatcher, row: Topic) -> rospy.Subscriber:
         except HeptarmError as error:
             rospy.logwarn_throttle(1.0, f"{name}: {error}")
 
-    return rospy.Subscriber(name, class_of(row.type, "msg"), callback, queue_size=1, tcp_nodelay=True)
+    kind = class_of(row.type, "msg")
+    return rospy.Subscriber(name, kind, callback, queue_size=row.depth, tcp_nodelay=True)
 
 
 def _sent(message: Any) -> PublishInfo:

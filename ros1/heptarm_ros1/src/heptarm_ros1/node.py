@@ -53,7 +53,9 @@ class HeptarmNode:
         self._wake = threading.Event()
         # actionlib cannot destroy a server, so they live as long as the node, and reject while it is not configured
         self._trajectories = TrajectoryAction(("~follow_joint_trajectory", *parameters.preset().actions()))
-        self._actions = ActionServers(str(rospy.get_param("~names", "heptarm")))
+        self._actions = ActionServers(
+            str(rospy.get_param("~names", "heptarm")), with_moveit=rospy.get_param("~moveit", False) is True
+        )
         steps: tuple[tuple[type, str, Callable[[], str]], ...] = (
             (Trigger, "~configure", self.configure),
             (Trigger, "~activate", self.activate),

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.errors import CommandRejected
 from heptarm.values.checks import array, finite, instance, integer, within, word
-from heptarm.values.frames import check_name
+from heptarm.values.frames import check_name, check_printable
 from heptarm.values.pose import Pose
 from heptarm.values.sealed import Sealed
 
@@ -40,9 +40,11 @@ class Operator(Sealed):
             What it shows; "" if it shows nothing.
 
         Raises:
+            ShapeError: the text cannot be printed.
             CommandRejected: there is no such command; the text lists them.
         """
-        error, shown = self._cabinet.operate(instance(words, str, "words"))
+        check_printable(instance(words, str, "words"), "words", lines=True)
+        error, shown = self._cabinet.operate(words)
         if error:
             raise CommandRejected(error, parameter="words", value=words)
         return shown

@@ -204,11 +204,12 @@ class Pad(Sealed):
 
         Raises:
             CommandRejected: the project has no process data of that name, or it is a setting of heptarm.
+            ShapeError: a text of more than 1024 bytes, or that cannot be printed.
             LimitError: the value does not fit its type.
         """
         check_name(name, "name")
         if isinstance(value, str):
-            text = value
+            text = _text(value, "value", 1024)
         elif isinstance(value, bool):
             text = str(value).lower()
         else:

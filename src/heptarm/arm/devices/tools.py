@@ -156,7 +156,7 @@ class Tooling:
             self._defined[tool.name] = _known(tool)
             name = tool.name
         elif isinstance(tool, str):
-            name, main = tool, frame or ""
+            name, main = check_name(tool, "tool", hint="name a tool of the project"), frame or ""
         else:
             raise ShapeError(
                 f"tool must be a Tool or the name of one, got {tool!r}", parameter="tool", value=tool

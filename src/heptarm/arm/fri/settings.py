@@ -19,6 +19,7 @@ from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
 from heptarm.io.udp import UdpSocket
 from heptarm.values.checks import instance, integer, scalar, shown, within, word
+from heptarm.values.frames import check_printable
 from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
@@ -126,7 +127,7 @@ def request(
         raise ShapeError("params need a law, and none was given", parameter="params", hint="give law=...")
     if port is not None:
         integer(port, "port", 0, 65535)
-    instance(host, str, "host")
+    check_printable(instance(host, str, "host"), "host")
     settings = LoopSettings(model=connection.robot, **loop)
     message = wire.FriOpen(
         host=host,

@@ -170,7 +170,7 @@ class Events:
             else:
                 self._deliver(program, message)
         elif isinstance(message, wire.ServoStatus):
-            self._servo_status = message
+            self._note_servo(message)
         elif isinstance(message, wire.KeyPressed):
             for listener in list(self.key_listeners):
                 try:
@@ -233,6 +233,14 @@ class Events:
         """The cabinet's last report on the target stream of a servo motion."""
         status = self._servo_status
         return status if status is not None and status.servo == number else None
+
+    def _note_servo(self, message: wire.ServoStatus) -> None:
+        before = self.servo_status(message.servo)
+        if message.refused and (
+            before is None or not before.refused
+        ):  # the first one; the others are counted
+            _log.warning("servo motion: the cabinet refused a target: %s", message.text)
+        self._servo_status = message
 
     def fri_change(self, number: int) -> wire.FriChanged | None:
         """The cabinet's last report on an FRI session; the report of its end is kept."""

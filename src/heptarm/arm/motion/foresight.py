@@ -20,12 +20,12 @@ from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, Sha
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
-from heptarm.planning.search import Goal, find_path
+from heptarm.planning.search import Goal, Keep, find_path
 from heptarm.values.checks import Array, frozen, shown
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, PlanningWorld, TouchOnPath
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.motion import Motion
-from heptarm.values.motion.planned_path import Path, Upright
+from heptarm.values.motion.planned_path import Path
 from heptarm.values.pose import quaternion
 from heptarm.values.state import State
 from heptarm.values.tool import unknown
@@ -137,15 +137,18 @@ class Foresight:
         self,
         goal: Goal,
         *,
+        start: Array | None = None,
         avoid: PlanningWorld | None,
-        keep: Upright | None,
+        keep: Keep | None,
         speed: float,
         timeout: float,
         states: int,
+        improve: int,
         seed: int,
         stop: Callable[[], bool] | None,
+        progress: Callable[[int, float], object] | None,
     ) -> Path:
-        """Find a path from where the arm rests; see `Arm.find_path`."""
+        """Find a path; see `Arm.find_path`. It begins at `start`, shape (7,) [rad]; None: where the arm rests."""
         world = self.check if avoid is None else avoid
         if not isinstance(world, PlanningWorld):
             raise ShapeError(
@@ -164,15 +167,17 @@ class Foresight:
             )
         found = find_path(
             self._tooling.loaded(world),
-            start=self._rest(),
+            start=self._rest() if start is None else start,
             goal=goal,
             tcp=self._tooling.on_flange(TOOL),
             keep=keep,
             speed=speed,
             timeout=timeout,
             states=states,
+            improve=improve,
             seed=seed,
             stop=stop,
+            progress=progress,
         )
         # it is checked with what the arm carries when it is sent, and with the world as it is then
         return replace(found, world=world)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.io.plan_box import PlanOutline, hand_over
-from heptarm.record.plot.chart import Band, Chart, ChartRow, Line, Mark, Style
+from heptarm.record.plot.chart import Chart
+from heptarm.record.plot.content import Band, ChartRow, Line, Mark, Style
 from heptarm.record.plot.signals import path_line, path_row
 from heptarm.values.checks import Array, Value, word
 from heptarm.values.clearance import ForeseenCollision

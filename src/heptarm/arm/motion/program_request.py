@@ -118,7 +118,8 @@ def resolved(
 
     Raises:
         CommandRejected: a set-point is not known yet: another motion runs, or one to a pose or home comes before. Or
-            poses in no fixed frame, points of an arc that define no circle, or a path that begins elsewhere.
+            poses in no fixed frame, points of an arc that define no circle, or a path of another robot or that begins
+            elsewhere.
         StaleState: the newest state is too old, or lacks the joints.
     """
     place = _Place(start)
@@ -135,8 +136,8 @@ def resolved(
                 one = _with_kept(one, place.q, index)
             elif isinstance(one, Circ | Spline):
                 _check_arcs(one, place.seen(one.moving, tooling))
-            elif isinstance(one, Path) and place.q is not None:
-                _check_begin(one, place.q)
+            elif isinstance(one, Path):
+                _check_path(one, place.q, connection.robot.name)
         place = place.behind(one)
         made.append(one)
     return tuple(made)
@@ -160,8 +161,17 @@ def _with_kept(motion: Ptp, known: Array | None, index: int) -> Ptp:
     return replace(motion, q=np.where(np.isnan(motion.q), known, motion.q))
 
 
-def _check_begin(path: Path, here: Array) -> None:
-    """Refuse a path that begins elsewhere: the joints would move there unchecked."""
+def _check_path(path: Path, here: Array | None, robot: str) -> None:
+    """Refuse a path of another robot, and one that begins elsewhere: the joints would move there unchecked."""
+    if path.world.robot.name != robot:
+        raise CommandRejected(
+            f"the path must be one of this robot, the {robot}, got one of the {path.world.robot.name}",
+            parameter="motion",
+            value=path.world.robot.name,
+            hint="find it with heptarm.CollisionModel(arm.robot.name, ...)",
+        )
+    if here is None:
+        return
     gap = float(np.abs(path.start - here).max())
     if gap > _AT_BEGIN:
         raise CommandRejected(

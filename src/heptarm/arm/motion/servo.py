@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -53,6 +54,8 @@ from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
 from heptarm.wire import messages as wire
+
+_log = logging.getLogger("heptarm.arm")
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -531,8 +534,21 @@ class Servo(Block):
         handle = self._handle = MotionHandle.send(
             self._connection, self._message, until=self._terms.until, breaks=self._terms.breaks
         )
-        if not handle.wait_started(_PATIENCE):
+        try:
+            self._wait_until_started(handle)
+        except BaseException:  # there will be no targets
             handle.cancel()
+            raise
+        self._warm_up_socket = WarmUpConnection()
+        self._began = self._due = self._last = self._clock.nanos()
+        self._number, self._active = handle.id, True
+        self._connection.enter_block(handle, "arm.servo()")
+        handle.add_done_callback(self._on_end)
+        return self
+
+    def _wait_until_started(self, handle: MotionHandle) -> None:
+        """Wait until the motion runs and its start is known; raises what keeps it from that."""
+        if not handle.wait_started(_PATIENCE):
             raise Timeout(
                 f"the servo motion did not begin within {_PATIENCE:g} s",
                 hint="check in arm.state.safety whether the robot is ready to move, or paused",
@@ -544,17 +560,7 @@ class Servo(Block):
         self._start = self._connection.wait_for(
             lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
         )
-        try:
-            self._clear = self._check_of_targets()
-        except BaseException:  # of the model: there will be no targets
-            handle.cancel()
-            raise
-        self._warm_up_socket = WarmUpConnection()
-        self._began = self._due = self._last = self._clock.nanos()
-        self._number, self._active = handle.id, True
-        self._connection.enter_block(handle, "arm.servo()")
-        handle.add_done_callback(self._on_end)
-        return self
+        self._clear = self._check_of_targets()
 
     def _check_of_targets(self) -> ClearTargets | None:
         """What refuses targets near bodies; None: nothing."""
@@ -667,6 +673,12 @@ class Servo(Block):
         assert message is not None
         _ = self.start  # raises unless it has begun
         self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
+
+    @property
+    def refused(self) -> int:
+        """Targets so far that the arm was not sent to: refused by the cabinet, by its last report, or held here."""
+        stats = self.stats
+        return stats.refused + stats.held
 
     @property
     def stats(self) -> ServoStats:
@@ -854,6 +866,8 @@ class PoseServo(Servo):
         except Unreachable as error:
             self._held += 1
             reason = self._reason(pose) or f"out of reach: {error.text}"
+            if not self._slowdowns:  # the first one; the others are counted
+                _log.warning("servo motion: a target is not sent, the arm is held: %s", reason)
             self._slowdown = self._slowdowns[reason] = Slowdown(reason, 0.0)
             return
         if (

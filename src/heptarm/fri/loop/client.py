@@ -25,7 +25,7 @@ from heptarm.fri.loop.user_api import Params
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
 from heptarm.values.checks import array, finite, instance, integer, within
-from heptarm.values.frames import check_name
+from heptarm.values.frames import check_name, check_printable
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
@@ -90,7 +90,7 @@ class Client(Sealed, Reader):
         integer(port, "port", 0, 65535)
         for address, what in ((host, "host"), (remote, "remote")):
             if address is not None:
-                instance(address, str, what)
+                check_printable(instance(address, str, what), what)
         within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
         self.model, law = self.settings.arm, self.settings.law
         place = process.Place(port, _own(remote) if host is None else host, remote, os.getpid())

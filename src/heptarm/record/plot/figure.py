@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from heptarm.errors import require
-from heptarm.record.plot.chart import LONGEST, Chart, ChartRow, Mark, Style, thinned, with_room
+from heptarm.record.plot.content import LONGEST, ChartContent, ChartRow, Mark, Style, thinned, with_room
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ class _Look:
 
 _LOOKS: dict[str, _Look] = {
     "screen": _Look(11.0, 1.9, 4.6, 8.0, 1.0, tuple(f"C{index}" for index in range(10)), 110, True),
-    # Okabe and Ito (2008): told apart by the colour-blind
+    # Okabe and Ito (2008): which the colour-blind can tell apart
     "paper": _Look(
         3.5,
         1.25,
@@ -57,7 +57,7 @@ _LOOKS: dict[str, _Look] = {
 }
 
 
-def draw(chart: Chart, style: Style) -> Figure:
+def draw(chart: ChartContent, style: Style) -> Figure:
     """Draw a chart as a Matplotlib figure, which needs no display."""
     figures: Any = require("matplotlib.figure", extra="record")
     look = _LOOKS[style]
@@ -150,7 +150,7 @@ def _draw_legend(axes: Axes, look: _Look) -> None:
         )  # fmt: skip
 
 
-def _draw_events(axes: Axes, chart: Chart, look: _Look, *, with_names: bool) -> None:
+def _draw_events(axes: Axes, chart: ChartContent, look: _Look, *, with_names: bool) -> None:
     """Motions as bands, events as lines; their names in the first row, as many as have room."""
     for index, band in enumerate(chart.bands):
         axes.axvspan(band.begin, band.end, color="0.5", alpha=0.12 if index % 2 else 0.06, linewidth=0)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import require
-from heptarm.record.plot.chart import LONGEST, Chart, ChartRow, Line, thinned, with_room
+from heptarm.record.plot.content import LONGEST, ChartContent, ChartRow, Line, thinned, with_room
 
 #: Points of a line that a page has at most: enough to zoom in tenfold.
 _POINTS = 20_000
@@ -27,7 +27,7 @@ _GAP, _WIDE_GAP = 24, 70
 _CHARACTER = 0.008
 
 
-def page(chart: Chart) -> str:
+def page(chart: ChartContent) -> str:
     """An HTML page that needs no network, with the chart in it: about 5 MB, of which plotly.js has most.
 
     Rows over time have one axis of time, so that zoom and cursor are the same in all. The legend hides lines: a
@@ -189,7 +189,7 @@ def _scene(row: ChartRow, domain: list[float]) -> dict[str, Any]:
     return {**axes, "domain": {"x": [0, 1], "y": domain}, "aspectmode": "manual", "aspectratio": ratio}
 
 
-def _add_events(chart: Chart, data: list[dict[str, Any]], layout: dict[str, Any]) -> None:
+def _add_events(chart: ChartContent, data: list[dict[str, Any]], layout: dict[str, Any]) -> None:
     """Motions as bands through all rows over time, events as lines; the cursor shows their names."""
     rows = [index for index, row in enumerate(chart.rows) if row.is_time]
     if not rows:

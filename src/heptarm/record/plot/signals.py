@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.record.journal import NOTE
-from heptarm.record.plot.chart import Band, Chart, ChartRow, Line, Mark, extremes
+from heptarm.record.plot.chart import Chart
+from heptarm.record.plot.content import Band, ChartRow, Line, Mark, extremes
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.record.samples import labels
-from heptarm.values.checks import shown, word
+from heptarm.values.checks import instance, shown, word
 from heptarm.values.robot import RobotModel
 
 Kind = Literal["time", "histogram", "spectrum"]
@@ -78,7 +79,7 @@ def chart_of(recording: RecordedData, *, signals: Sequence[str] = (), kind: Kind
         recording: what is drawn.
         signals: names as in `recording.names`, or "path"; none: positions, speeds and torques by their limits, wrench
             and path, as far as they were recorded.
-        kind: "time"; "histogram": the share of the samples at each value; "spectrum": amplitude spectral density over
+        kind: "time"; "histogram": fraction of the samples at each value; "spectrum": amplitude spectral density over
             frequency, by Welch's method (1967) with Hann windows that overlap by half.
 
     Raises:
@@ -137,6 +138,7 @@ def _chosen(recordings: Sequence[RecordedData], signals: Sequence[str], kind: Ki
     """Names to draw, checked."""
     if signals:
         for name in signals:
+            instance(name, str, "signals")
             if name == PATH and kind != "time":
                 raise CommandRejected(
                     f"a {kind} must be of signals, got {PATH!r}",
@@ -261,7 +263,7 @@ def _by_limit(robot: RobotModel | None, quantity: _Quantity) -> npt.NDArray[np.f
 def _histogram(
     values: npt.NDArray[np.float64], bins: npt.NDArray[np.float64]
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Steps: the share of the samples in each bin [%]."""
+    """Steps: the fraction of the samples in each bin [%]."""
     known = values[np.isfinite(values)]
     counts = np.histogram(known, bins)[0] * (100.0 / max(1, len(known)))
     return np.repeat(bins, 2), np.concatenate([[0.0], np.repeat(counts, 2), [0.0]])

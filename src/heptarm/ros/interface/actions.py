@@ -8,8 +8,6 @@ from __future__ import annotations
 import contextlib
 import queue
 import threading
-import time
-from collections.abc import Sequence
 from functools import partial
 from math import inf
 from typing import Any
@@ -27,11 +25,13 @@ from heptarm.ros.interface.action import (
     result_of_motion,
     wait_for_task,
 )
-from heptarm.ros.interface.conditions import condition_of, reaction_of
+from heptarm.ros.interface.conditions import condition_of
 from heptarm.ros.interface.context import NodeContext
-from heptarm.ros.interface.events import event_message, with_triggers
+from heptarm.ros.interface.events import with_triggers
 from heptarm.ros.interface.gripper import gripper_command
 from heptarm.ros.interface.messages import pose_message
+from heptarm.ros.interface.planning.paths import plan_and_execute
+from heptarm.ros.interface.program_goal import start_program
 from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.skills.replay import Replay
 from heptarm.skills.taps import TapWatch
@@ -48,7 +48,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.spline import spline, spline_joints
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.pose import Pose
-from heptarm.values.result import Cause, MotionEvent
+from heptarm.values.result import Cause
 from heptarm.values.state import State
 
 #: Default name of a recorded trajectory, and the most that are kept.
@@ -111,65 +111,11 @@ def move_spline(context: NodeContext, goal: Any) -> GoalWork:
 
 def run_program(context: NodeContext, goal: Any) -> GoalWork:
     """Run several motions as one program."""
-    return _start(context, goal, motions.program_of(context.driver, goal.motions))
+    return start_program(context, goal, motions.program_of(context.driver, goal.motions))
 
 
 def _move(context: NodeContext, goal: Any, motion: Motion) -> GoalWork:
-    return _start(context, goal, (with_triggers(motion, goal.triggers),))
-
-
-def run_motion(context: NodeContext, motion: Motion, *, speed: float | None = None) -> GoalWork:
-    """Start a motion in place of any other.
-
-    Args:
-        context: of the node.
-        motion: to start.
-        speed: speed limit, (0, 1]; None: that of the parameter `speed`.
-    """
-    return _ProgramGoal(context, context.driver.start(motion, speed=speed)).run
-
-
-def _start(context: NodeContext, goal: Any, program: Sequence[Motion]) -> GoalWork:
-    when: Any = getattr(goal, "when", "") or "replace"
-    speed = None if goal.speed == 0.0 else goal.speed
-    until, then = condition_of(goal.until), reaction_of(goal.then)
-    handle = context.driver.start(program, speed=speed, until=until, then=then, when=when)
-    return _ProgramGoal(context, handle).run
-
-
-class _ProgramGoal:
-    """A goal whose program moves the arm."""
-
-    def __init__(self, context: NodeContext, handle: MotionHandle) -> None:
-        self._ros, self._handle = context.ros, handle
-        self._events: queue.SimpleQueue[MotionEvent] = queue.SimpleQueue()
-        handle.add_event_callback(self._events.put)
-
-    def run(self, client: GoalClient) -> ActionResult:
-        """Wait until the program has ended; a cancelled one brakes on its path."""
-        cancelled = False
-        while not self._handle.done:
-            self._publish(client)
-            if not cancelled and client.is_cancel_requested():
-                cancelled = True
-                self._handle.cancel()
-            time.sleep(FEEDBACK_PERIOD)
-        self._publish(client)
-        return result_of_motion(self._handle, cancelled=cancelled)
-
-    def _publish(self, client: GoalClient) -> None:
-        handle = self._handle
-        count = self._events.qsize()
-        events = [event_message(self._ros, handle.id, self._events.get()) for _ in range(count)]
-        client.publish_feedback(
-            {
-                "progress": handle.progress,
-                "item": max(handle.item, 0),
-                "segment": handle.segment,
-                "remaining": handle.remaining,
-                "events": events,
-            }
-        )
+    return start_program(context, goal, (with_triggers(motion, goal.triggers),))
 
 
 # -------------------------------------------------------------------- hand guiding, teaching, replay
@@ -544,6 +490,7 @@ ACTIONS = (
     RosAction("~/move_pose", "heptarm_msgs/MovePose", move_pose),
     RosAction("~/move_spline", "heptarm_msgs/MoveSpline", move_spline),
     RosAction("~/run_program", "heptarm_msgs/RunProgram", run_program),
+    RosAction("~/plan_and_execute", "heptarm_msgs/PlanAndExecute", plan_and_execute),
     RosAction("~/touch", "heptarm_msgs/Touch", touch),
     RosAction("~/wait_for_taps", "heptarm_msgs/WaitForTaps", wait_for_taps),
     RosAction("~/ask", "heptarm_msgs/Ask", ask),

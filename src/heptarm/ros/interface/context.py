@@ -7,6 +7,7 @@ import contextlib
 from heptarm.arm.arm import Arm
 from heptarm.errors import NotReady, Timeout
 from heptarm.ros.interface.messages import RosAdapter
+from heptarm.ros.interface.planning.world import NodeWorld
 from heptarm.ros.interface.presets.iiwa_settings import IiwaStackSettings
 from heptarm.ros.node.driver import Driver
 from heptarm.skills.gripper import TwoSignalGripper
@@ -33,6 +34,7 @@ class NodeContext:
         gripper: of the action `gripper_cmd`; None: it has had no goal yet.
         gripper_goal: number of its newest goal; 0: none.
         iiwa_stack: what the services with names of iiwa_stack have set.
+        world: the bodies around the arm.
     """
 
     def __init__(self, driver: Driver, ros: RosAdapter) -> None:
@@ -43,6 +45,7 @@ class NodeContext:
         self.gripper: TwoSignalGripper | None = None
         self.gripper_goal = 0
         self.iiwa_stack = IiwaStackSettings()
+        self.world = NodeWorld(driver)
         self._mode = contextlib.ExitStack()
 
     @property

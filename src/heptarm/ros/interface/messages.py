@@ -8,7 +8,7 @@ A node names its types once::
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -76,6 +76,11 @@ def class_of(kind: str, part: Literal["msg", "srv", "action"]) -> Any:
     """
     package, _, name = kind.partition("/")
     return getattr(importlib.import_module(f"{package}.{part}"), name)
+
+
+def is_installed(kind: str) -> bool:
+    """Whether the package of a "package/Type" is installed."""
+    return importlib.util.find_spec(kind.partition("/")[0]) is not None
 
 
 def put(message: Any, fields: Mapping[str, Any]) -> None:

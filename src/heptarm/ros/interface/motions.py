@@ -140,12 +140,16 @@ def stamped_pose(message: Any, driver: Driver) -> Pose:
     """
     place, turn = message.pose.position, message.pose.orientation
     pose = Pose.of([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
-    frame = _frame(message.header, driver)
+    frame = frame_in_base(message.header, driver)
     return pose if frame is None else frame @ pose
 
 
-def _frame(header: Any, driver: Driver) -> Pose | None:
-    """Pose in the base of the frame that a header names; None: it is the base itself."""
+def frame_in_base(header: Any, driver: Driver) -> Pose | None:
+    """Pose in the base of the frame that a header names; None: it is the base itself.
+
+    Raises:
+        ShapeError: neither the base nor a taught frame.
+    """
     name = header.frame_id.lstrip("/")
     base = driver.configuration.frame("base")
     if name in ("", base):
@@ -233,7 +237,7 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
     if kind == LIN:
         return lin(stamped_pose(message.pose, driver), **near, **how)
     if kind == CIRC:
-        via, frame = pose_of(message.via), _frame(message.pose.header, driver)
+        via, frame = pose_of(message.via), frame_in_base(message.pose.header, driver)
         return circ(via if frame is None else frame @ via, stamped_pose(message.pose, driver), **near, **how)
     if kind == LIN_REL:
         return offset(message.pose, how)

@@ -17,12 +17,17 @@ from typing import Any
 
 from heptarm.ros.interface.action import RosAction
 from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.messages import is_installed
 from heptarm.ros.interface.names import PRESETS, NameRole, PresetName
+from heptarm.ros.interface.planning import moveit
 from heptarm.ros.interface.presets import iiwa_stack
 from heptarm.ros.interface.presets.libiiwa import LibiiwaServer
 from heptarm.ros.interface.service import Service
 from heptarm.ros.interface.services import SERVICES
 from heptarm.ros.interface.topics import Topic, topics_of
+
+#: The package with the types of MoveIt.
+_MOVEIT = "moveit_msgs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +37,8 @@ class OfferedInterface:
     Attributes:
         topics: that it subscribes to.
         services: that it serves.
-        missing: packages with types of the other driver that are not installed; what needs them is left out.
+        missing: packages with types of the other driver, or of MoveIt, that are not installed; what needs them is left
+            out.
     """
 
     topics: tuple[Topic, ...]
@@ -44,7 +50,8 @@ def offered(values: Mapping[str, Any]) -> OfferedInterface:
     """List what a node offers.
 
     Args:
-        values: of its parameters: `names` adds the names of another driver, `forward_controllers` leaves topics out.
+        values: of its parameters: `names` adds the names of another driver, `moveit` those of move_group, and
+            `forward_controllers` leaves topics out.
     """
     preset = PRESETS[values["names"]]
     topics, services = list(topics_of(values)), list(SERVICES)
@@ -58,7 +65,13 @@ def offered(values: Mapping[str, Any]) -> OfferedInterface:
             topics.append(Topic(entry.name, entry.type, iiwa_stack.TOPICS[entry.last]))
         elif entry.role is NameRole.SERVICE and entry.is_available:
             services.append(_service(server, entry))
-    return OfferedInterface(tuple(topics), tuple(services), preset.missing())
+    missing = preset.missing()
+    if values["moveit"] and not is_installed(_MOVEIT):
+        missing = (*missing, _MOVEIT)
+    elif values["moveit"]:
+        topics += moveit.TOPICS
+        services += moveit.SERVICES
+    return OfferedInterface(tuple(topics), tuple(services), missing)
 
 
 def _service(libiiwa: LibiiwaServer, entry: PresetName) -> Service:
@@ -68,14 +81,16 @@ def _service(libiiwa: LibiiwaServer, entry: PresetName) -> Service:
     return libiiwa.service(entry.last, entry.type)
 
 
-def offered_actions(names: str) -> tuple[RosAction, ...]:
+def offered_actions(names: str, *, with_moveit: bool) -> tuple[RosAction, ...]:
     """List the actions that a node serves, except those for trajectories.
 
     Args:
         names: the parameter of that name; an unknown one adds nothing.
+        with_moveit: the parameter `moveit`.
     """
     preset = PRESETS.get(names, PRESETS["heptarm"])
-    return ACTIONS + tuple(
+    others = moveit.ACTIONS if with_moveit and is_installed(_MOVEIT) else ()
+    return (*ACTIONS, *others) + tuple(
         RosAction(entry.name, entry.type, iiwa_stack.ACTIONS[entry.last])
         for entry in preset.entries
         if entry.role is NameRole.ACTION and entry.is_available

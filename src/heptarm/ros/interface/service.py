@@ -43,7 +43,8 @@ class ServiceResponse:
             if not self.success:
                 return None
             fields = {}
-        put(response, {**fields, **self.fields})
+        given = {name: value for name, value in fields.items() if hasattr(response, name)}
+        put(response, {**given, **self.fields})
         return response
 
 

@@ -12,6 +12,7 @@ from heptarm.errors import CommandRejected, NotReady, ShapeError
 from heptarm.ros.interface.conditions import condition_of
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.motions import pose_of
+from heptarm.ros.interface.planning.paths import plan
 from heptarm.ros.interface.service import Service, ServiceResponse
 from heptarm.skills.collision_guard import THRESHOLD
 from heptarm.values.frames import BASE, TOOL
@@ -529,4 +530,5 @@ SERVICES = (
     Service("~/fri/close", _TRIGGER, close_fri),
     Service("~/fri/set_outputs", "heptarm_msgs/SetSignals", set_fri_outputs, at_once=True),
     Service("~/collision_guard", "heptarm_msgs/SetCollisionGuard", collision_guard),
+    Service("~/plan", "heptarm_msgs/PlanPath", plan, at_once=True),
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.context import NodeContext
-from heptarm.ros.interface.messages import trajectory_goal
+from heptarm.ros.interface.messages import is_installed, trajectory_goal
 from heptarm.ros.interface.motions import (
     partial_joints,
     positions,
@@ -24,6 +24,7 @@ from heptarm.ros.interface.motions import (
     velocities,
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.ros.interface.planning import scene
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.values.checks import Array, array
 from heptarm.values.motion.line import lin
@@ -45,6 +46,8 @@ class Topic:
         handler: handles a message; raises HeptarmError to refuse it.
         at_once: never waits for another topic.
         counted: its handler takes a `PublishInfo` after the message.
+        depth: most messages that wait; further ones replace the oldest.
+        aside: its messages are handled in order, but neither wait for those of another topic nor let these wait.
     """
 
     name: str
@@ -52,10 +55,12 @@ class Topic:
     handler: Handler
     at_once: bool = False
     counted: bool = False
+    depth: int = 1
+    aside: bool = False
 
 
 class TopicDispatcher:
-    """Calls the handlers of topics, one at a time unless a topic is `at_once`.
+    """Calls the handlers of topics, one at a time unless a topic is `at_once` or `aside`.
 
     Args:
         context: of the node.
@@ -76,7 +81,7 @@ class TopicDispatcher:
         Raises:
             HeptarmError: refused; the text gives the reason.
         """
-        with contextlib.nullcontext() if topic.at_once else self._lock:
+        with contextlib.nullcontext() if topic.at_once or topic.aside else self._lock:
             if topic.counted:
                 topic.handler(self._context, message, sent)
             else:
@@ -236,6 +241,7 @@ def fri_pose(context: NodeContext, message: Any) -> None:
 
 
 _JOINTS, _POSE = "sensor_msgs/JointState", "geometry_msgs/PoseStamped"
+_SCENE = "moveit_msgs/PlanningScene"
 _FORWARD_POSITION, _FORWARD_VELOCITY = (
     "forward_position_controller/commands",
     "forward_velocity_controller/commands",
@@ -260,6 +266,15 @@ TOPICS = (
     Topic("~/fri/joint", _JOINTS, fri_joint),
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
     Topic("~/fri/pose", _POSE, fri_pose),
+    Topic("planning_scene", _SCENE, scene.planning_scene, depth=100, aside=True),
+    Topic("collision_object", "moveit_msgs/CollisionObject", scene.collision_object, depth=100, aside=True),
+    Topic(
+        "attached_collision_object",
+        "moveit_msgs/AttachedCollisionObject",
+        scene.attached_collision_object,
+        depth=100,
+        aside=True,
+    ),
 )
 #: Handlers of topics with the names of other drivers.
 _PRESET_HANDLERS: Mapping[NameRole, Handler] = MappingProxyType(
@@ -278,10 +293,14 @@ def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
     """List the topics that a node subscribes to.
 
     Args:
-        values: of the node's parameters: `names` adds some, `forward_controllers` leaves some out.
+        values: of the node's parameters: `names` adds some, `forward_controllers` leaves some out. Without the package
+            moveit_msgs those of the world are left out, too.
     """
     forward = values["forward_controllers"]
-    ours = tuple(row for row in TOPICS if forward or row.name not in (_FORWARD_POSITION, _FORWARD_VELOCITY))
+    left_out: tuple[str, ...] = () if forward else (_FORWARD_POSITION, _FORWARD_VELOCITY)
+    if not is_installed(_SCENE):
+        left_out += ("planning_scene", "collision_object", "attached_collision_object")
+    ours = tuple(row for row in TOPICS if row.name not in left_out)
     return ours + tuple(
         Topic(
             entry.name,

@@ -81,6 +81,8 @@ _log = logging.getLogger("heptarm.ros")
 
 #: How long a motion may take to come to rest before a goal [s].
 _REST_TIMEOUT = 5.0
+#: Results of goals that are kept for those that wait for them.
+_MOST_RESULTS = 32
 #: When the arm is to be at a streamed position that has no time [s].
 _STREAM_AHEAD = 0.01
 #: Repetitions of the target on the way to a destination within `command_timeout`.
@@ -114,6 +116,8 @@ class Driver:
         self._handle: MotionHandle | None = None
         self._starting = threading.Lock()  # messages and goals come in several threads
         self._task: ArmTask | None = None
+        self._results: dict[int, GoalResult] = {}
+        self._has_result = threading.Condition()
         _check_simulator(values["target"])
         self._arm = connect(
             values["target"] or None,
@@ -325,7 +329,18 @@ class Driver:
 
     def on_result(self, result: GoalResult) -> None:
         """Forward a result of the execution."""
+        with self._has_result:
+            self._results[result.number] = result
+            while len(self._results) > _MOST_RESULTS:
+                del self._results[min(self._results)]
+            self._has_result.notify_all()
         self._listener.on_result(result)
+
+    def result(self, number: int, *, timeout: float) -> GoalResult | None:
+        """Wait for the result of a goal, of one of the last ones; None: it has none within `timeout` [s]."""
+        with self._has_result:
+            self._has_result.wait_for(lambda: number in self._results, timeout)
+            return self._results.get(number)
 
     def _check_ready(self) -> None:
         safety = self._arm.state.groups.safety

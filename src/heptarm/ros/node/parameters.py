@@ -220,6 +220,17 @@ PARAMETERS = (
         0.0,
         600.0,
     ),
+    Parameter(
+        "planning.scene",
+        "",
+        'bodies around which paths are planned, besides those of messages: a ready scene, or a file (MJCF); "": none',
+    ),
+    Parameter("planning.margin", 0.005, "bodies nearer than this count as touching [m]", 0.0, 0.1),
+    Parameter(
+        "moveit",
+        False,
+        "offer the services and actions of MoveIt's move_group, for programs that are written for it; not beside one",
+    ),
     _live("allow_partial_joints_goal", False, "accept goals that lack joints; these hold their positions"),
     _live("allow_nonzero_velocity_at_trajectory_end", False, "accept goals whose last point has a velocity"),
     _live(
@@ -336,6 +347,11 @@ class NodeConfiguration:
     def frame(self, which: str) -> str:
         """Look up the name of a frame with prefix: "base", "flange" or "tool"."""
         return f"{self.values['prefix']}{self.values[f'{which}_frame']}"
+
+    @property
+    def links(self) -> tuple[str, str]:
+        """Names of the links with prefix to which poses of MoveIt refer: of the flange and of the tool."""
+        return self.frame("flange"), self.frame("tool")
 
     @property
     def settings(self) -> ExecutionSettings:

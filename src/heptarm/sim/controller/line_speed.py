@@ -145,7 +145,7 @@ class AxisLimits:
     def fraction(self, before: Array, step: Array) -> float:
         """The fraction of a set-point's step nearest to 1 with which no axis changes its speed too much.
 
-        Where the axes disagree, it stays as near to 1 as one of them wants it.
+        Where the axes disagree, it stays as near to 1 as one of them allows.
 
         Args:
             before: the last step, shape (7,) [rad].

@@ -275,7 +275,7 @@ def _resolved(client: Address) -> Address:
         )
     try:
         return socket.gethostbyname(host), port
-    except (OSError, UnicodeError) as error:
+    except (OSError, UnicodeError, TypeError) as error:  # a NUL is no character of a name
         raise ConnectFailed(f"the FRI client {host!r} has no IPv4 address: {error}") from error
 
 

@@ -33,7 +33,7 @@ _MEETS_ALL = 1
 #: MuJoCo's flag that it does not search trees of the shapes of a body for those that are near others.
 NO_TREES = int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
 #: MuJoCo's kind of each kind of shape.
-GEOMS = {
+GEOMS: dict[ShapeKind, mujoco.mjtGeom] = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,

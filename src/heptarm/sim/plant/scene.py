@@ -18,6 +18,8 @@ import numpy as np
 from heptarm.errors import CommandRejected
 from heptarm.values.checks import shown
 from heptarm.values.files import read_xml, unreadable
+from heptarm.values.pose import Pose
+from heptarm.values.shape import ORIGIN
 
 FOLDER = Path(__file__).parents[1] / "scenes"
 #: Put before all names of a scene, so that they differ from those of the arm.
@@ -165,8 +167,13 @@ class Scene:
                 )
         return model
 
-    def attach_to(self, arm: mujoco.MjSpec) -> None:
+    def attach_to(self, arm: mujoco.MjSpec, *, at: Pose = ORIGIN, flange: str = "flange") -> None:
         """Add the scene to the description of an arm: the tool to its flange, all else to the world.
+
+        Args:
+            arm: the description.
+            at: pose of the scene in the base of the arm.
+            flange: site to which the tool is mounted.
 
         Raises:
             ValueError: the file is not in MuJoCo's format.
@@ -179,11 +186,17 @@ class Scene:
         tool = _top_level(world, TOOL)
         if tool is not None:
             alone = world.copy()
-            _adopt(alone, arm)
+            adopt(alone, arm)
             world.delete(tool)
-            arm.site("flange").attach_body(alone.body(TOOL), PREFIX, "")
-        _adopt(world, arm)
-        arm.attach(world, frame=arm.worldbody.add_frame(), prefix=PREFIX)
+            arm.site(flange).attach_body(alone.body(TOOL), PREFIX, "")
+        adopt(world, arm)
+        frame = arm.worldbody.add_frame(pos=at.xyz, quat=np.roll(at.quat, 1))
+        arm.attach(world, frame=frame, prefix=PREFIX)
+
+    def place_of(self, name: str) -> Pose | None:
+        """Where the scene has a site of that name, such as the base of another arm; None: it has none."""
+        found = next((one for one in self.read().worldbody.sites if one.name == name), None)
+        return None if found is None else Pose.of(found.pos, np.roll(found.quat, -1))
 
     @property
     def wiring(self) -> Wiring:
@@ -254,7 +267,7 @@ def _top_level(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody | None:
     return next((body for body in spec.worldbody.bodies if body.name == name), None)
 
 
-def _adopt(scene: mujoco.MjSpec, arm: mujoco.MjSpec) -> None:
+def adopt(scene: mujoco.MjSpec, arm: mujoco.MjSpec) -> None:
     """Give a scene the options of the arm, so that nothing conflicts when it is attached."""
     for name in dir(scene.option):
         value = getattr(scene.option, name)

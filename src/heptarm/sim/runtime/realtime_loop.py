@@ -1,9 +1,11 @@
 """The realtime loop: ticks in real time, or N times faster, and measures its own lateness.
 
 The loop sleeps until a tick is due. After a late wake-up it catches up, since a tick costs a tenth of a millisecond;
-after more than 20 missed ticks it re-bases its schedule and counts that. With an FRI session open it leaves
-`answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
-that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
+after more than 20 missed ticks it re-bases its schedule and counts that. Faster than real time it sleeps until all
+ticks of a millisecond are due, unless somebody waits for one before: to wake up costs as much as a tick. With an FRI
+session open it leaves `answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no
+client could answer ticks that follow each other without a pause, and a machine that was suspended kept its client
+from answering as well.
 A sensor's reading is there at once, a simulated one has to be computed: so a tick whose state somebody waits for begins
 early, by about as long as it takes and as its readers take to wake; they see its state when it is due. With an FRI
 session open it begins when it is due, since the answer to the state before is one of its inputs.
@@ -157,8 +159,10 @@ class RealtimeLoop:
         speed: plant seconds per second; 0: as fast as possible.
         real_time: when to have real-time priority.
         rest: the plant while it rests; None: each tick is simulated.
+        at_once: most ticks that a call of `tick` may be; above real time no more than are due each millisecond.
 
     Attributes:
+        allowed: how many ticks the running call of `tick` may be.
         answer_gap: least time between two ticks, as a fraction of a period: `ANSWER_GAP` while an FRI client has to
             answer each of them, else 0; may be set at any time.
         is_real_time: whether real-time priority is wanted now.
@@ -172,7 +176,9 @@ class RealtimeLoop:
         speed: float = 1.0,
         real_time: RealTime = "fri",
         rest: Rest | None = None,
+        at_once: int = 1,
     ) -> None:
+        self.allowed = self._at_once = min(at_once, max(1, int(speed))) if speed > 0 else at_once
         self._shared, self._rest, self._real_time = shared, rest, real_time
         self.is_real_time = False
         self._rested = 0
@@ -289,12 +295,13 @@ class RealtimeLoop:
         header[HeaderWords.ANCHOR] = due - (done + 1) * period
         end, is_second = now_ns(), False
         moment, awaited = (done + 1) * TICK_NS, 0  # of the next tick; ticks in a row that somebody waited for
+        more = self._at_once - 1
         while not self._stop:
             now, gap = now_ns(), int(self.answer_gap * period)
             if self.is_real_time is not (always or (gap > 0 and not never)):
                 self._prioritise()
                 spin = spun if self.is_real_time else 0
-            if now - due > (CATCH_UP_ANSWERED if gap else CATCH_UP) * period:
+            if now - due > (CATCH_UP_ANSWERED if gap else CATCH_UP + more) * period:
                 self._rebased += 1
                 time.sleep(YIELD_TIME)
                 due = now = now_ns()
@@ -302,7 +309,10 @@ class RealtimeLoop:
             # who waits for every tick does so only after the last one's state
             is_early = gap == 0 and (awaited > 1 or bool(header[HeaderWords.WAKE] <= moment))
             early = int(self._early) if is_early else 0
-            start = max(due - early, end + gap)
+            planned = due - early
+            if more and not (gap or is_early) and now < due:
+                planned += min(more, (int(header[HeaderWords.WAKE]) - moment) // TICK_NS) * period
+            start = max(planned, end + gap)
             if now < start:
                 exact = 0 if is_early else spin
                 if start - now > exact:
@@ -316,14 +326,19 @@ class RealtimeLoop:
                     continue
             begin, is_second = now_ns(), False
             awaited = awaited + 1 if header[HeaderWords.WAKE] <= moment else 0
+            ticks = 1
+            if more:
+                self.allowed = 1 if gap else 1 + min(more, max(0, begin - due) // period)
             self._tick()
             end = now_ns()
+            if more:
+                ticks = max(1, int(header[HeaderWords.NEWEST]) - moment // TICK_NS + 1)
             if is_early:
                 spare = due - WAKING_NS - end
                 self._early = min(self._earliest, self._early + (EARLIER_NS if spare < 0 else -LATER * spare))
-            moment += TICK_NS
-            self._record(begin - due + early, end - begin, 1)
-            due += period
+            moment += ticks * TICK_NS
+            self._record(begin - planned, end - begin, ticks)
+            due += ticks * period
             if rest is not None and rest.begins():
                 self._pass_rest(rest)
                 end, done = now_ns(), int(header[HeaderWords.NEWEST])

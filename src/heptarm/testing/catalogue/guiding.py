@@ -151,5 +151,7 @@ def taught(arm: Arm) -> None:
     above(float(len(trajectory)), 1.5, "positions kept, each with its time")
     replay = arm.replay(trajectory, by="spline", speed_scaling=0.5)
     holds(replay.result.arrived, "it was done again")
+    twice = 2.0 * trajectory.duration
+    near(replay.result.duration, twice, 0.05 * twice, "at half of the taught speed, twice the time", unit="s")
     below(replay.deviation, 0.05, "farthest from what was taught", unit="rad")
     near(arm.wait_for_rest().q, trajectory.q[-1], 2e-3, "its end", unit="rad")

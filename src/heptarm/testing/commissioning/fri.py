@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import statistics
 import time
 
 from heptarm.arm.arm import Arm
@@ -126,4 +127,30 @@ def lost_answer(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     return (
         same("the session is", state.name if is_open else "closed", SessionState.COMMANDING_ACTIVE.name),
         at_most("largest change of the position between two messages", max(steps), 1e-3, "rad"),
+    )
+
+
+@step(movement=Movement("A7", "by less than 1 deg", "1.2 deg/s, by FRI commands"), needs=("fri_position",))
+def command_delay(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """By how many periods are the set-points of an overlay behind its commands?"""
+    params = {"velocity": _SLOW, "at": math.inf, "pause": 0.0}
+    with arm.fri(
+        "position", period_ms=_PERIOD, law=hold_back_once, params=params, history=_HISTORY
+    ) as session:
+        session.wait(0.8)
+        states = session.history()
+    moving = [one for one in states if one.session is SessionState.COMMANDING_ACTIVE and 0.3 < one.t < 0.6]
+    # the law commanded an offset of velocity t^2 / 2; FRI 2 sends no set-points, so that the measured position counts
+    offsets = [
+        float(one.q_cmd[6] if math.isfinite(one.q_cmd[6]) else one.q[6]) - one.q_ipo[6] for one in moving
+    ]
+    delays = [
+        one.t - math.sqrt(max(0.0, 2.0 * offset / _SLOW)) for one, offset in zip(moving, offsets, strict=True)
+    ]
+    if not delays:
+        raise Unfit("the overlay did not last 0.3 s", hint="check the connection with heptarm doctor --fri")
+    return (
+        near(
+            "set-points behind the commands", statistics.median(delays) * 1e3 / _PERIOD, 1.5, 0.4, "periods"
+        ),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
@@ -134,7 +135,7 @@ def lin_rel(
     b: float = 0.0,
     c: float = 0.0,
     *,
-    frame: str = TOOL,
+    frame: str | Pose = TOOL,
     moving: str = TOOL,
     orientation: str = "variable",
     reference: str = "base",
@@ -149,7 +150,8 @@ def lin_rel(
         a: rotation Rz(a) Ry(b) Rx(c) [rad], as b and c.
         b: see a.
         c: see a.
-        frame: the frame whose axes these are: "tool" (the motion frame), "base", or the name of a frame.
+        frame: the frame whose axes these are: "tool" (the motion frame), "base", the name of a frame, or the pose of
+            any frame in the base.
         moving: the motion frame, see `lin`.
         orientation: see `lin`.
         reference: see `lin`.
@@ -161,8 +163,12 @@ def lin_rel(
         CommandRejected: an unknown word.
     """
     x, y, z, a, b, c = array([x, y, z, a, b, c], 6, "offset").tolist()
+    offset = Pose.xyz_abc(x, y, z, a, b, c)
+    if isinstance(frame, Pose):  # the motion frame turns about its own origin: only the axes count
+        axes = Pose.of(np.zeros(3), frame.quat)
+        offset, frame = axes @ offset @ axes.inverse(), BASE
     return LinRel(
-        Pose.xyz_abc(x, y, z, a, b, c),
+        offset,
         frame,
         moving,
         orientation_of(orientation, reference),

@@ -1,18 +1,20 @@
-"""Paths that a search has found around bodies, and what a search is asked for beside joint positions and poses."""
+"""Paths that a search has found around bodies, goals beside joint positions and poses, and constraints along paths."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import pi
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.errors import LimitError
 from heptarm.values.checks import Array, Value, array, frozen, instance, within, word
 from heptarm.values.clearance import Clearance
 from heptarm.values.motion.spline import JointSpline
 from heptarm.values.pose import Pose, check_pose
+from heptarm.values.workspace import Workspace
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -46,6 +48,8 @@ class Path(JointSpline):
         duration: at the speed for which it was searched [s].
         clearance: the nearest two bodies on it; None: none are nearer than 0.2 m.
         stats: what the search took.
+        goal: what it was searched for: joint positions, poses or regions, of which it reaches one.
+        keep: constraints along it.
         world: the model of bodies that it keeps clear of, and against which it is checked again before it is sent.
     """
 
@@ -54,6 +58,8 @@ class Path(JointSpline):
     duration: float = field(kw_only=True)
     clearance: Clearance | None = field(kw_only=True)
     stats: SearchStats = field(kw_only=True)
+    goal: tuple[Array | Pose | Region, ...] = field(kw_only=True, repr=False)
+    keep: tuple[PathConstraint, ...] = field(kw_only=True)
     world: Any = field(kw_only=True, compare=False, repr=False)
 
     @property
@@ -105,6 +111,54 @@ class Upright(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class OnPlane(Value):
+    """A constraint along a path: the origin of the tool frame stays on a plane.
+
+    Attributes:
+        point: any point of the plane, in the base, shape (3,) [m].
+        normal: direction across it, in the base, shape (3,); its length does not matter.
+        within: largest distance from the plane [m], 0.001 to 1.
+
+    Raises:
+        ShapeError: another shape.
+        LimitError: a number outside its range, or a normal without a direction.
+    """
+
+    point: npt.ArrayLike
+    normal: npt.ArrayLike = (0.0, 0.0, 1.0)
+    within: float = 0.005
+
+    def __post_init__(self) -> None:
+        _check_place(self, "normal")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OnLine(Value):
+    """A constraint along a path: the origin of the tool frame stays on a line without ends.
+
+    Attributes:
+        point: any point of the line, in the base, shape (3,) [m].
+        direction: of the line, in the base, shape (3,); its length does not matter.
+        within: largest distance from the line [m], 0.001 to 1.
+
+    Raises:
+        ShapeError: another shape.
+        LimitError: a number outside its range, or a direction of length 0.
+    """
+
+    point: npt.ArrayLike
+    direction: npt.ArrayLike
+    within: float = 0.005
+
+    def __post_init__(self) -> None:
+        _check_place(self, "direction")
+
+
+#: What can hold along a whole path; of a `Workspace` the box and the joints.
+PathConstraint: TypeAlias = Upright | OnPlane | OnLine | Workspace
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Region(Value):
     """A goal that leaves a choice: a box of positions and a cone of orientations of the tool frame.
 
@@ -140,3 +194,55 @@ class Region(Value):
     ) -> Region:
         """A region around a pose; see the attributes. Raises as they state."""
         return Region(pose, array(box, 3, "box"), cone, turn)
+
+    @staticmethod
+    def touching(
+        point: npt.ArrayLike, *, axis: npt.ArrayLike = (0.0, 0.0, -1.0), gap: float = 0.0, cone: float = 0.0
+    ) -> Region:
+        """The z axis of the tool frame points along an axis at a point, turned about that axis by any angle.
+
+        Bodies keep the margin of the world from each other also at the goal. To touch a surface, leave a gap and go
+        the rest until there is a force: `arm.touch(...)`, `ha.lin_rel(z=gap)` with `until=`.
+
+        Args:
+            point: in the base, shape (3,) [m].
+            axis: direction in which the tool points there, in the base, shape (3,); its length does not matter.
+            gap: distance along the axis by which the tool frame stays before the point [m], 0 to 1.
+            cone: largest angle between the z axis of the tool frame and the axis [rad], 0 to pi.
+
+        Raises:
+            ShapeError: another shape.
+            LimitError: a number outside its range, or an axis of length 0.
+        """
+        along = unit_vector(axis, "axis")
+        place = array(point, 3, "point") - within(gap, "gap", 0.0, 1.0, unit="m") * along
+        half = along + (0.0, 0.0, 1.0)  # a half turn about what is between both axes takes z to the axis
+        quat = (*half, 0.0) if np.linalg.norm(half) > 1e-6 else (1.0, 0.0, 0.0, 0.0)
+        return Region.of(Pose.of(place, np.array(quat) / np.linalg.norm(quat)), cone=cone, turn=pi)
+
+
+def unit_vector(value: npt.ArrayLike, name: str) -> Array:
+    """A direction of length 1, shape (3,).
+
+    Raises:
+        ShapeError: another shape.
+        LimitError: its length is 0.
+    """
+    given = array(value, 3, name)
+    length = float(np.linalg.norm(given))
+    if length < 1e-9:
+        raise LimitError(
+            f"{name} must have a direction, got {given.tolist()}",
+            code=2,
+            parameter=name,
+            value=given.tolist(),
+            hint="for example (0, 0, 1)",
+        )
+    return frozen(given / length)
+
+
+def _check_place(one: OnPlane | OnLine, direction: str) -> None:
+    """Check a plane or a line, and give its direction the length 1."""
+    object.__setattr__(one, "point", array(one.point, 3, "point"))
+    object.__setattr__(one, direction, unit_vector(getattr(one, direction), direction))
+    object.__setattr__(one, "within", within(one.within, "within", 1e-3, 1.0, unit="m"))

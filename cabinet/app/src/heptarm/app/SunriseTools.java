@@ -1,5 +1,6 @@
 package heptarm.app;
 
+import java.util.Arrays;
 import java.util.LinkedHashMap;
 import java.util.Map;
 
@@ -322,7 +323,8 @@ final class SunriseTools implements ToolPort {
     ObjectFrame motionFrame(String name) throws CommandRejected {
         ObjectFrame found = own(name);
         if (found == null) {
-            throw new CommandRejected(Code.UNKNOWN_NAME, "frame", name, "", "unknown frame " + name + "; motions move a frame of the attached tool or workpiece, or the flange");
+            throw new CommandRejected(Code.UNKNOWN_NAME, "frame", name, movable(), "unknown frame " + name
+                    + "; motions move a frame of the attached tool or workpiece, or the flange: " + movable());
         }
         return found;
     }
@@ -353,6 +355,16 @@ final class SunriseTools implements ToolPort {
         }
         ObjectFrame found = qualified(tool, toolFrames, name);
         return found == null ? qualified(workpiece, pieceFrames, name) : found;
+    }
+
+    private synchronized String movable() {
+        StringBuilder names = new StringBuilder("flange");
+        for (Map<String, ObjectFrame> frames : Arrays.asList(toolFrames, pieceFrames)) {
+            for (String name : frames.keySet()) {
+                names.append(", ").append(name);
+            }
+        }
+        return names.toString();
     }
 
     private static ObjectFrame qualified(PhysicalObject owner, Map<String, ObjectFrame> frames, String name) {

@@ -45,7 +45,7 @@ public final class Code {
     public static final int UNSUPPORTED = 40;
     /** something else is running: wait for it, cancel it, or use when="replace" or when="queue". */
     public static final int BUSY = 41;
-    /** no frame, tool, signal or process data of that name: use one of the names listed in the message. */
+    /** no frame, tool, signal or process data of that name: check the spelling of the name. */
     public static final int UNKNOWN_NAME = 42;
     /** no motion of that id is running or queued: it may have ended already; see its result. */
     public static final int UNKNOWN_MOTION = 43;

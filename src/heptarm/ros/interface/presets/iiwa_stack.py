@@ -18,9 +18,9 @@ import numpy as np
 from heptarm.errors import CommandRejected
 from heptarm.ros.interface import topics
 from heptarm.ros.interface.action import ActionResult, GoalClient, GoalWork
-from heptarm.ros.interface.actions import run_motion
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.motions import pose_of, stamped_pose
+from heptarm.ros.interface.program_goal import run_motion
 from heptarm.ros.interface.service import ServiceResponse
 from heptarm.ros.node.target_stream import StreamLimits
 from heptarm.ros.trajectory.goal import GoalOutcome

@@ -63,11 +63,11 @@ final class RequestDispatcher {
             }
             if (Messages.needsControl(type) && !authority.isController(client)) {
                 String controller = authority.name();
-                throw new CommandRejected(Code.NOT_IN_CONTROL, "controller", controller, client.name(),
-                        controller.length() == 0 ? "nobody controls the robot; take control first"
+                throw new CommandRejected(Code.NOT_IN_CONTROL, "controller", controller, "",
+                        controller.length() == 0 ? "nobody controls the robot"
                                 : controller.equals(client.name()) ? "another client named " + controller
-                                        + " controls the robot; take control first, and give each client a name of its own"
-                                : controller + " controls the robot, not " + client.name() + "; take control first");
+                                        + " controls the robot; give each client a name of its own"
+                                : controller + " controls the robot, not " + client.name());
             }
             if (CommandHandler.isTarget(type)) {
                 commands.stream(message, sent, request);

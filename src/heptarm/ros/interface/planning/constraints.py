@@ -1,0 +1,304 @@
+"""MoveIt's requests as those of `Arm.find_path`: constraints become goals, links the tool frame.
+
+What a request asks for is never loosened: a tolerance that has another shape here becomes one inside of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from math import pi, sqrt
+from typing import Any
+
+import numpy as np
+
+from heptarm.errors import CollisionForeseen, CommandRejected, HeptarmError, LimitError, NoPath, Unreachable
+from heptarm.model.kinematics import forward
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.motions import pose_of, positions, stamped_pose
+from heptarm.ros.interface.planning.scene import BOX, SPHERE, tool_on_flange
+from heptarm.values.checks import Array
+from heptarm.values.motion.planned_path import Region, Upright
+from heptarm.values.pose import Pose
+
+#: Tolerances below are met by the pose itself: position [m], angle [rad].
+_EXACT_POSITION, _EXACT_ANGLE = 0.005, 0.02
+#: Name of the planning group, without prefix, as in heptarm_moveit_config.
+_GROUP = "arm"
+#: Angle between an axis that a path constraint leaves free and one of the tool frame [rad].
+_ALONG = 1e-3
+
+
+class MoveItCode(IntEnum):
+    """Error codes of moveit_msgs/MoveItErrorCodes."""
+
+    SUCCESS = 1
+    FAILURE = 99999
+    PLANNING_FAILED = -1
+    MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE = -3
+    CONTROL_FAILED = -4
+    TIMED_OUT = -6
+    PREEMPTED = -7
+    START_STATE_IN_COLLISION = -10
+    START_STATE_VIOLATES_PATH_CONSTRAINTS = -11
+    GOAL_IN_COLLISION = -12
+    GOAL_VIOLATES_PATH_CONSTRAINTS = -13
+    INVALID_GROUP_NAME = -15
+    INVALID_GOAL_CONSTRAINTS = -16
+    INVALID_ROBOT_STATE = -17
+    INVALID_LINK_NAME = -18
+    FRAME_TRANSFORM_FAILURE = -21
+    GOAL_STATE_INVALID = -27
+    NO_IK_SOLUTION = -31
+
+
+#: By the reason of a NoPath.
+_OF_REASON = {
+    "start": MoveItCode.START_STATE_IN_COLLISION,
+    "goal": MoveItCode.GOAL_IN_COLLISION,
+    "inverse kinematics": MoveItCode.NO_IK_SOLUTION,
+    "constraint": MoveItCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
+    "not connected": MoveItCode.PLANNING_FAILED,
+    "time": MoveItCode.TIMED_OUT,
+}
+
+
+class RequestRefused(CommandRejected):
+    """A request of MoveIt's was refused.
+
+    Args:
+        text: why: the value and what is allowed.
+        moveit: code for the client.
+        hint: what to do.
+    """
+
+    def __init__(self, text: str, moveit: MoveItCode, *, hint: str = "") -> None:
+        super().__init__(text, hint=hint)
+        self.moveit = moveit
+
+
+def code_of(error: HeptarmError) -> MoveItCode:
+    """The code of MoveIt for an error."""
+    if isinstance(error, RequestRefused):
+        return error.moveit
+    if isinstance(error, NoPath):
+        return _OF_REASON.get(error.reason, MoveItCode.FAILURE)
+    if isinstance(error, CollisionForeseen):
+        return MoveItCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
+    if isinstance(error, Unreachable):
+        return MoveItCode.NO_IK_SOLUTION
+    return MoveItCode.GOAL_STATE_INVALID if isinstance(error, LimitError) else MoveItCode.FAILURE
+
+
+def check_group(context: NodeContext, name: str) -> None:
+    """Refuse the name of another planning group; "" is the only one there is."""
+    own = f"{context.driver.configuration.values['prefix']}{_GROUP}"
+    if name not in ("", own):
+        raise RequestRefused(f"group_name must be {own!r}, got {name!r}", MoveItCode.INVALID_GROUP_NAME)
+
+
+def link_on_flange(context: NodeContext, name: str) -> Pose:
+    """Where a link of which a pose is asked for is in the flange frame: the flange itself or the tool; "": the tool.
+
+    Raises:
+        RequestRefused: another link.
+    """
+    flange, tool = context.driver.configuration.links
+    if name == flange:
+        return Pose.of((0.0, 0.0, 0.0))
+    if name in ("", tool):
+        return tool_on_flange(context)
+    raise RequestRefused(f"link must be {flange!r} or {tool!r}, got {name!r}", MoveItCode.INVALID_LINK_NAME)
+
+
+def start_of(context: NodeContext, state: Any) -> Array | None:
+    """Joint positions of a moveit_msgs/RobotState, shape (7,) [rad]; None: it names none, which is where the arm is."""
+    if state.attached_collision_objects:
+        raise RequestRefused(
+            "attached bodies of a start state are not supported",
+            MoveItCode.INVALID_ROBOT_STATE,
+            hint="publish them on attached_collision_object",
+        )
+    own = set(context.joints)
+    pairs = [pair for pair in zip(state.joint_state.name, state.joint_state.position) if pair[0] in own]
+    if not pairs:
+        return None
+    return positions(context.driver, [name for name, _ in pairs], [value for _, value in pairs])
+
+
+# --------------------------------------------------------------------------------------------- goals
+
+
+def goals_of(context: NodeContext, constraints: Sequence[Any]) -> list[Array | Pose | Region]:
+    """Goals of several moveit_msgs/Constraints, of which one has to be reached.
+
+    Raises:
+        HeptarmError: refused; the text gives the reason.
+    """
+    if not constraints:
+        raise RequestRefused("there is no goal", MoveItCode.INVALID_GOAL_CONSTRAINTS)
+    return [_goal_of(context, one) for one in constraints]
+
+
+def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
+    counts = len(message.position_constraints), len(message.orientation_constraints)
+    if message.visibility_constraints or max(counts) > 1:
+        raise RequestRefused(
+            "a goal must be joint positions, or one position with at most one orientation",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        )
+    joints = message.joint_constraints
+    if joints and not any(counts):
+        return positions(context.driver, [one.joint_name for one in joints], [one.position for one in joints])
+    if joints or not counts[0]:
+        raise RequestRefused(
+            "a goal must be joint positions, or a position with or without an orientation",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+            hint="give one of them",
+        )
+    return _pose_goal(context, message.position_constraints[0], message.orientation_constraints)
+
+
+def _pose_goal(context: NodeContext, place: Any, turns: Sequence[Any]) -> Pose | Region:
+    """A goal for the tool frame, of a position and perhaps an orientation of a link."""
+    to_tool = link_on_flange(context, place.link_name).inverse() @ tool_on_flange(context)
+    offset = place.target_point_offset
+    to_tool = Pose.of((-offset.x, -offset.y, -offset.z)) @ to_tool
+    has_lever = bool(np.abs(to_tool.xyz).max() > 0.0)
+    centre, radius = _ball(context, place)
+    if turns:
+        one = turns[0]
+        if one.link_name not in ("", place.link_name):
+            raise RequestRefused(
+                f"position and orientation must be of the same link, got {place.link_name!r} and {one.link_name!r}",
+                MoveItCode.INVALID_GOAL_CONSTRAINTS,
+            )
+        quat = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).quat
+        cone = min(one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, pi)
+        turn = min(one.absolute_z_axis_tolerance, pi)
+    elif has_lever:
+        raise RequestRefused(
+            "a position with any orientation must be of the tool frame itself",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+            hint="name the tool's link, without target_point_offset, or give an orientation",
+        )
+    else:
+        quat, cone, turn = np.array([0.0, 0.0, 0.0, 1.0]), pi, pi
+    if has_lever:
+        cone = turn = 0.0  # to turn the tool frame would move the link
+    cone, turn = (0.0 if angle <= _EXACT_ANGLE else angle for angle in (cone, turn))
+    pose = Pose.of(centre.xyz, quat) @ to_tool
+    edge = 0.0 if radius <= _EXACT_POSITION else 2.0 * radius / sqrt(3.0)
+    if not (edge or cone or turn):
+        return pose
+    return Region.of(pose, box=(edge, edge, edge), cone=cone, turn=turn)
+
+
+def _ball(context: NodeContext, message: Any) -> tuple[Pose, float]:
+    """Centre, in the base, and radius of the largest ball in the region of a position constraint [m]."""
+    region = message.constraint_region
+    if region.meshes or len(region.primitives) != 1 or len(region.primitive_poses) != 1:
+        raise RequestRefused(
+            "a region of positions must be one primitive with its pose", MoveItCode.INVALID_GOAL_CONSTRAINTS
+        )
+    primitive, at = region.primitives[0], region.primitive_poses[0]
+    sizes = list(primitive.dimensions)
+    if primitive.type not in (BOX, SPHERE) or not sizes:
+        raise RequestRefused(
+            f"a region of positions must be a box or a sphere, got a primitive of type {primitive.type}",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        )
+    point = (at.position.x, at.position.y, at.position.z)
+    radius = sizes[0] if primitive.type == SPHERE else min(sizes) / 2.0
+    return _in_base(context, message.header, point, None), radius
+
+
+def _in_base(context: NodeContext, header: Any, point: tuple[float, float, float], turn: Any) -> Pose:
+    """A point and an orientation of a frame as a pose in the base.
+
+    Raises:
+        RequestRefused: unknown frame.
+    """
+    message = _Stamped(header, context.ros.pose())
+    place = message.pose.position
+    place.x, place.y, place.z = point
+    message.pose.orientation.w = 1.0
+    if turn is not None:
+        message.pose.orientation = turn
+    return stamped_in_base(context, message)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stamped:
+    """As a geometry_msgs/PoseStamped."""
+
+    header: Any
+    pose: Any
+
+
+def stamped_in_base(context: NodeContext, message: Any) -> Pose:
+    """Convert a geometry_msgs/PoseStamped to a pose in the base.
+
+    Raises:
+        RequestRefused: it is in an unknown frame, or has no orientation.
+    """
+    try:
+        pose_of(message.pose)
+        return stamped_pose(message, context.driver)
+    except HeptarmError as error:
+        raise RequestRefused(str(error), MoveItCode.FRAME_TRANSFORM_FAILURE) from None
+
+
+# ---------------------------------------------------------------------------------- path constraints
+
+
+def keep_of(context: NodeContext, message: Any, start: Array) -> Upright | None:
+    """What a moveit_msgs/Constraints along a path keeps; None: nothing.
+
+    MoveIt's constraint is about a fixed orientation, ours about that at the start: what lies between tightens it.
+
+    Args:
+        context: of the node.
+        message: the constraints.
+        start: joint positions at the beginning, shape (7,) [rad].
+
+    Raises:
+        RequestRefused: it is another kind of constraint, or the start violates it.
+    """
+    if message.joint_constraints or message.position_constraints or message.visibility_constraints:
+        raise RequestRefused(
+            "a path constraint must be one of an orientation",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+            hint="leave out the other kinds",
+        )
+    if not message.orientation_constraints:
+        return None
+    one = message.orientation_constraints[0]
+    tolerances = (one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, one.absolute_z_axis_tolerance)
+    free = [index for index, tolerance in enumerate(tolerances) if tolerance >= pi]
+    if len(message.orientation_constraints) > 1 or len(free) != 1:
+        raise RequestRefused(
+            f"a path constraint must leave free one axis, with a tolerance of at least pi, got tolerances "
+            f"{', '.join(f'{value:g}' for value in tolerances)} rad",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        )
+    link = link_on_flange(context, one.link_name)
+    to_tool = link.inverse() @ tool_on_flange(context)
+    along = np.abs(to_tool.rotation.T[:, free[0]])
+    if along.max() < np.cos(_ALONG):
+        raise RequestRefused(
+            "the axis that stays upright must be one of the tool frame", MoveItCode.INVALID_GOAL_CONSTRAINTS
+        )
+    wanted = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).rotation[:, free[0]]
+    flange = Pose.from_matrix(forward(context.arm.robot, start))
+    here = (flange @ link).rotation[:, free[0]]
+    tilt = float(np.arccos(np.clip(wanted @ here, -1.0, 1.0)))
+    left = min(tolerance for index, tolerance in enumerate(tolerances) if index != free[0]) - tilt
+    if left < 0.01:
+        raise RequestRefused(
+            f"at the start the axis is turned by {tilt:.3f} rad already, which leaves {left:.3f} rad; at least "
+            "0.01 rad are needed",
+            MoveItCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+        )
+    return Upright(("x", "y", "z")[int(along.argmax())], within=min(left, pi))

@@ -1,0 +1,196 @@
+"""The service `plan` and the action `plan_and_execute`: requests to `Arm.find_path`, and its paths as messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import nan
+from typing import Any, cast
+
+import numpy as np
+
+from heptarm.errors import CollisionForeseen, HeptarmError, NoPath, ShapeError
+from heptarm.planning.search import STATES, TIMEOUT
+from heptarm.ros.interface.action import ActionResult, GoalClient, GoalWork
+from heptarm.ros.interface.conditions import condition_of, reaction_of
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.motions import positions, stamped_pose
+from heptarm.ros.interface.program_goal import start_program
+from heptarm.ros.interface.service import ServiceResponse
+from heptarm.ros.trajectory.goal import GoalOutcome
+from heptarm.values.checks import Array
+from heptarm.values.motion.planned_path import Path, Region, Upright
+from heptarm.values.pose import Pose
+
+#: Time between two points of a trajectory [s], and the most points that one has.
+_STEP, _MOST_POINTS = 0.02, 1000
+#: Default of the angle within which an axis stays upright [rad].
+_WITHIN = 0.1
+
+
+def plan(context: NodeContext, request: Any) -> ServiceResponse:
+    """Find a path around the bodies of the world."""
+    find = _search(context, request)
+    try:
+        path = find(None)
+    except NoPath as error:
+        return ServiceResponse(False, str(error), {"reason": error.reason, "clearance": nan})
+    fields = {**_fields(path), "trajectory": timed(context, path, speed=_speed(context, request))}
+    return ServiceResponse(True, str(path), fields)
+
+
+def plan_and_execute(context: NodeContext, goal: Any) -> GoalWork:
+    """Find a path around the bodies of the world, and move along it."""
+    context.check_active()
+    condition_of(goal.until)  # refused now, not after the search
+    reaction_of(goal.then)
+    find = _search(context, goal)
+
+    def work(client: GoalClient) -> ActionResult:
+        client.publish_feedback({"state": "planning", "remaining": nan})
+        try:
+            path = find(client.is_cancel_requested)
+        except NoPath as error:
+            return _not_found(error, client)
+        except HeptarmError as error:
+            return ActionResult(GoalOutcome.ABORTED, str(error), {"clearance": nan})
+        return move_along(context, goal, path, client)
+
+    return work
+
+
+def move_along(context: NodeContext, goal: Any, path: Path, client: GoalClient) -> ActionResult:
+    """Move along a path, after it was checked against the world as it is now.
+
+    Args:
+        context: of the node.
+        goal: has the speed, the condition that ends the motion, and the reaction to it.
+        path: begins where the arm rests.
+        client: of the goal.
+    """
+    try:
+        work = start_program(context, goal, (replace(path, world=context.world.model),))
+    except CollisionForeseen as error:
+        return ActionResult(GoalOutcome.ABORTED, f"the world has changed: {error}", _fields(path))
+    except HeptarmError as error:
+        return ActionResult(GoalOutcome.ABORTED, str(error), _fields(path))
+    result = work(_Moving(client))
+    return replace(result, fields={**_fields(path), **result.fields})
+
+
+class _Moving:
+    """The client of a goal whose path was found."""
+
+    def __init__(self, client: GoalClient) -> None:
+        self._client = client
+
+    def publish_feedback(self, fields: Mapping[str, Any]) -> None:
+        """Publish feedback of the motion."""
+        self._client.publish_feedback({"state": "moving", **fields})
+
+    def is_cancel_requested(self) -> bool:
+        """Whether the client has requested to cancel the goal."""
+        return self._client.is_cancel_requested()
+
+
+def _not_found(error: NoPath, client: GoalClient) -> ActionResult:
+    fields = {"reason": error.reason, "clearance": nan}
+    if client.is_cancel_requested():
+        return ActionResult(GoalOutcome.CANCELED, "cancelled during the search; nothing has moved", fields)
+    return ActionResult(GoalOutcome.ABORTED, str(error), fields)
+
+
+def _search(context: NodeContext, request: Any) -> Callable[[Callable[[], bool] | None], Path]:
+    """Check a request; the function that is returned searches, until its argument returns true.
+
+    Raises:
+        HeptarmError: refused; the text gives the reason.
+    """
+    goals = [_goal(context, one, f"goals[{index}]") for index, one in enumerate(request.goals)]
+    if not goals:
+        raise ShapeError("goals must have at least one goal, got none", parameter="goals")
+    if request.within and not request.upright:
+        raise ShapeError(
+            "within is given without upright", parameter="within", hint="name the axis that stays upright"
+        )
+    keep = Upright(request.upright, within=request.within or _WITHIN) if request.upright else None
+    world, speed = context.world.model, _speed(context, request)
+
+    def find(stop: Callable[[], bool] | None) -> Path:
+        return context.arm.find_path(
+            goals,
+            avoid=world,
+            keep=keep,
+            speed=speed,
+            timeout=request.timeout or TIMEOUT,
+            states=request.states or STATES,
+            seed=request.seed,
+            stop=stop,
+        )
+
+    return find
+
+
+def _goal(context: NodeContext, message: Any, name: str) -> Array | Pose | Region:
+    """Convert a heptarm_msgs/PathGoal."""
+    region = [*message.box, message.cone, message.turn]
+    if len(message.position):
+        if any(region):
+            raise ShapeError(
+                f"{name} has joint positions and a region around a pose, which exclude each other",
+                parameter=name,
+                hint="give one",
+            )
+        return positions(context.driver, message.joint_names, message.position)
+    pose = stamped_pose(message.pose, context.driver)
+    if not any(region):
+        return pose
+    return Region.of(pose, box=list(message.box) or (0.0, 0.0, 0.0), cone=message.cone, turn=message.turn)
+
+
+def _speed(context: NodeContext, request: Any) -> float:
+    return cast(float, request.speed or context.driver.configuration.values["speed"])
+
+
+def _fields(path: Path) -> dict[str, Any]:
+    near = path.clearance
+    return {
+        "duration": path.duration,
+        "clearance": nan if near is None else near.distance,
+        "nearest": [] if near is None else [near.first, near.second],
+    }
+
+
+# -------------------------------------------------------------------------------------- trajectories
+
+
+def timed(context: NodeContext, path: Path, *, speed: float) -> dict[str, Any]:
+    """Fields of the trajectory_msgs/JointTrajectory of a path, as fast as the arm moves along it at a speed."""
+    step = max(_STEP, path.duration / _MOST_POINTS)
+    preview = context.arm.plan(path, speed=speed, start=path.start, step=step)
+    return trajectory_fields(context, preview.t, preview.q, preview.dq, preview.ddq)
+
+
+def trajectory_fields(context: NodeContext, t: Array, q: Array, dq: Array, ddq: Array) -> dict[str, Any]:
+    """Fields of a trajectory_msgs/JointTrajectory that begins and ends at rest.
+
+    Args:
+        context: of the node.
+        t: times, shape (n,) [s].
+        q: positions, shape (n, 7) [rad].
+        dq: velocities, shape (n, 7) [rad/s].
+        ddq: accelerations, shape (n, 7) [rad/s²].
+    """
+    ros, moving = context.ros, np.ones(len(t))
+    moving[-1] = 0.0
+    rows = zip(t.tolist(), q.tolist(), (moving[:, None] * dq).tolist(), (moving[:, None] * ddq).tolist())
+    points = [
+        ros.point(
+            positions=place,
+            velocities=velocity,
+            accelerations=acceleration,
+            time_from_start=ros.duration(time),
+        )
+        for time, place, velocity, acceleration in rows
+    ]
+    return {"joint_names": context.joints, "points": points}

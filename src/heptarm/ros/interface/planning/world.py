@@ -1,0 +1,161 @@
+"""The bodies around the arm of a node, as topics and services report them.
+
+A change happens to a copy, which replaces the world when all of it has succeeded. So a refused message changes nothing,
+and a search that runs keeps the world with which it began.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TypeAlias
+
+from heptarm.errors import CommandRejected
+from heptarm.ros.node.driver import Driver
+from heptarm.sim.collision import CollisionModel
+from heptarm.values.mesh import Mesh
+from heptarm.values.pose import Pose
+from heptarm.values.shape import ORIGIN, Shape
+
+Part: TypeAlias = Shape | Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class SceneBody:
+    """A body that somebody has added to the world of a node.
+
+    Attributes:
+        parts: its shapes, in the frame of the body.
+        pose: of the body, in the base; of one that the arm holds, in the flange frame.
+        is_held: whether the arm holds it.
+    """
+
+    parts: tuple[Part, ...]
+    pose: Pose
+    is_held: bool = False
+
+
+class WorldDraft:
+    """A copy of a world, to be changed.
+
+    Args:
+        model: of collisions; it is changed.
+        bodies: those that were added.
+
+    Attributes:
+        model: see above.
+        bodies: see above.
+    """
+
+    def __init__(self, model: CollisionModel, bodies: Mapping[str, SceneBody]) -> None:
+        self.model, self.bodies = model, dict(bodies)
+
+    def add(self, name: str, body: SceneBody) -> None:
+        """Add a body, in place of the one of that name.
+
+        Raises:
+            HeptarmError: refused; the text gives the reason.
+        """
+        if name in self.bodies:
+            self.model.remove(name)
+        self.model.add(name, body.parts, at=ORIGIN if body.is_held else body.pose)
+        self._put(name, body)
+
+    def remove(self, name: str) -> None:
+        """Remove a body.
+
+        Raises:
+            CommandRejected: none of that name was added.
+        """
+        self.body(name)
+        self.model.remove(name)
+        del self.bodies[name]
+
+    def move(self, name: str, pose: Pose) -> None:
+        """Put a body somewhere in the base; the arm holds it no more."""
+        self._put(name, replace(self.body(name), pose=pose, is_held=False))
+
+    def hold(self, name: str, pose: Pose) -> None:
+        """Let the arm hold a body at a pose in the flange frame."""
+        self._put(name, replace(self.body(name), pose=pose, is_held=True))
+
+    def body(self, name: str) -> SceneBody:
+        """Look up a body.
+
+        Raises:
+            CommandRejected: none of that name was added.
+        """
+        if name not in self.bodies:
+            listed = ", ".join(self.bodies) or "none"
+            raise CommandRejected(
+                f"id must be that of a body that was added, one of {listed}; got {name!r}",
+                parameter="id",
+                value=name,
+                allowed=listed,
+            )
+        return self.bodies[name]
+
+    def _put(self, name: str, body: SceneBody) -> None:
+        (self.model.hold if body.is_held else self.model.place)(name, body.pose)
+        self.bodies[name] = body
+
+
+class NodeWorld:
+    """The world around the arm of a node; it begins with the scene of the parameters.
+
+    Args:
+        driver: of the arm.
+    """
+
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
+        self._lock = threading.Lock()
+        self._model: CollisionModel | None = None
+        self._bodies: Mapping[str, SceneBody] = MappingProxyType({})
+
+    @property
+    def model(self) -> CollisionModel:
+        """The world as it is now. It is not changed any more: a change makes another one.
+
+        Raises:
+            CommandRejected: there is no such scene.
+            MissingExtra: the models of bodies are not installed.
+        """
+        with self._lock:
+            return self._made()
+
+    @property
+    def bodies(self) -> Mapping[str, SceneBody]:
+        """Bodies that were added, by name."""
+        return self._bodies
+
+    def draft(self) -> WorldDraft:
+        """A copy, to be changed; see `changing` for one that becomes the world.
+
+        Raises:
+            HeptarmError: as `model`.
+        """
+        return WorldDraft(self.model.carrying(None), self._bodies)
+
+    @contextlib.contextmanager
+    def changing(self) -> Iterator[WorldDraft]:
+        """A copy that becomes the world at the end, unless an error is raised.
+
+        Raises:
+            HeptarmError: as `model`.
+        """
+        with self._lock:
+            draft = WorldDraft(self._made().carrying(None), self._bodies)
+            yield draft
+            self._model, self._bodies = draft.model, MappingProxyType(draft.bodies)
+
+    def _made(self) -> CollisionModel:
+        if self._model is None:
+            values = self._driver.configuration.values
+            self._model = CollisionModel(
+                self._driver.arm.robot.name, scene=values["planning.scene"], margin=values["planning.margin"]
+            )
+        return self._model

@@ -1,0 +1,336 @@
+"""The world of a node, and MoveIt's requests: messages become bodies and goals; the nodes' own tests move the arm."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from heptarm.errors import CommandRejected, HeptarmError, NoPath, ShapeError
+from heptarm.model.kinematics import forward
+from heptarm.ros.interface.offered import offered, offered_actions
+from heptarm.ros.interface.planning import constraints, scene
+from heptarm.ros.interface.planning.constraints import MoveItCode, RequestRefused
+from heptarm.ros.interface.planning.world import NodeWorld
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.values.motion.planned_path import Region
+from heptarm.values.pose import Pose
+from heptarm.values.robot import robot
+
+HOME = np.radians([0, 30, 0, -90, 0, 60, 0])
+FLANGE = Pose.from_matrix(forward(robot("iiwa14"), HOME))
+TCP = Pose.at(0.0, 0.0, 0.1)
+
+
+def message(**fields: Any) -> SimpleNamespace:
+    return SimpleNamespace(**fields)
+
+
+def header(frame: str = "") -> SimpleNamespace:
+    return message(frame_id=frame)
+
+
+def pose(
+    xyz: tuple[float, ...] = (0.0, 0.0, 0.0), quat: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)
+) -> SimpleNamespace:
+    return message(position=message(**dict(zip("xyz", xyz))), orientation=message(**dict(zip("xyzw", quat))))
+
+
+def body(name: str, *, operation: Any = 0, frame: str = "", **fields: Any) -> SimpleNamespace:
+    """A moveit_msgs/CollisionObject: by default a box of 10 cm."""
+    empty: dict[str, Any] = {
+        "header": header(frame),
+        "id": name,
+        "pose": pose(),
+        "primitives": [message(type=1, dimensions=[0.1, 0.1, 0.1])],
+        "primitive_poses": [pose()],
+        "meshes": [],
+        "mesh_poses": [],
+        "planes": [],
+        "operation": operation,
+    }
+    return message(**(empty | fields))
+
+
+def attached(name: str, link: str = "", **fields: Any) -> SimpleNamespace:
+    """A moveit_msgs/AttachedCollisionObject; by default of a body that is in the world."""
+    nothing: dict[str, Any] = {"primitives": [], "primitive_poses": []}
+    return message(link_name=link, touch_links=[], object=body(name, **(nothing | fields)))
+
+
+@pytest.fixture
+def context() -> Any:
+    """As that of a node whose arm rests at HOME with a tool frame 10 cm before the flange."""
+    configuration = NodeConfiguration.of({})
+    state = message(q=HOME, q_cmd=HOME, pose=FLANGE @ TCP, groups=message(mode=None))
+    fixture = Pose.at(0.5, 0.1, 0.2)
+    arm = message(robot=robot("iiwa14"), state=state, frames={"/Fixture": fixture}, tools={})
+    driver = message(configuration=configuration, arm=arm)
+    world = NodeWorld(cast(Any, driver))
+    ros = message(pose=pose)
+    return cast(
+        Any,
+        message(
+            world=world,
+            driver=driver,
+            arm=arm,
+            ros=ros,
+            workpiece=None,
+            joints=list(configuration.joints),
+            base="link_0",
+        ),
+    )
+
+
+# -------------------------------------------------------------------------------------------- world
+
+
+def test_bodies_come_go_and_move_in_the_frames_that_their_headers_name(context: Any) -> None:
+    scene.collision_object(context, body("wall", pose=pose((0.5, 0.2, 0.3))))
+    scene.collision_object(
+        context, body("jig", operation=b"\x00", frame="Fixture", pose=pose((0.0, 0.0, 0.1)))
+    )
+    scene.collision_object(context, body("tag", frame="tool"))
+    found = context.world.bodies
+    np.testing.assert_allclose(found["wall"].pose.xyz, [0.5, 0.2, 0.3])
+    np.testing.assert_allclose(found["jig"].pose.xyz, [0.5, 0.1, 0.3])
+    np.testing.assert_allclose(found["tag"].pose.xyz, (FLANGE @ TCP).xyz)
+    scene.collision_object(context, body("wall", operation=3, pose=pose((0.0, 0.6, 0.1))))
+    np.testing.assert_allclose(context.world.bodies["wall"].pose.xyz, [0.0, 0.6, 0.1])
+    scene.collision_object(context, body("wall", operation=2, pose=pose((0.0, 0.6, 0.4))))
+    parts = context.world.bodies["wall"].parts
+    assert len(parts) == 2 and parts[1].pose.xyz[2] == pytest.approx(0.3)
+    scene.collision_object(context, body("jig", operation=1))
+    assert set(context.world.bodies) == {"wall", "tag"} and "jig" not in context.world.model.bodies
+    scene.collision_object(context, body("", operation=1))
+    assert not context.world.bodies and "wall" not in context.world.model.bodies
+
+
+def test_shapes_have_their_sizes(context: Any) -> None:
+    primitives = [message(type=2, dimensions=[0.05]), message(type=3, dimensions=[0.4, 0.03])]
+    corners = [(0, 0, 0), (0.2, 0, 0), (0, 0.2, 0), (0, 0, 0.2)]
+    mesh = message(
+        vertices=[message(x=x, y=y, z=z) for x, y, z in corners],
+        triangles=[message(vertex_indices=face) for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))],
+    )
+    at = [pose((0.0, 0.0, 0.2)), pose()]
+    scene.collision_object(
+        context,
+        body(
+            "post",
+            pose=pose((0.5, 0.3, 0.2)),
+            primitives=primitives,
+            primitive_poses=at,
+            meshes=[mesh],
+            mesh_poses=[pose()],
+        ),
+    )
+    ball, rod, wedge = context.world.bodies["post"].parts
+    assert ball.kind == "sphere" and ball.size[0] == 0.05 and ball.pose.xyz[2] == 0.2
+    assert rod.kind == "cylinder" and rod.size.tolist() == [0.03, 0.4, 0.0], "MoveIt's have the height first"
+    assert len(wedge.faces) == 4
+
+
+def test_the_arm_carries_what_is_attached_and_leaves_it_where_it_is(context: Any) -> None:
+    place = (FLANGE @ Pose.at(0.0, 0.0, 0.2)).xyz
+    scene.collision_object(context, body("part", pose=pose(tuple(place))))
+    assert not context.world.model.touching(HOME)
+    scene.attached_collision_object(context, attached("part", "flange"))
+    held = context.world.bodies["part"]
+    assert held.is_held and np.linalg.norm(held.pose.xyz) == pytest.approx(0.2)
+    turned = HOME.copy()
+    turned[0] = 1.0
+    scene.collision_object(
+        context,
+        body("post", pose=pose(tuple(Pose.from_matrix(forward(robot("iiwa14"), turned)).xyz + [0, 0, -0.2]))),
+    )
+    touched = {frozenset((one.first, one.second)) for one in context.world.model.touching(turned)}
+    assert frozenset(("part", "post")) in touched
+    context.arm.state.q, there = turned, Pose.from_matrix(forward(robot("iiwa14"), turned))
+    scene.attached_collision_object(context, attached("part", operation=1))
+    left = context.world.bodies["part"]
+    assert not left.is_held
+    np.testing.assert_allclose(left.pose.xyz, (there @ held.pose).xyz, atol=1e-9)
+    own = attached("grip", "tool", primitives=[message(type=2, dimensions=[0.02])], primitive_poses=[pose()])
+    context.arm.state.pose = there @ TCP
+    scene.attached_collision_object(context, own)
+    np.testing.assert_allclose(context.world.bodies["grip"].pose.xyz, TCP.xyz, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        (body("link_3"), "name must be a new name"),
+        (body("wall", frame="camera"), "frame of the pose"),
+        (body("wall", primitives=[message(type=4, dimensions=[0.1, 0.1])]), "type of a primitive"),
+        (body("wall", primitives=[message(type=1, dimensions=[0.1])]), "must be 3 numbers"),
+        (body("wall", primitives=[message(type=1, dimensions=[0.1, 0.1, -1.0])]), "must be in"),
+        (body("wall", primitive_poses=[pose(), pose()]), "must have 1 poses"),
+        (body("wall", primitives=[], primitive_poses=[]), "must have primitives or meshes"),
+        (body("wall", planes=[message()]), "no end"),
+        (body("wall", operation=3), "body that was added"),
+        (body("wall", operation=1), "body that was added"),
+        (body("wall", pose=pose((0.0, 0.0, 0.1))), "inside link_0"),
+    ],
+)
+def test_a_refused_message_changes_nothing(context: Any, wrong: Any, text: str) -> None:
+    scene.collision_object(context, body("post", pose=pose((0.5, 0.3, 0.2))))
+    before = context.world.model
+    world = message(
+        collision_objects=[body("crate", pose=pose((0.0, 0.6, 0.2))), wrong],
+        octomap=message(octomap=message(data=[])),
+    )
+    both = message(
+        is_diff=False,
+        world=world,
+        robot_state=message(attached_collision_objects=[]),
+        allowed_collision_matrix=message(entry_values=[]),
+    )
+    for handler, one in ((scene.collision_object, wrong), (scene.planning_scene, both)):
+        with pytest.raises(HeptarmError, match=text):
+            handler(context, one)
+        assert set(context.world.bodies) == {"post"} and context.world.model is before
+
+
+def test_what_cannot_be_attached_is_refused(context: Any) -> None:
+    for wrong, text in (
+        (attached("part", "flange"), "body that was added"),
+        (attached("part", "link_2"), "link must be one of"),
+        (message(link_name="", touch_links=["link_3"], object=body("part")), "touch_links"),
+    ):
+        with pytest.raises(CommandRejected, match=text):
+            scene.attached_collision_object(context, wrong)
+    assert not context.world.bodies
+
+
+# --------------------------------------------------------------------------------- MoveIt's requests
+
+
+def position(link: str, xyz: tuple[float, ...], size: list[float], kind: int = 2) -> Any:
+    region = message(primitives=[message(type=kind, dimensions=size)], primitive_poses=[pose(xyz)], meshes=[])
+    return message(
+        header=header("link_0"),
+        link_name=link,
+        target_point_offset=message(x=0.0, y=0.0, z=0.0),
+        constraint_region=region,
+    )
+
+
+def orientation(link: str, quat: tuple[float, ...], tolerances: tuple[float, float, float]) -> Any:
+    names = ("absolute_x_axis_tolerance", "absolute_y_axis_tolerance", "absolute_z_axis_tolerance")
+    turn = message(**dict(zip("xyzw", quat)))
+    return message(header=header(), link_name=link, orientation=turn, **dict(zip(names, tolerances)))
+
+
+def wanted(**fields: Any) -> Any:
+    names = ("joint_constraints", "position_constraints", "orientation_constraints", "visibility_constraints")
+    return message(**(dict.fromkeys(names, ()) | fields))
+
+
+def test_constraints_become_goals_of_the_tool_frame(context: Any) -> None:
+    place, down = (0.5, 0.1, 0.4), (0.0, 1.0, 0.0, 0.0)
+    joints = [message(joint_name=name, position=value) for name, value in (("A2", 0.3), ("A1", 0.1))]
+    goals = constraints.goals_of(
+        context,
+        [
+            wanted(joint_constraints=joints),
+            wanted(
+                position_constraints=[position("flange", place, [0.001])],
+                orientation_constraints=[orientation("flange", down, (0.001, 0.001, 0.001))],
+            ),
+            wanted(
+                position_constraints=[position("tool", place, [0.1])],
+                orientation_constraints=[orientation("tool", down, (0.3, 0.2, pi))],
+            ),
+            wanted(position_constraints=[position("tool", place, [0.2, 0.4, 0.6], kind=1)]),
+        ],
+    )
+    joint, exact, near, anywhere = goals
+    np.testing.assert_allclose(joint, [0.1, 0.3, *HOME[2:]])  # type: ignore[arg-type]
+    assert isinstance(exact, Pose)
+    np.testing.assert_allclose(exact.xyz, [0.5, 0.1, 0.3], atol=1e-9)  # the tool is 10 cm below the flange
+    assert isinstance(near, Region) and (near.cone, near.turn) == (0.2, pi)
+    np.testing.assert_allclose(near.box, [0.2 / sqrt(3.0)] * 3)
+    assert isinstance(anywhere, Region) and (anywhere.cone, anywhere.turn) == (pi, pi)
+
+
+@pytest.mark.parametrize(
+    ("goal", "code"),
+    [
+        (wanted(), MoveItCode.INVALID_GOAL_CONSTRAINTS),
+        (wanted(visibility_constraints=[message()]), MoveItCode.INVALID_GOAL_CONSTRAINTS),
+        (wanted(position_constraints=[position("hand", (0, 0, 0), [0.1])]), MoveItCode.INVALID_LINK_NAME),
+        (
+            wanted(position_constraints=[position("flange", (0, 0, 0), [0.1])]),
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        ),
+        (
+            wanted(position_constraints=[position("tool", (0, 0, 0), [0.1, 0.1], kind=3)]),
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        ),
+    ],
+)
+def test_a_goal_that_cannot_be_understood_is_refused_with_moveits_code(
+    context: Any, goal: Any, code: MoveItCode
+) -> None:
+    with pytest.raises(RequestRefused) as error:
+        constraints.goals_of(context, [goal])
+    assert constraints.code_of(error.value) is code
+
+
+def test_an_orientation_along_the_path_is_kept_upright_and_never_loosened(context: Any) -> None:
+    tilt = Pose.from_rotvec(np.zeros(3), np.array([0.1, 0.0, 0.0]))
+    quat = tuple((tilt @ Pose.of(np.zeros(3), FLANGE.quat)).quat.tolist())
+
+    def kept(tolerances: tuple[float, float, float]) -> Any:
+        one = wanted(orientation_constraints=[orientation("flange", quat, tolerances)])
+        return constraints.keep_of(context, one, HOME)
+
+    keep = kept((0.5, 0.4, 2 * pi))
+    assert keep.axis == "z" and keep.within == pytest.approx(0.4 - 0.1)
+    assert constraints.keep_of(context, wanted(), HOME) is None
+    for tolerances, code in (
+        ((0.5, 0.4, 0.3), MoveItCode.INVALID_GOAL_CONSTRAINTS),
+        ((0.05, 0.05, pi), MoveItCode.START_STATE_VIOLATES_PATH_CONSTRAINTS),
+    ):
+        with pytest.raises(RequestRefused) as error:
+            kept(tolerances)
+        assert error.value.moveit is code
+
+
+def test_errors_have_moveits_codes() -> None:
+    assert constraints.code_of(NoPath("", reason="goal")) is MoveItCode.GOAL_IN_COLLISION
+    assert constraints.code_of(NoPath("", reason="time")) is MoveItCode.TIMED_OUT
+    assert constraints.code_of(ShapeError("")) is MoveItCode.FAILURE
+
+
+def test_the_group_and_the_start_state(context: Any) -> None:
+    constraints.check_group(context, "arm")
+    with pytest.raises(RequestRefused, match="group_name must be 'arm', got 'hand'"):
+        constraints.check_group(context, "hand")
+    none = message(joint_state=message(name=["finger"], position=[1.0]), attached_collision_objects=[])
+    assert constraints.start_of(context, none) is None
+    some = message(
+        joint_state=message(name=["A2", "finger"], position=[0.4, 1.0]), attached_collision_objects=[]
+    )
+    start = constraints.start_of(context, some)
+    assert start is not None and start[1] == 0.4 and start[3] == HOME[3]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_moveits_names_are_offered_on_request_where_its_types_are_installed(
+    is_there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("offered", "topics"):
+        monkeypatch.setattr(f"heptarm.ros.interface.{module}.is_installed", lambda _: is_there)
+    for wanted_too in (True, False):
+        table = offered(NodeConfiguration.of({"moveit": wanted_too}).values)
+        names = {row.name for row in table.topics} | {row.name for row in table.services}
+        names |= {row.name for row in offered_actions("heptarm", with_moveit=wanted_too)}
+        assert ("collision_object" in names) is is_there
+        for name in ("compute_ik", "move_action", "trajectory_execution_event"):
+            assert (name in names) is (is_there and wanted_too)
+        assert table.missing == (("moveit_msgs",) if wanted_too and not is_there else ())
