@@ -45,8 +45,9 @@ class _Checks(ctypes.Structure):
             for name in ["model", "data", "kinematics", "distance", "positions", "places", "turns"]
         ],
         *[(name, _POINTER) for name in ["flange_place", "flange_turn", "hulls", "entries"]],
-        ("count", _WORD),
-        *[("all", _WORD), ("levers", _POINTER), ("moves", _POINTER), ("levels", _WORD)],
+        *[("count", _WORD), ("all", _WORD)],
+        *[("levers", _POINTER), ("moves", _POINTER)],
+        ("levels", _WORD),
         ("grips", _POINTER),
         ("held", _WORD),
     ]
