@@ -34,14 +34,14 @@ MEDIAN, LATE, LONGER = 25.0, 150.0, 1.15
 POSTURES, CHECK = 5000, 15.0
 
 
-def _searched(world: ha.CollisionModel, one: Problem) -> tuple[float, float] | None:
-    """Time of a search [s], and the length of its path by the best known; None: it found none."""
-    begin = time.perf_counter()
+def _searched(world: ha.CollisionModel, one: Problem) -> tuple[float, float, float] | None:
+    """Time and processor time of a search [s], and the length of its path by the best known; None: it found none."""
+    begin, used = time.perf_counter(), time.process_time()
     try:
         path = planning.find_path(world, start=one.start, goal=one.goal, timeout=LONGEST)
     except ha.NoPath:
         return None
-    return time.perf_counter() - begin, length(path.curve) / one.length
+    return time.perf_counter() - begin, time.process_time() - used, length(path.curve) / one.length
 
 
 @benchmark("searches")
@@ -53,7 +53,7 @@ def searches() -> Iterator[Figure]:
         gc.collect()
         with Noise() as noise:
             found = [done for one in posed if (done := _searched(world, one)) is not None]
-        times, lengths = (np.array(column) for column in zip(*found, strict=True))
+        times, cpu, lengths = (np.array(column) for column in zip(*found, strict=True))
         detail = {"problems": len(posed), "longest_s": LONGEST, "others": round(noise.others, 2)}
         is_noisy = noise.is_noisy
         yield Figure(
@@ -63,8 +63,11 @@ def searches() -> Iterator[Figure]:
         # what was not found counts as the longest
         times = np.concatenate([times, np.full(len(posed) - len(found), LONGEST)]) * 1e3
         middle, late = np.percentile(times, [50, 95]).tolist()
-        yield Figure(f"plan_time_{scene}", middle, "ms", limit=MEDIAN, disturbed=is_noisy)
-        yield Figure(f"plan_late_{scene}", late, "ms", limit=LATE, disturbed=is_noisy)
+        processor = [{"processor_ms": round(float(1e3 * np.percentile(cpu, part)), 1)} for part in (50, 95)]
+        yield Figure(
+            f"plan_time_{scene}", middle, "ms", limit=MEDIAN, disturbed=is_noisy, detail=processor[0]
+        )
+        yield Figure(f"plan_late_{scene}", late, "ms", limit=LATE, disturbed=is_noisy, detail=processor[1])
         middle, late = np.percentile(lengths, [50, 95]).tolist()
         yield Figure(f"plan_length_{scene}", middle, "fraction", limit=LONGER, detail={"p95": round(late, 3)})
 
