@@ -132,6 +132,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "CollisionModel.add": {"name": "post", "shape": heptarm.shapes.sphere(0.1), "at": POSE},
     "CollisionModel.add_points": {"cloud": [[0.5, 0.0, 0.5]]},
     "CollisionModel.remove": {"body": "cube"},
+    "CollisionModel.allowing": {"pairs": (("cube", "table"),)},
     "Mesh": {
         "vertices": np.vstack([np.zeros(3), 0.1 * np.eye(3)]),
         "faces": np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]),
@@ -160,7 +161,13 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Region": {"pose": POSE, "box": (0.1, 0.1, 0.1)},
     "Region.of": {"pose": POSE, "box": (0.1, 0.1, 0.1)},
     "height_map": {"heights": [[0.1, 0.2]], "cell": 0.1},
-    **{f"CollisionModel.{verb}": {"body": "cube"} for verb in ("place", "hold", "release")},
+    **{
+        f"CollisionModel.{verb}": {"body": "cube"}
+        for verb in ("place", "hold", "release", "pose", "held", "shapes")
+    },
+    "CollisionModel.first_together": {"t": (0.0, 1.0), "q": (HOME, HOME), "others": {}},
+    "CollisionModel.with_arm": {"name": "right", "at": POSE.shifted(1.2)},
+    "CollisionModel.wait_for_change": {"revision": 0, "timeout": 0.01},
     "Workspace": {"box": ((0.3, -0.5, 0.05), (0.8, 0.5, 0.9))},
     "spiral": {"radius": 0.003},
     "Spiral": {"radius": 0.003},
@@ -221,6 +228,7 @@ ACCEPTED: dict[tuple[str, str], str] = {
     ("Trajectory.positions", "too long"): "any number of times",
     ("height_map.heights", "matrix"): "two rows",
     ("CollisionModel.add_points.cloud", "matrix"): "two points",
+    ("find_path.keep", "empty list"): "no constraint",
 }
 #: Operators of conditions and poses; the others are those that every object has.
 OPERATORS: dict[str, Callable[[Any, Any], object]] = {

@@ -239,8 +239,8 @@ def test_pause_and_override_end_with_their_controller(cabinet: RunningCabinet) -
         first.pause()
         first.wait_until(lambda state: state.safety.paused, timeout=20.0)
     with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as second:
-        state = second.wait_until(lambda state: not state.safety.paused, timeout=20.0)
-        assert state.motion is not None and state.motion.override == 1.0
+        second.wait_until(lambda state: not state.safety.paused, timeout=20.0)
+        second.wait_until(lambda state: state.motion is not None and state.motion.override == 1.0)
         assert second.move(hold(0.1)).arrived
 
 

@@ -45,7 +45,7 @@ def world(probe: Probe) -> dict[str, Any]:
     return {one.id: one for one in scene.world.collision_objects}
 
 
-def furnished(probe: Probe) -> None:
+def with_bodies(probe: Probe) -> None:
     """Put the table and the wall into the world, by the topics of single objects and of scenes."""
     table = box(probe, "table", [0.4, 0.6, TABLE], pose(probe, (0.6, 0.0, TABLE / 2)))
     fields = {
@@ -67,7 +67,7 @@ def emptied(probe: Probe) -> None:
 
 def case_a_path_is_found_around_a_wall_and_moved_along(probe: Probe, stage: Stage) -> None:
     home(probe)
-    furnished(probe)
+    with_bodies(probe)
     goal = probe.make("heptarm_msgs/PathGoal", position=THERE)
     refused(probe.call("plan", "PlanPath", goals=[]), "at least one goal")
     refused(probe.call("plan", "PlanPath", goals=[goal], within=0.2), "upright")
@@ -92,7 +92,7 @@ def case_a_path_is_found_around_a_wall_and_moved_along(probe: Probe, stage: Stag
 
 def case_moveits_interface_plans_and_drives(probe: Probe, stage: Stage) -> None:
     home(probe)
-    furnished(probe)
+    with_bodies(probe)
     answer = probe.call("/surface/compute_fk", "moveit_msgs/GetPositionFK", fk_link_names=["flange"])
     assert answer.error_code.val == SUCCESS
     at = answer.pose_stamped[0].pose.position

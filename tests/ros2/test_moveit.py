@@ -78,6 +78,15 @@ def test_pymoveit2_drives_lines_and_asks_for_kinematics(client: Client, moveit: 
     )
     q = [dict(zip(solved.name, solved.position))[name] for name in client.joints]
     np.testing.assert_allclose(forward(robot("iiwa14"), q)[:3, 3], wanted, atol=1e-6)
+    far = {
+        "position": (there.xyz + [0.6, 0.0, 0.0]).tolist(),
+        "quat_xyzw": there.quat.tolist(),
+        "cartesian": True,
+    }
+    assert moveit.plan(**far, cartesian_fraction_threshold=0.9) is None, "out of reach"
+    part = moveit.plan(**far, cartesian_fraction_threshold=0.1)
+    ends = [forward(robot("iiwa14"), point.positions)[:3, 3] for point in (part.points[0], part.points[-1])]
+    assert 0.06 < ends[1][0] - ends[0][0] < 0.54 and abs(ends[1] - ends[0])[1:].max() < 1e-3
     begin = client.now()
     pose = {"position": wanted.tolist(), "quat_xyzw": there.quat.tolist()}
     assert moveit.move_to_pose(**pose, cartesian=True, timeout_sec=PATIENCE), moveit.last_failure()

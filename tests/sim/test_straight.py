@@ -346,3 +346,16 @@ def test_a_stop_brakes_within_the_limits_of_the_axes_too(tick: int) -> None:
     speed = np.diff(q, axis=0) * 1e3
     assert (np.abs(np.diff(speed, axis=0)) * 1e3).max() <= 10.0 and ear.causes == ["started", "cancelled"]
     assert np.max(q) < plant.robot.q_max[5]
+
+
+def test_stretched_upwards_with_a3_turned_wild_targets_end_nothing() -> None:
+    """No arm position has this A3 a hair beside; the plant's tick ended with Unreachable."""
+    random = np.random.default_rng(106)
+    plant, ear, start = at(10, 0, -30, 0, 15, 0, 0)
+    goals = [
+        moved(start, *random.uniform(-0.6, 0.6, 3)) @ Pose.xyz_abc(0, 0, 0, *random.uniform(-1.5, 1.5, 3))
+        for _ in range(8)
+    ]
+    for goal in [*goals, start @ Pose.xyz_abc(a=np.pi), start]:
+        followed(plant, lambda goal=goal: goal, 30)  # type: ignore[misc]
+    assert ear.causes == ["started"]

@@ -68,7 +68,7 @@ OBJECTS: dict[str, object] = {
 
 #: Methods that a program has no reason to call; and `save` and `plot`, which draw and write.
 CALLED_BY_HEPTARM = ("given", "longest_duration", "path_time", "plot", "replace", "save", "turn_time")
-#: What a correct call raises here: a state without torques is stale, and there is no file, library or body to remove.
+#: What a correct call raises here: a state without torques is stale; there is no file, library, other arm or body to remove.
 EXPECTED: dict[str, type[Exception]] = {
     "CollisionGuard.collision": heptarm.StaleState,
     "CollisionGuard.seen": heptarm.StaleState,
@@ -76,6 +76,8 @@ EXPECTED: dict[str, type[Exception]] = {
     "load": heptarm.CommandRejected,
     "mesh": heptarm.CommandRejected,
     "CollisionModel.remove": heptarm.CommandRejected,
+    "CollisionModel.seen_by": heptarm.CommandRejected,
+    "CollisionModel.set_arm": heptarm.CommandRejected,
     "law_from": heptarm.CommandRejected,
 }
 

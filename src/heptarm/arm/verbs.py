@@ -603,24 +603,6 @@ class ArmVerbs(Sealed):
             progress=progress,
         )
 
-    def loaded(self, model: _Carrier) -> _Carrier:
-        """A model of bodies with the shapes of what is attached to this arm, as its own checks and searches use it.
-
-        Args:
-            model: such as a `heptarm.CollisionModel`; it stays as it is.
-
-        Raises:
-            ShapeError: not a model that carries tools.
-        """
-        if not isinstance(model, CarriesTools):
-            raise ShapeError(
-                f"model must be a model of bodies that carries tools, got {shown(model)}",
-                parameter="model",
-                value=model,
-                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
-            )
-        return self._tooling.loaded(model)
-
     def follow(
         self,
         path: FoundPath,
@@ -680,11 +662,13 @@ class ArmVerbs(Sealed):
             self._foresight.find_path,
             path.goal,
             avoid=world,
-            keep=path.keep,
+            keep=path.keep or None,
             speed=terms.speed,
             timeout=TIMEOUT,
             states=STATES,
+            improve=0,
             seed=path.stats.seed,
+            progress=None,
         )
         follow_terms = FollowTerms(
             world=world,
@@ -696,6 +680,24 @@ class ArmVerbs(Sealed):
         )
         with link.stopping_on_interrupt():
             return PathFollower(link, self._tooling, follow_terms).follow(replace(path, world=world))
+
+    def loaded(self, model: _Carrier) -> _Carrier:
+        """A model of bodies with the shapes of what is attached to this arm, as its own checks and searches use it.
+
+        Args:
+            model: such as a `heptarm.CollisionModel`; it stays as it is.
+
+        Raises:
+            ShapeError: not a model that carries tools.
+        """
+        if not isinstance(model, CarriesTools):
+            raise ShapeError(
+                f"model must be a model of bodies that carries tools, got {shown(model)}",
+                parameter="model",
+                value=model,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
+        return self._tooling.loaded(model)
 
     @property
     def workspace(self) -> Workspace | None:

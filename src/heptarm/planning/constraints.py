@@ -124,8 +124,8 @@ class Constraints:
             for index, (part, (offset,), deviation) in enumerate(zip(self._parts, offsets, deviations)):
                 held[index] |= offset != 0.0
                 rows.append(part.rows(moves, turns[0])[held[index]])
-                share = max(0.0, 1.0 - 0.9 * _AIM / deviation) if deviation else 0.0
-                wanted.append(share * offset[held[index]])
+                fraction = max(0.0, 1.0 - 0.9 * _AIM / deviation) if deviation else 0.0
+                wanted.append(fraction * offset[held[index]])
             q = q - np.linalg.pinv(np.concatenate(rows), rcond=1e-3) @ np.concatenate(wanted)
         return None
 

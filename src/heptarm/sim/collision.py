@@ -17,7 +17,17 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, require
-from heptarm.values.checks import Array, array, finite_entries, frozen, instance, numbers, shown, within
+from heptarm.values.checks import (
+    Array,
+    array,
+    finite_entries,
+    frozen,
+    instance,
+    integer,
+    numbers,
+    shown,
+    within,
+)
 from heptarm.values.clearance import Clearance, ForeseenCollision, TouchOnPath
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose, check_pose
@@ -196,9 +206,15 @@ class CollisionModel(Sealed):
 
         Returns:
             The revision now: the same if nothing has changed.
+
+        Raises:
+            ShapeError: not numbers.
+            LimitError: one is outside its range.
         """
+        before = integer(revision, "revision", 0, 2**63)
+        longest = within(timeout, "timeout", 0.0, 3600.0, unit="s")
         with self._lock:
-            self._lock.wait_for(lambda: self._revision != revision, timeout)
+            self._lock.wait_for(lambda: self._revision != before, longest)
             return self._revision
 
     @_changes
@@ -397,7 +413,7 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: not pairs of names.
         """
-        view = self._copied()
+        view = self._copy()
         view._allowed = self._allowed | _pairs(pairs)
         view._distances = view._compiled(self._distances)
         return view
@@ -425,15 +441,16 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: wrong types.
         """
-        if tool is not None:
-            instance(tool, (Tool, KnownTool), "tool")
-        if workpiece is not None:
-            instance(workpiece, (Workpiece, KnownTool), "workpiece")
-        if at is not None:
-            check_pose(at, "at")
-        view = self._copied()
+        view = self._copy()
         view._carried = _carried(tool, workpiece, at)
         view._distances = view._compiled(self._distances)
+        return view
+
+    def _copy(self) -> CollisionModel:
+        """A model whose later changes do not reach this one."""
+        view = copy(self)
+        view._lock = threading.Condition(threading.RLock())
+        view._held, view._added = dict(self._held), dict(self._added)
         return view
 
     # -------------------------------------------------------------------------------- other arms
@@ -477,10 +494,11 @@ class CollisionModel(Sealed):
                 hint="for example at=heptarm.Pose.at(1.2, 0.0, 0.0)",
             )
         check_pose(place, "at")
-        model = known(instance(robot, str, "robot")) if robot else self._robot
+        instance(robot, str, "robot")
+        model = known(robot) if robot else self._robot
         posture = np.zeros(7) if q is None else array(q, 7, "q")
         model.check(posture, "q")
-        view = self._copied()
+        view = self._copy()
         view._arms = (*self._arms, OtherArm(name, model.name, place, _carried(tool, workpiece, None)))
         view._distances = view._compiled(self._distances)
         view._distances.set_arm(name, posture)
@@ -531,7 +549,7 @@ class CollisionModel(Sealed):
         self._robot.check(posture, "q")
         back = chosen.pose.inverse()
         others = (OtherArm(one.name, one.robot, back @ one.pose, one.carried) for one in self._arms)
-        view = self._copied()
+        view = self._copy()
         view._robot, view._carried, view._held = known(chosen.robot), chosen.carried, {}
         view._arms = (
             OtherArm(own, self._robot.name, back, self._carried),
@@ -577,6 +595,7 @@ class CollisionModel(Sealed):
         """
         from heptarm.sim.distances import Distances
 
+        instance(others, Mapping, "others")
         rows = {"q": _rows(q, "q")} | {name: _rows(one, name) for name, one in others.items()}
         times = finite_entries(numbers(t, "t", "times of shape (n,)"), "t")
         if any(times.shape != (len(one),) for one in rows.values()):
@@ -615,13 +634,6 @@ class CollisionModel(Sealed):
                 free += max(_FAR, self._margin) if found is None else found[1]
             free -= (1.0 - at) * moved
         return None
-
-    def _copied(self) -> CollisionModel:
-        """A copy of which what is in the world can be changed."""
-        view = copy(self)
-        view._lock = threading.Condition(threading.RLock())
-        view._held, view._added = dict(self._held), dict(self._added)
-        return view
 
     def _check_free(self, name: str) -> None:
         instance(name, str, "body")
@@ -802,8 +814,8 @@ class _Models:
         tool_of: str = "",
     ) -> None:
         self._robot, self._boxes, self._scene = robot, boxes, scene
-        self._origin, self._tool_of = origin, tool_of
         self._lock = threading.Lock()  # models of the same world share this in several threads
+        self._origin, self._tool_of = origin, tool_of
         self._made: dict[tuple[object, ...], Any] = {}
 
     def site(self, name: str) -> Pose | None:
@@ -855,9 +867,19 @@ class _Models:
 def _carried(
     tool: Tool | KnownTool | None, workpiece: Workpiece | KnownTool | None, at: Pose | None
 ) -> tuple[CarriedShapes, ...]:
-    """The shapes of a tool and of what it holds, as they are on the flange."""
+    """The shapes of a tool and of what it holds, as they are on the flange.
+
+    Raises:
+        ShapeError: wrong types.
+    """
     from heptarm.sim.plant.carried import CarriedShapes
 
+    if tool is not None:
+        instance(tool, (Tool, KnownTool), "tool")
+    if workpiece is not None:
+        instance(workpiece, (Workpiece, KnownTool), "workpiece")
+    if at is not None:
+        check_pose(at, "at")
     origin = Pose.of((0.0, 0.0, 0.0))
     found = [] if tool is None else [CarriedShapes(tool.name, tool.shapes, origin, is_tool=True)]
     if workpiece is not None:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
+from heptarm.errors import Unreachable
 from heptarm.model.inverse_kinematics import PathInverse
 from heptarm.model.kinematics import forward
 from heptarm.planning.geometry import Quat, product
@@ -394,12 +395,14 @@ class StraightFollower:
         profile = self._profile(otg, centre, rate=1.0)
         if profile is None:
             return False
-        ahead = [self._q]
-        for elapsed in profile.first_ticks:
-            ahead.append(self._set_point(_Trajectory(otg, centre, profile), elapsed))
+        one, ahead = _Trajectory(otg, centre, profile), [self._q]
+        try:
+            ahead += [self._set_point(one, elapsed) for elapsed in profile.first_ticks]
+        except Unreachable:  # between the samples of the profile
+            return False
         if not self._axes.joins(scale * self._speed, *ahead):
             return False
-        self._followed, self._elapsed, self.resting = _Trajectory(otg, centre, profile), 0.0, 0.0
+        self._followed, self._elapsed, self.resting = one, 0.0, 0.0
         return True
 
     def _go_on(self, one: _Trajectory, *, rate: float, horizon: float = HORIZON) -> bool:

@@ -1,4 +1,4 @@
-"""Messages of MoveIt about the world: their conversion both ways, and the topics on which they come.
+"""Messages of MoveIt about the world: their conversion from and to bodies, and the topics on which they come.
 
 moveit_msgs has the same fields in both ROS. The pose of a body is in the frame that its header names: the base, a
 taught frame, or the flange or tool of an arm at rest.
