@@ -905,7 +905,7 @@ _NEARER = 1e-4
 def _joints(values: npt.ArrayLike, name: str) -> Array:
     """Joint positions of shape (7,); those of a search, which asks often, need no more than a look."""
     if (
-        isinstance(values, np.ndarray)
+        type(values) is np.ndarray
         and values.dtype == float
         and values.shape == (7,)
         and isfinite(values.sum())
