@@ -68,7 +68,7 @@ OBJECTS: dict[str, object] = {
 
 #: Methods that a program has no reason to call; and `save` and `plot`, which draw and write.
 CALLED_BY_HEPTARM = ("given", "longest_duration", "path_time", "plot", "replace", "save", "turn_time")
-#: What a correct call raises here: a state without torques is stale; there is no file, library, other arm or body to remove.
+#: What a correct call raises here: a state without torques is stale; there is no file, library, other arm or body.
 EXPECTED: dict[str, type[Exception]] = {
     "CollisionGuard.collision": heptarm.StaleState,
     "CollisionGuard.seen": heptarm.StaleState,
