@@ -17,9 +17,10 @@ struct hull {
 };
 
 /* A hull of the arm, its tool or what it holds, and one that it may meet. `size` is 1 for two shapes; else the second hull is around
-   those of the next entries, of which there are `size` less this one: a tree, in the order of a walk through it. */
+   those of the next entries, of which there are `size` less this one: a tree, in the order of a walk through it. `lever`: number of
+   their levers. */
 struct entry {
-    int32_t first, second, size;
+    int32_t first, second, size, lever;
 };
 
 /* A body that the flange carries: where its position is in MuJoCo's, and its pose in the flange: place, quaternion x y z w. */
@@ -40,6 +41,9 @@ struct checks {
     const struct hull *hulls;               /* of the shapes, then those around several */
     const struct entry *entries;
     int64_t count, all;                     /* of entries: of those that may not touch; with those that may */
+    const double *levers;                   /* how far two hulls move to each other for each radian of the joints, N numbers each */
+    double *moves;                          /* by how much they may, on a path: as many as there are levers */
+    int64_t levels;                         /* count of levers */
     const struct grip *grips;
     int64_t held;                           /* count of grips */
 };
@@ -170,22 +174,76 @@ void hc_nearest(const struct checks *c, int64_t count, const double *q, double b
     for (int64_t n = 0; n < count; n++) distances[n] = nearest(c, q + N * n, below);
 }
 
-/* Move on along a straight joint path until bodies are nearer than a margin, or to its end (conservative advancement, Mirtich
-   1996); the count of checks.
+/* How far the arm may move on from a posture: the fraction of its path that no two bodies use up, each by at most the distance
+   between them and `least`; negative: two bodies are nearer than `margin`. No more than `most`. */
+static double ahead(const struct checks *c, const double *q, double margin, double least, double most) {
+    move(c, q);
+    for (int64_t n = 0; n < c->count;) {
+        const struct entry *entry = c->entries + n;
+        double moved = c->moves[entry->lever], reach = fmax(most * moved - least, margin);
+        if (is_beyond(c, c->hulls + entry->first, c->hulls + entry->second, reach)) {
+            n += entry->size;
+            continue;
+        }
+        if (entry->size == 1) {
+            double distance = between(c, n, reach);
+            if (distance < margin) return -1.0;
+            if (distance < reach) most = fmin(most, (distance + least) / moved);
+        }
+        n++;
+    }
+    return most;
+}
 
-   moved: bound on the movement of all points on the whole path. least: what they may move beyond the distance. far: to look no
-   farther than this. single: move by one step only. at, distance: where it is on the path, 0 to 1, and the distance there, before
-   and after. */
-int64_t hc_advance(const struct checks *c, const double *first, const double *change, double moved, double margin, double least,
-                   double far, int single, double *at, double *distance) {
-    int64_t checks = 0;
-    double q[N];
-    do {
-        double look = fmin(fmax((1.0 - *at) * moved, margin), far);
-        *at = fmin(1.0, *at + (fmin(fmax(*distance, margin), look) + least) / moved);
-        for (int i = 0; i < N; i++) q[i] = first[i] + *at * change[i];
-        *distance = nearest(c, q, fmin(fmax((1.0 - *at) * moved, margin), far));
-        checks++;
-    } while (*at < 1.0 && *distance >= margin && !single);
-    return checks;
+/* The first place on a joint path at which bodies are nearer than a margin, by conservative advancement (Mirtich 1996).
+
+   count, points: of the path, which is straight from one to the next. least: what two bodies may move beyond their distance in a
+   step. far: to look no farther than this. place: the fraction of the piece between two points, and the joint positions there.
+   checks: of postures, to which those done here are added. Returns the piece, or -1: there is none. */
+int64_t hc_first(const struct checks *c, int64_t count, const double *points, double margin, double least, double far, double *place,
+                 int64_t *checks) {
+    double *at = place, *q = place + 1;
+    for (int64_t piece = 0; piece + 1 < count; piece++) {
+        const double *first = points + N * piece;
+        double change[N], largest = least, end = 0.0;
+        for (int i = 0; i < N; i++) change[i] = first[N + i] - first[i];
+        for (int64_t n = 0; n < c->levels; n++) {
+            c->moves[n] = 0.0;
+            for (int i = 0; i < N; i++) c->moves[n] += c->levers[N * n + i] * fabs(change[i]);
+            largest = fmax(largest, c->moves[n]);
+        }
+        for (*at = 0.0; *at < 1.0 || piece + 2 == count; *at = end) { /* the end is the beginning of the next piece */
+            for (int i = 0; i < N; i++) q[i] = *at < 1.0 ? first[i] + *at * change[i] : first[N + i];
+            double step = ahead(c, q, margin, least, fmin(1.0 - *at, (far + least) / largest));
+            ++*checks;
+            if (step < 0.0) return piece;
+            if (*at >= 1.0) break;
+            end = fmin(1.0, *at + step);
+        }
+    }
+    return -1;
+}
+
+/* Whether bodies are nearer than a margin in a posture. */
+static int is_touching(const struct checks *c, const double *q, double margin) {
+    move(c, q);
+    for (int64_t n = 0; (n = next_near(c, n, c->count, margin)) < c->count; n++)
+        if (between(c, n, fmax(margin, 0.0)) < margin) return 1;
+    return 0;
+}
+
+/* Whether there is no such place as `hc_first` finds, on a path that is straight from first to last: 1, or 0; negative: bodies touch at
+   its beginning. Most often they are in the way at its end or in its middle, so these are tried before anything is proven. */
+int hc_is_free(const struct checks *c, const double *points, double margin, double least, double far, int64_t *checks) {
+    static const double tried[] = {1.0, 0.5, 0.25, 0.75};
+    double q[N], place[1 + N];
+    int is_free = 1;
+    for (size_t n = 0; is_free && n < sizeof tried / sizeof *tried; n++) {
+        for (int i = 0; i < N; i++) q[i] = points[i] + tried[n] * (points[N + i] - points[i]);
+        is_free = !is_touching(c, q, margin);
+        ++*checks;
+    }
+    if (is_free && hc_first(c, 2, points, margin, least, far, place, checks) < 0) return 1;
+    ++*checks;
+    return -is_touching(c, points, margin);
 }

@@ -127,6 +127,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
         "near": np.array([HOME]),
     },
     "CollisionModel.first_on": {"path": (HOME, HOME)},
+    "CollisionModel.is_free": {"first": HOME, "last": HOME},
     "CollisionModel.distances": {"q": (HOME, HOME)},
     "CollisionModel.add": {"name": "post", "shape": heptarm.shapes.sphere(0.1), "at": POSE},
     "CollisionModel.add_points": {"cloud": [[0.5, 0.0, 0.5]]},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 import subprocess
 from pathlib import Path
@@ -24,3 +25,17 @@ def compiled(source: Path, folder: Path) -> Path:
     program = folder / source.stem
     subprocess.run([compiler, "-O2", *more, "-pthread", "-o", str(program), str(source), "-lm"], check=True)
     return program
+
+
+def library(source: Path, folder: Path) -> ctypes.CDLL:
+    """Compile one source in C to functions that this process calls.
+
+    Raises:
+        RuntimeError: there is no compiler.
+    """
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        raise RuntimeError(f"no compiler to compile {source.name} with; install gcc")
+    made = folder / f"{source.stem}.so"
+    subprocess.run([compiler, "-O2", "-shared", "-fPIC", "-o", str(made), str(source)], check=True)
+    return ctypes.CDLL(str(made))

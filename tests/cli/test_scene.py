@@ -166,7 +166,10 @@ def test_a_virtual_cabinet_with_a_scene_serves_its_clients() -> None:
 @pytest.mark.parametrize(
     ("options", "because"),
     [
-        (("--scene", "nowhere"), "one of bins, narrow-slot, peg-in-hole, shelf, table, two-arms"),
+        (
+            ("--scene", "nowhere"),
+            "one of bins, cage, narrow-slot, peg-in-hole, shelf, table, table-and-post, two-arms",
+        ),
         (("--scene", "table", "--fri", "1.15"), "cannot be used with heptarm sim fri"),
     ],
 )

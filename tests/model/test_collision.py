@@ -187,9 +187,8 @@ def test_a_model_that_carries_a_tool_has_the_scene_as_it_is_then() -> None:
 
 
 def test_refusals(bare: ha.CollisionModel) -> None:
-    with pytest.raises(
-        ha.CommandRejected, match="one of bins, narrow-slot, peg-in-hole, shelf, table, two-arms"
-    ):
+    known = "bins, cage, narrow-slot, peg-in-hole, shelf, table, table-and-post, two-arms"
+    with pytest.raises(ha.CommandRejected, match=f"one of {known}"):
         ha.CollisionModel("iiwa14", scene="nowhere")
     with pytest.raises(ha.CommandRejected, match="box must be"):
         ha.CollisionModel("iiwa14", boxes=["1,2"])

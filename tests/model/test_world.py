@@ -199,6 +199,35 @@ def test_many_postures_at_once_agree_with_each_alone(world: ha.CollisionModel) -
     assert allowed.distances([inside])[0] > allowed.clearances(inside)[0].distance
 
 
+def test_a_line_is_free_where_no_first_touch_is_on_it() -> None:
+    """Both ask for the same, and no pair moves farther than its own bound: many small steps find no other touch."""
+    world = ha.CollisionModel("iiwa14", scene="shelf")
+    world.hold("box", Pose.xyz_abc(0.0, 0.0, 0.2, 0.3, 0.0, 0.0))
+    random, seen = np.random.default_rng(9), {True: 0, False: 0}
+    for start in random.uniform(IIWA.q_min, IIWA.q_max, (200, 7)):
+        if world.touching(start):
+            continue
+        end = np.clip(start + random.uniform(-0.6, 0.6, 7), IIWA.q_min, IIWA.q_max)
+        is_free, touch = world.is_free(start, end), world.first_on([start, end])
+        assert is_free == (touch is None)
+        many = start + np.linspace(0.0, 1.0, 150)[:, None] * (end - start)
+        if touch is None:
+            assert world.distances(many, below=world.margin).min() >= -1e-6
+        else:
+            assert touch.clearance == world.touching(touch.q)[0]
+            assert touch.q == pytest.approx(start + touch.at * (end - start))
+        seen[is_free] += 1
+    assert min(seen.values()) > 10
+    bare, inside = ha.CollisionModel("iiwa14"), flange_at(0.5, 0.0, 0.5)
+    bare.add("ball", shapes.sphere(0.1), at=Pose.at(0.5, 0.0, 0.402))
+    assert bare.touching(inside) and bare.is_free(inside, flange_at(0.5, 0.0, 0.7))  # a contact may be left
+    assert not bare.is_free(inside, flange_at(0.5, 0.0, 0.45))
+    with pytest.raises(ha.ShapeError, match="last"):
+        world.is_free(inside, inside[:6])
+    with pytest.raises(ha.LimitError, match="first"):
+        world.is_free(np.full(7, np.nan), inside)
+
+
 def test_no_point_moves_farther_than_the_bound(world: ha.CollisionModel) -> None:
     pen = ha.Tool("pen", shapes=[shapes.capsule(0.01, 0.2, at=Pose.at(0.1, 0, 0.1))])
     loaded = world.carrying(pen)

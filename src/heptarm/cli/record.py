@@ -43,8 +43,8 @@ CameraFrame = Annotated[
 CameraScene = Annotated[
     str | None,
     Parameter(
-        help="What is around the arm: table, peg-in-hole, bins, shelf, narrow-slot, two-arms, or a file (MJCF); "
-        "nothing of it moves."
+        help="What is around the arm: table, peg-in-hole, bins, shelf, table-and-post, cage, narrow-slot, two-arms, "
+        "or a file (MJCF); nothing of it moves."
     ),
 ]
 #: Pause between two looks whether the time is over [s].

@@ -1,8 +1,9 @@
 """Searches a path around bodies: from joint positions to a goal, within a margin and under a constraint.
 
 Two trees of joint positions grow towards each other (RRT-Connect, Kuffner and LaValle 2000), under a constraint by
-steps that are projected onto it (CBiRRT, Berenson et al. 2009). What they find is shortened, laid on a joint spline
-that is checked again, and timed by the planner of the controller.
+steps that are projected onto it (CBiRRT, Berenson et al. 2009). Where bodies are in the way, only near targets count
+(dynamic domain, Yershova et al. 2005). What they find is shortened, laid on a joint spline that is checked again, and
+timed by the planner of the controller.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -32,7 +32,9 @@ _ORIGIN = Pose.of((0.0, 0.0, 0.0))
 #: Bodies at the start may overlap by so much: the arm then leaves them first [m].
 _SLIGHT = 0.005
 #: Longest step of a tree [rad], of all joints together; under constraints they are shorter.
-_STEP = 0.8
+_STEP = 1.2
+#: Steps that joint positions reach at which bodies are in the way; targets that are drawn at a time.
+_REACH, _DRAWN = 1.7, 32
 #: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
 _ELBOWS, _POSES = 36, 24
 #: Most joint positions that stand for the goals.
@@ -210,6 +212,7 @@ class _Tree:
 
     def __init__(self, roots: Array) -> None:
         self._q = np.empty((max(256, 2 * len(roots)), 7))
+        self._reach = np.full(len(self._q), inf)
         self._parents: list[int] = []
         for root in roots:
             self.add(root, -1)
@@ -219,6 +222,7 @@ class _Tree:
         index = len(self._parents)
         if index == len(self._q):
             self._q = np.concatenate([self._q, np.empty_like(self._q)])
+            self._reach = np.concatenate([self._reach, np.full_like(self._reach, inf)])
         self._q[index] = q
         self._parents.append(parent)
         return index
@@ -226,6 +230,20 @@ class _Tree:
     def nearest(self, q: Array) -> int:
         """Index of the nearest joint positions."""
         return int(((self._q[: len(self._parents)] - q) ** 2).sum(axis=1).argmin())
+
+    def target(self, random: np.random.Generator, low: Array, high: Array) -> Array | None:
+        """Random joint positions between limits; None: each is beyond the reach of its nearest ones."""
+        drawn = random.uniform(low, high, (_DRAWN, 7))
+        q = self._q[: len(self._parents)]
+        squares = (q**2).sum(axis=1) - 2.0 * drawn @ q.T
+        nearest = squares.argmin(axis=1)
+        squares = squares[np.arange(_DRAWN), nearest] + (drawn**2).sum(axis=1)
+        within = np.flatnonzero(squares <= self._reach[nearest] ** 2)
+        return drawn[within[0]] if len(within) else None
+
+    def limit(self, target: Array, reach: float) -> None:
+        """Let the nearest joint positions reach only so far [rad], since bodies were in the way to a target."""
+        self._reach[self.nearest(target)] = reach
 
     def at(self, index: int) -> Array:
         """Joint positions, shape (7,) [rad]."""
@@ -379,11 +397,17 @@ class _Search:
         high = np.maximum(np.maximum(self._robot.q_max - _INSIDE, self._start), goals.max(axis=0))
         while True:
             self._budget.check(nearest)
-            target = self._random.uniform(low, high)
-            if longest < inf:
-                target = np.clip(self._near(goals, longest), low, high)
+            target = (
+                one.target(self._random, low, high)
+                if longest == inf
+                else np.clip(self._near(goals, longest), low, high)
+            )
+            if target is None:
+                continue
             new = self._extend(one, target, steps=1)
-            if new is not None:
+            if new is None:
+                one.limit(target, _REACH * self._step)
+            else:
                 near = other.nearest(one.at(new))
                 reached = self._extend(other, one.at(new), steps=1000)
                 near = near if reached is None else reached
@@ -418,7 +442,7 @@ class _Search:
     def _line(self, first: Array, last: Array) -> list[Array] | None:
         """Joint positions behind the first on the way to the last: under a constraint several; None: it is not free."""
         if self._keep is None:
-            return [last] if self._world.first_on(np.array([first, last])) is None else None
+            return [last] if self._world.is_free(first, last) else None
         tree = _Tree(first[None])
         end = self._extend(tree, last, steps=1000)
         if end is None or np.linalg.norm(tree.at(end) - last) > 1e-9:
@@ -440,22 +464,15 @@ class _Search:
                 if obeying is None:
                     return result
                 there = obeying
-            if not self._is_free(here, there):
+            if not self._world.is_free(here, there):
                 half = 0.5 * (here + there)  # nearer to the bodies in the way, but not against them
-                if self._keep is None and self._is_free(here, half):
+                if self._keep is None and self._world.is_free(here, half):
                     self._budget.reached += 1
                     return tree.add(half, index)
                 return result
             self._budget.reached += 1
             index = result = tree.add(there, index)
         return result
-
-    def _is_free(self, here: Array, there: Array) -> bool:
-        """Whether a step is free; its end is checked first, which is most often where it is not."""
-        world = self._world
-        if world.distances(there[None], below=world.margin)[0] < world.margin:
-            return False
-        return world.first_on(np.array([here, there])) is None
 
     def _projected(self, here: Array, there: Array, target: Array) -> Array | None:
         """A step that obeys the constraint; None: there is none that gets nearer."""
@@ -655,7 +672,4 @@ def _curve(robot: RobotModel, points: Array) -> Array:
     from heptarm.planning.spline import through
 
     lengths = np.maximum(np.abs(np.diff(points, axis=0) / robot.dq_max).max(axis=1), 1e-9)
-    curve = through(points, lengths)
-    marks = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
-    places = [np.linspace(low, high, _SAMPLES, endpoint=False) for low, high in pairwise(marks.tolist())]
-    return np.array([curve.at(s) for s in [*np.concatenate(places).tolist(), 1.0]])
+    return through(points, lengths).samples(_SAMPLES)

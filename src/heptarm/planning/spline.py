@@ -72,6 +72,11 @@ class Quintic:
             ((((a * t + b) * t + c) * t + d) * t + e) * t + f for a, b, c, d, e, f in self._coefficients
         )
 
+    def samples(self, t: Array) -> Array:
+        """Positions at n fractions of the piece, shape (n, m)."""
+        found: Array = np.vander(t, 6) @ np.array(self._coefficients).T
+        return found
+
 
 def slopes(points: Array, lengths: Array, first: Array | None, last: Array | None) -> tuple[Array, Array]:
     """Slopes and curvatures of the cubic spline through n points, shapes (n, m).
@@ -117,6 +122,11 @@ class Piecewise:
         index = min(bisect_right(self._marks, s), len(self._pieces)) - 1
         low, high = self._marks[index], self._marks[index + 1]
         return self._pieces[index].at((s - low) / (high - low))
+
+    def samples(self, count: int) -> Array:
+        """Positions at so many places of each piece, and at the end."""
+        places = np.linspace(0.0, 1.0, count, endpoint=False)
+        return np.vstack([*(piece.samples(places) for piece in self._pieces), self.at(1.0)])
 
 
 def through(points: Array, lengths: Array) -> Piecewise:

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from functools import wraps
+from math import isfinite
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
@@ -702,53 +703,73 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: no path.
         """
-        points = _rows(path, "path")
-        moves = np.abs(np.diff(points, axis=0)).max(axis=1) if len(points) > 1 else np.zeros(0)
-        length = float(moves.sum()) or 1.0
-        known = {(one.first, one.second): one.distance for one in self.touching(points[0])}
-        done = 0.0
-        for first, last, move in zip(points[:-1], points[1:], moves.tolist()):
-            found = self._first_between(first, last, known)
+        points, margin = _rows(path, "path"), self._margin
+        known: dict[tuple[str, str], float] = {}
+        if self._distances.nearest(points[:1], margin)[0] < margin:
+            known = {(one.first, one.second): one.distance for one in self.touching(points[0])}
+        piece, at = 0, 0.0
+        while known and piece < len(points) - 1:
+            at, found = self._leave(points[piece], points[piece + 1], known)
             if found is not None:
-                clearance, fraction = found
-                return TouchOnPath(
-                    clearance, (done + fraction * move) / length, first + fraction * (last - first)
-                )
-            done += move
-        return None
+                q = points[piece] + at * (points[piece + 1] - points[piece])
+                return TouchOnPath(found, _place(points, piece, at), q)
+            piece, at = (piece + 1, 0.0) if known else (piece, at)
+        if piece >= len(points) - 1:
+            return None
+        here = points[piece] + at * (points[piece + 1] - points[piece])
+        touch = self._distances.first(np.vstack([here, points[piece + 1 :]]), **self._steps)
+        if touch is None:
+            return None
+        further, fraction, q = touch
+        at = fraction if further else at + fraction * (1.0 - at)
+        return TouchOnPath(self.touching(q)[0], _place(points, piece + further, at), q)
 
-    def _first_between(
+    @_alone
+    def is_free(self, first: npt.ArrayLike, last: npt.ArrayLike) -> bool:
+        """Whether nothing touches on a straight joint path: as `first_on`, and faster where something does.
+
+        Args:
+            first: joint positions at its beginning, shape (7,) [rad].
+            last: likewise at its end.
+
+        Raises:
+            ShapeError: not seven numbers.
+        """
+        line = np.array([_joints(first, "first"), _joints(last, "last")])
+        free = self._distances.is_free(line, **self._steps)
+        # a pair that touches at the beginning may be left
+        return self.first_on(line) is None if free is None else free
+
+    @property
+    def _steps(self) -> dict[str, float]:
+        """Margin and steps on a path, see `Distances.first`."""
+        return {
+            "margin": self._margin,
+            "least": max(self._margin, _LEAST_MARGIN),
+            "far": max(_FAR, self._margin),
+        }
+
+    def _leave(
         self, first: Array, last: Array, known: dict[tuple[str, str], float]
-    ) -> tuple[Clearance, float] | None:
-        """The first touch on a straight joint path, and the fraction at which it is.
+    ) -> tuple[float, Clearance | None]:
+        """Move on along a straight joint path while pairs touch that did at its start, or to its end.
 
         Args:
             first: joint positions at its beginning.
             last: likewise at its end.
             known: pairs that touch there, and may while they do not get nearer; what is left is taken out.
+
+        Returns:
+            The fraction at which it ends, and the pair that may not touch there; None: there is none.
         """
-        change = last - first
+        change, at = last - first, 0.0
         moved, least = self._distances.moved(change), max(self._margin, _LEAST_MARGIN)
-        if not moved:
-            return None
-        far = max(_FAR, self._margin)
-        at, distance = 0.0, self._margin
-        if not known:
-            distance = float(self._distances.nearest(first[None], min(max(moved, self._margin), far))[0])
-        while at < 1.0:
-            at, distance = self._distances.advance(
-                *(first, change),
-                start=(at, distance),
-                margin=self._margin,
-                least=least,
-                far=far,
-                is_single=bool(known),
-            )
-            if distance < self._margin or known:
-                found = self._new(first + at * change, known)
-                if found is not None:
-                    return found, at
-        return None
+        while known and at < 1.0:
+            at = min(1.0, at + (self._margin + least) / max(moved, least))
+            found = self._new(first + at * change, known)
+            if found is not None:
+                return at, found
+        return at, None
 
     def _new(self, q: Array, start: dict[tuple[str, str], float]) -> Clearance | None:
         """The nearest pair that touches at joint positions and did not at the start, or is nearer now."""
@@ -879,6 +900,24 @@ def _unknown(name: str, known: tuple[str, ...], what: str, parameter: str = "bod
 
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].
 _NEARER = 1e-4
+
+
+def _joints(values: npt.ArrayLike, name: str) -> Array:
+    """Joint positions of shape (7,); those of a search, which asks often, need no more than a look."""
+    if (
+        type(values) is np.ndarray
+        and values.dtype == float
+        and values.shape == (7,)
+        and isfinite(values.sum())
+    ):
+        return values
+    return array(values, 7, name)
+
+
+def _place(points: Array, piece: int, at: float) -> float:
+    """The fraction of a joint path at a fraction of one of its pieces, by the joint that moves most in each."""
+    moves = np.abs(np.diff(points, axis=0)).max(axis=1)
+    return float((moves[:piece].sum() + at * moves[piece]) / (moves.sum() or 1.0))
 
 
 def _rows(values: npt.ArrayLike, name: str) -> Array:

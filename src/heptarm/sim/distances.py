@@ -45,8 +45,9 @@ class _Checks(ctypes.Structure):
             for name in ["model", "data", "kinematics", "distance", "positions", "places", "turns"]
         ],
         *[(name, _POINTER) for name in ["flange_place", "flange_turn", "hulls", "entries"]],
-        ("count", _WORD),
-        ("all", _WORD),
+        *[("count", _WORD), ("all", _WORD)],
+        *[("levers", _POINTER), ("moves", _POINTER)],
+        ("levels", _WORD),
         ("grips", _POINTER),
         ("held", _WORD),
     ]
@@ -72,12 +73,9 @@ def _functions() -> ctypes.CDLL:
     made = library()
     made.hc_nearest.restype = None
     made.hc_nearest.argtypes = (_POINTER, _WORD, _POINTER, _REAL, _POINTER)
-    made.hc_advance.restype = _WORD
-    made.hc_advance.argtypes = (
-        *(_POINTER, _POINTER, _POINTER),
-        *(_REAL, _REAL, _REAL, _REAL, ctypes.c_int),
-        *(_POINTER, _POINTER),
-    )
+    made.hc_first.restype = _WORD
+    made.hc_first.argtypes = (_POINTER, _WORD, _POINTER, _REAL, _REAL, _REAL, _POINTER, _POINTER)
+    made.hc_is_free.argtypes = (_POINTER, _POINTER, _REAL, _REAL, _REAL, _POINTER)
     made.hc_pairs.restype = _WORD
     made.hc_pairs.argtypes = (_POINTER, _POINTER, _REAL, _POINTER, _POINTER)
     made.hc_size.restype = _WORD
@@ -197,10 +195,10 @@ class Distances:
         if not np.array_equal(group, self._group):
             self._group = group
             self._meet()
-        self._levers = self._own_levers
-        if held:
-            found = [self._lever(self._in_flange(geom), geom) for geom in np.flatnonzero(is_held).tolist()]
-            self._levers = np.vstack([self._own_levers, *found])
+        self._levers, self._last = self._own_levers.copy(), self._own_last.copy()
+        for geom in np.flatnonzero(is_held).tolist():
+            self._levers[geom] = self._lever(self._in_flange(geom), geom)
+            self._last[geom] = _JOINTS - 1
         self._prepare()
 
     def _meet(self) -> None:
@@ -208,7 +206,8 @@ class Distances:
         pairs = _candidates(self._model, self._group != _WORLD)
         pairs = pairs[_MEETS[self._group[pairs[:, 0]], self._group[pairs[:, 1]]]]
         counts = self._counts(pairs)
-        parts = self._boxes.entries(pairs[counts]), self._boxes.entries(pairs[~counts])
+        self._met = list[tuple[int, npt.NDArray[np.int32]]]()
+        parts = [self._boxes.entries(some, self._met) for some in (pairs[counts], pairs[~counts])]
         self._entries, self._count, self._hulls = np.concatenate(parts), len(parts[0]), self._boxes.hulls
         self._found = np.empty((len(pairs), 2), np.int32), np.empty(len(pairs))
 
@@ -228,6 +227,9 @@ class Distances:
         memory.flange_place, memory.flange_turn = place.ctypes.data, turn.ctypes.data
         memory.hulls, memory.entries = self._hulls.ctypes.data, self._entries.ctypes.data
         memory.count, memory.all = self._count, len(self._entries)
+        levers = np.array([self._relative(*met) for met in self._met]).reshape(-1, _JOINTS)
+        self._pair_levers, self._moves = levers, np.empty(len(levers))
+        memory.levers, memory.moves, memory.levels = levers.ctypes.data, self._moves.ctypes.data, len(levers)
         memory.grips, memory.held = grips.ctypes.data, len(grips)
         self._grips = grips
         self._memory = memory
@@ -271,38 +273,40 @@ class Distances:
         self.checks += len(given)
         return result
 
-    def advance(
-        self,
-        first: Array,
-        change: Array,
-        *,
-        start: tuple[float, float],
-        margin: float,
-        least: float,
-        far: float,
-        is_single: bool,
-    ) -> tuple[float, float]:
-        """Move on along a straight path until two bodies are nearer than a margin, or to its end.
+    def first(
+        self, path: Array, *, margin: float, least: float, far: float
+    ) -> tuple[int, float, Array] | None:
+        """The first place on a joint path at which two bodies that may not touch are nearer than a margin.
 
         Args:
-            first: joint positions at its beginning, shape (7,) [rad].
-            change: of the joints along it, shape (7,) [rad].
-            start: fraction of the path from which it moves on, and the distance there [m].
+            path: joint positions, straight from one to the next, shape (n, 7) [rad].
             margin: nearer bodies touch [m].
-            least: what a point may move beyond the distance in a step [m].
+            least: what two bodies may move beyond their distance in a step [m].
             far: bodies are looked for so far [m].
-            is_single: move by one step only.
 
         Returns:
-            The fraction at which it ends, and the distance there [m]; infinite: none are near.
+            The piece between two of its points, the fraction of that, and the joint positions there; None: there is
+            no such place.
         """
-        begin, along = np.ascontiguousarray(first, float), np.ascontiguousarray(change, float)
-        at, distance = _REAL(start[0]), _REAL(start[1])
-        self.checks += _functions().hc_advance(
-            *(ctypes.byref(self._memory), begin.ctypes.data, along.ctypes.data, self.moved(along)),
-            *(margin, least, far, is_single, ctypes.byref(at), ctypes.byref(distance)),
+        given, place, checks = np.ascontiguousarray(path, float), np.empty(1 + _JOINTS), _WORD(0)
+        piece = _functions().hc_first(
+            *(ctypes.byref(self._memory), len(given), given.ctypes.data, margin, least, far),
+            *(place.ctypes.data, ctypes.byref(checks)),
         )
-        return at.value, distance.value
+        self.checks += checks.value
+        return None if piece < 0 else (piece, float(place[0]), place[1:])
+
+    def is_free(self, line: Array, *, margin: float, least: float, far: float) -> bool | None:
+        """Whether `first` finds nothing on a straight joint path, shape (2, 7) [rad]; faster where it does.
+
+        None: bodies touch at its beginning.
+        """
+        checks = _WORD(0)
+        free: int = _functions().hc_is_free(
+            ctypes.byref(self._memory), line.ctypes.data, margin, least, far, ctypes.byref(checks)
+        )
+        self.checks += checks.value
+        return None if free < 0 else free > 0
 
     def nearest_of_arms(self, q: Array, below: float) -> tuple[tuple[str, str], float] | None:
         """The nearest bodies of this arm and another one, their distance [m]; None: none are nearer than `below`."""
@@ -343,12 +347,21 @@ class Distances:
         mujoco.mj_kinematics(model, data)
         self._anchors, self._axes = data.xanchor[:_JOINTS].copy(), data.xaxis[:_JOINTS].copy()
         self._flange_pose = Pose.of(data.site_xpos[self._flange], _quaternion(data.site_xmat[self._flange]))
-        rows = []
+        self._own_levers, self._own_last = np.zeros((model.ngeom, _JOINTS)), np.full(model.ngeom, -1)
         for geom in np.flatnonzero(self._fixed_group != _WORLD).tolist():
-            joint = self._joint_of(int(model.geom_bodyid[geom]))
+            self._own_last[geom] = joint = self._joint_of(int(model.geom_bodyid[geom]))
             if joint >= 0:
-                rows.append(self._lever(data.geom_xpos[geom], geom, joint))
-        self._own_levers = np.array(rows)
+                self._own_levers[geom] = self._lever(data.geom_xpos[geom], geom, joint)
+
+    def _relative(self, geom: int, others: npt.NDArray[np.int32]) -> Array:
+        """How far a shape and those of another body may move to each other, shape (7,) [m/rad].
+
+        Only the joints between them count, by the levers of the one that they move.
+        """
+        low, high = sorted((int(self._last[geom]), int(self._last[others[0]])))
+        rows = self._levers[[geom]] if self._last[geom] == high else self._levers[others]
+        joints = np.arange(_JOINTS)
+        return np.where((low < joints) & (joints <= high), rows.max(axis=0), 0.0)
 
     def _joint_of(self, body: int) -> int:
         """The last joint of the arm that moves a body; -1: none does."""
@@ -472,16 +485,25 @@ class _Boxes:
         """Hulls of the shapes, then those around several."""
         return np.concatenate([self._own, *self._around])
 
-    def entries(self, pairs: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-        """`struct entry` of pairs of shapes, which are ordered by the first one, shape (n, 3)."""
-        found = [np.zeros((0, 3), np.int32)]
+    def entries(
+        self, pairs: npt.NDArray[np.int32], met: list[tuple[int, npt.NDArray[np.int32]]]
+    ) -> npt.NDArray[np.int32]:
+        """`struct entry` of pairs of shapes, shape (n, 4).
+
+        Args:
+            pairs: ordered by the first shape, shape (n, 2).
+            met: where it appends each shape with those of a body that it may meet: they have levers in common.
+        """
+        found = [np.zeros((0, 4), np.int32)]
         for firsts in np.split(pairs, np.flatnonzero(np.diff(pairs[:, 0])) + 1):
             # a plane has an entry of its own, as if it were a body
             others = firsts[:, 1]
             bodies = np.where(self._own["is_plane"][others] != 0, -1 - others, self._bodies[others])
             for body in set(bodies.tolist()):
-                tree = self._tree(others[bodies == body])
-                found += [np.column_stack([np.full(len(tree), firsts[0, 0]), tree])]
+                shapes = others[bodies == body]
+                tree, numbers = self._tree(shapes), np.array([firsts[0, 0], len(met)])
+                found += [np.insert(tree, [0, 2], numbers, axis=1)]
+                met.append((int(firsts[0, 0]), shapes))
         return np.concatenate(found, dtype=np.int32)
 
     def _tree(self, geoms: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:

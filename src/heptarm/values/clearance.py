@@ -112,6 +112,9 @@ class PlanningWorld(Protocol):
     def touching(self, q: Array) -> tuple[Clearance, ...]:
         """Pairs of bodies that touch at joint positions, shape (7,) [rad]."""
 
+    def is_free(self, first: Array, last: Array) -> bool:
+        """Whether nothing touches on a straight joint path, both shape (7,) [rad]."""
+
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
 

@@ -98,8 +98,8 @@ class SimulatorOptions:
     scene: str = field(
         default="",
         metadata=_about(
-            "what is around the arm and on its flange: table, peg-in-hole, bins, shelf, narrow-slot, two-arms, "
-            "or a file (MJCF)",
+            "what is around the arm and on its flange: table, peg-in-hole, bins, shelf, table-and-post, cage, "
+            "narrow-slot, two-arms, or a file (MJCF)",
             metavar="NAME|FILE",
             in_target=True,
         ),

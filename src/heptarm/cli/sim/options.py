@@ -113,7 +113,8 @@ class CabinetOptions(ArmOptions):
         str,
         Parameter(
             help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, shelf, "
-            "narrow-slot, two-arms, or a file (MJCF). Its bodies collide and can be grasped; the view shows them."
+            "table-and-post, cage, narrow-slot, two-arms, or a file (MJCF). Its bodies collide and can be grasped; the "
+            "view shows them."
         ),
     ] = DEFAULTS.scene
     project: Annotated[
