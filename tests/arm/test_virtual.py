@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -335,17 +336,29 @@ def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
 
 
 def test_ctrl_c_amid_requests_breaks_nothing(arm: Arm) -> None:
-    with ctrl_c_interrupts():
-        for count in range(40):
-            timer = threading.Timer(0.002 + count * 1e-4, os.kill, (os.getpid(), signal.SIGINT))
-            with pytest.raises(KeyboardInterrupt):
-                timer.start()
-                deadline = time.monotonic() + 30.0
-                while time.monotonic() < deadline:
-                    arm.set_override(1.0)
-            timer.join()
-            assert arm.connected
-            arm.stop()
+    delays: queue.SimpleQueue[float | None] = queue.SimpleQueue()
+
+    def interrupt() -> None:
+        while (delay := delays.get()) is not None:
+            time.sleep(delay)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    # one thread for all: where one ends, a callback of `threading` runs, and Python loses an interrupt in a callback
+    hand = threading.Thread(target=interrupt)
+    hand.start()
+    try:
+        with ctrl_c_interrupts():
+            for count in range(40):
+                with pytest.raises(KeyboardInterrupt):
+                    delays.put(0.002 + count * 1e-4)
+                    deadline = time.monotonic() + 30.0
+                    while time.monotonic() < deadline:
+                        arm.set_override(1.0)
+                assert arm.connected
+                arm.stop()
+    finally:
+        delays.put(None)
+        hand.join()
 
 
 def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tmp_path: Path) -> None:
