@@ -467,8 +467,9 @@ static int mirror(struct fri_loop *l) {
     } else if (mode != NO_COMMAND) {
         missing = "the controller sends no interpolator position to mirror";
     }
+    int size = write_answer(l, &a); /* reports outputs that are gone */
     if (missing) fri_report(l, KIND_NO_IPO, l->session.received, "%s", missing);
-    return write_answer(l, &a);
+    return size;
 }
 
 static void count_setpoint(struct fri_loop *l, int is_limited) {

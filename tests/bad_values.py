@@ -27,6 +27,7 @@ from heptarm import Cause, HeptarmError, Pose, Result
 from heptarm.do import notify
 from heptarm.fri import SessionState
 from heptarm.modes import CartesianImpedance, Position
+from heptarm.planning import find_path
 from heptarm.values.robot import robot
 from heptarm.values.state import State
 from heptarm.when import force
@@ -92,6 +93,8 @@ VECTORS = {
     "dwrench_max": 6,
     "times": 3,
 }
+#: A path that a search has found.
+FOUND = find_path(heptarm.CollisionModel("iiwa14"), start=HOME, goal=HOME + 0.1)
 #: Arguments that a name does not give away, by function and parameter.
 ARGUMENTS: dict[str, dict[str, object]] = {
     "Pose": {"quat": (0.0, 0.0, 0.0, 1.0)},
@@ -154,6 +157,8 @@ ARGUMENTS: dict[str, dict[str, object]] = {
         "stop": None,
         "progress": None,
     },
+    "Arm.loaded": {"model": heptarm.CollisionModel("iiwa14")},
+    "Arm.follow": {"path": FOUND, "watch": None, "stop": None, "on_progress": None},
     "Upright": {"axis": "z", "within": 0.1},
     "OnPlane": {"point": (0.5, 0.0, 0.5), "normal": (0.0, 0.0, 1.0)},
     "OnLine": {"point": (0.5, 0.0, 0.5), "direction": (1.0, 0.0, 0.0)},
@@ -229,6 +234,7 @@ ACCEPTED: dict[tuple[str, str], str] = {
     ("height_map.heights", "matrix"): "two rows",
     ("CollisionModel.add_points.cloud", "matrix"): "two points",
     ("find_path.keep", "empty list"): "no constraint",
+    ("Arm.find_path.keep", "empty list"): "no constraint",
 }
 #: Operators of conditions and poses; the others are those that every object has.
 OPERATORS: dict[str, Callable[[Any, Any], object]] = {

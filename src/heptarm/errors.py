@@ -24,6 +24,7 @@
     │   │   └── CollisionDetected           by a collision guard; `collision` has joint and torque
     │   ├── NoContact                       no contact was found
     │   ├── InsertionFailed                 a part did not go into its hole
+    │   ├── GraspFailed                     a gripper was closed and holds nothing
     │   └── ArrivalError                    it ended short of its target
     ├── StreamError
     │   ├── Starved                         no target within the watchdog time

@@ -32,6 +32,8 @@ _HOLDS = Movement("Nothing but the approach", "0 deg", "then the arm holds its p
 _UNTIL_GOOD = 95
 #: Speed of A7 while an answer is held back [rad/s], and for how many periods it is.
 _SLOW, _HELD_BACK = 0.02, 2.4
+#: Time at which no answer is held back [s].
+_NEVER = 1e6
 
 
 def _opening(arm: Arm) -> list[FriState]:
@@ -133,7 +135,7 @@ def lost_answer(arm: Arm, person: Person) -> tuple[Comparison, ...]:
 @step(movement=Movement("A7", "by less than 1 deg", "1.2 deg/s, by FRI commands"), needs=("fri_position",))
 def command_delay(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     """By how many periods are the set-points of an overlay behind its commands?"""
-    params = {"velocity": _SLOW, "at": math.inf, "pause": 0.0}
+    params = {"velocity": _SLOW, "at": _NEVER, "pause": 0.0}
     with arm.fri(
         "position", period_ms=_PERIOD, law=hold_back_once, params=params, history=_HISTORY
     ) as session:
