@@ -149,12 +149,14 @@ class _Excess:
         place: s there.
         places: all s at which an axis is too fast, shape (n,).
         factors: by which the motion has to be slower at each, shape (n,).
+        why: why set-points jump there.
     """
 
     axis: int
     place: float
     places: Array
     factors: Array
+    why: str
 
     def slow(self, s: Array, factors: Array) -> None:
         """Make factors at the samples s, shape (n,), larger around the places."""
@@ -171,7 +173,7 @@ class _Excess:
         """What refuses the path."""
         return PlanError(
             "planning",
-            f"Can not plan motion: A{self.axis} would have to jump at {100 * self.place:.0f} % of the path "
+            f"Can not plan motion: A{self.axis} would have to jump at {100 * self.place:.0f} % of the path{self.why} "
             "(singularity); move there by a PTP, or give the end an E1",
         )
 
@@ -187,8 +189,13 @@ def _excess(
     Raises:
         PlanError: a set-point has no joint position next to the one before.
     """
-    if not any(_is_delicate(robot, one.path, q) for one, q in zip(path.segments, samples.q, strict=True)):
+    followed = [
+        (one.path, q) for one, q in zip(path.segments, samples.q, strict=True) if one.path.line is None
+    ]
+    does_a3_move = any(one.keeps_a3 and np.ptp(q[:, 2]) > _STAYS for one, q in followed)
+    if not (does_a3_move or any(_is_near_singular(robot, q) for _, q in followed)):
         return None
+    why = ", where A3 cannot stay at its angle" if does_a3_move else ""
     profile = timing.profile
     count = min(max(3, ceil(profile.duration / _TICK)), _MOST_TICKS)
     times = np.linspace(0.0, profile.duration, count + 1)
@@ -198,7 +205,7 @@ def _excess(
         try:
             joints[index] = near = path.at(s, near)
         except Unreachable:
-            raise _Excess(4, s, places, np.ones_like(places)).error from None
+            raise _Excess(4, s, places, np.ones_like(places), why).error from None
     period = float(times[1])
     speeds = np.abs(np.diff(joints, axis=0)) / (period * robot.dq_max)
     changes = np.abs(np.diff(joints, 2, axis=0)) / (period**2 * robot.ddq_max)
@@ -208,14 +215,10 @@ def _excess(
     index, axis = (int(n) for n in np.unravel_index(int(needed.argmax()), needed.shape))
     most = needed.max(axis=1)
     fast = most > _MOST
-    return _Excess(axis + 1, float(places[index + 1]), places[1:-1][fast], most[fast] * _SPARE)
+    return _Excess(axis + 1, float(places[index + 1]), places[1:-1][fast], most[fast] * _SPARE, why)
 
 
-def _is_delicate(robot: RobotModel, path: JointPath, q: Array) -> bool:
+def _is_near_singular(robot: RobotModel, q: Array) -> bool:
     """Whether samples may miss what the joints do on a path in space, at joint positions of shape (n, 7) [rad]."""
-    if path.line is not None:
-        return False
-    if path.keeps_a3 and np.ptp(q[:, 2]) > _STAYS:
-        return True
     moving = jacobian_batch(robot, q)[:, :, [0, 1, 3, 4, 5, 6]]  # A3 is given
     return bool(np.linalg.svd(moving, compute_uv=False)[:, -1].min() < _SINGULAR)
