@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
 from math import ceil, inf, isnan
 
 import numpy as np
@@ -118,7 +118,7 @@ def timed(
     edges = [0, *(index + 1 for index in rests)]
     sections = [constraints(robot, path, samples, a, b) for a, b in pairwise(edges)]
     slowed = [np.ones_like(section.s) for section in sections]
-    for _ in range(_ATTEMPTS):
+    for attempt in count(1):
         timing = PathTiming(
             tuple(path.marks[edge] for edge in edges[1:]),
             tuple(section.slower(factors) for section, factors in zip(sections, slowed, strict=True)),
@@ -128,10 +128,8 @@ def timed(
             break
         for section, factors in zip(sections, slowed, strict=True):
             found.slow(section.s, factors)
-        if max(factors.max() for factors in slowed) > _SLOWEST:
+        if attempt == _ATTEMPTS or max(factors.max() for factors in slowed) > _SLOWEST:
             raise found.error
-    else:
-        raise found.error
     fractions = [
         np.linspace(low, high, len(q)) for q, (low, high) in zip(samples.q, pairwise(path.marks), strict=True)
     ]
@@ -197,10 +195,10 @@ def _excess(
         return None
     why = ", where A3 cannot stay at its angle" if does_a3_move else ""
     profile = timing.profile
-    count = min(max(3, ceil(profile.duration / _TICK)), _MOST_TICKS)
-    times = np.linspace(0.0, profile.duration, count + 1)
+    ticks = min(max(3, ceil(profile.duration / _TICK)), _MOST_TICKS)
+    times = np.linspace(0.0, profile.duration, ticks + 1)
     places = np.array([profile.at(time)[0] for time in times.tolist()])
-    joints, near = np.empty((count + 1, _JOINTS)), samples.q[0][0]
+    joints, near = np.empty((ticks + 1, _JOINTS)), samples.q[0][0]
     for index, s in enumerate(places.tolist()):
         try:
             joints[index] = near = path.at(s, near)
