@@ -169,3 +169,28 @@ def test_with_an_e1_for_its_end_such_a_line_may_be_followed() -> None:
         plan(arm, motions.lin(goal), start)
     found = plan(arm, motions.lin(goal, redundancy=(float(end[2]), -1, -1)), start)
     assert found.end[2] == pytest.approx(end[2], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "degrees", [(0, 0, 90, -90, 0, 60, 0), (0, 0, 0, 0, 0, 0, 0), (-90, 0, 90, -90, 0, 90, 0)]
+)
+def test_a_line_out_of_a_singular_posture_is_within_the_limits_or_refused(degrees: tuple[float, ...]) -> None:
+    """Out of the candle set-points had up to 31 times an axis' speed, and 700 times its acceleration."""
+    arm, random = ROBOTS["iiwa14"], np.random.default_rng(3)
+    start, refused = deg(*degrees), 0
+    for _ in range(longer(10, 100)):
+        end = np.clip(start + random.normal(0, 0.4, 7), 0.95 * arm.q_min, 0.95 * arm.q_max)
+        try:
+            found = plan(arm, motions.lin(numbers(Pose.from_matrix(forward(arm, end)))), start)
+        except PlanError as error:
+            refused += "singularity" in str(error)
+            continue
+        assert found.path is not None and found.timing is not None
+        near, q = start, [start]
+        for time in np.arange(3e-4, found.duration, 1e-3).tolist():
+            near = found.path.at(found.timing.profile.at(time)[0], near)
+            q.append(near)
+        steps = np.diff(np.array(q), axis=0)
+        assert (np.abs(steps) * 1e3 / arm.dq_max).max() <= 1.0
+        assert (np.abs(np.diff(steps[1:], axis=0)) * 1e6 / arm.ddq_max).max() <= 1.0
+    assert refused > 1

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
 from math import ceil, inf, isnan
 
 import numpy as np
 
 from heptarm.errors import Unreachable
+from heptarm.model.batch import jacobian_batch
 from heptarm.planning import seam
 from heptarm.planning.composite_path import CompositePath, PathSamples, constraints, sample
 from heptarm.planning.motion import PlanError
@@ -21,8 +22,15 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
 _NEVER = 1e9
-#: An axis that accelerates by more than this fraction of its maximum jumps between two arm positions.
-_JUMPS = 2.0
+#: Timings that are tried until the axes stay within their limits, and the factor up to which a path is slowed down.
+_ATTEMPTS, _SLOWEST = 4, 4.0
+#: Samples around a place at which an axis is too fast that are slowed down as well, and by how much more than needed.
+_AROUND, _SPARE = 2, 1.05
+#: Largest speed and acceleration of an axis, fractions of its maxima.
+_MOST = 1.0 + 1e-6
+#: Smallest singular value of the Jacobian from which on samples do not miss what the joints do.
+_SINGULAR = 0.1
+_JOINTS = 7
 #: A3 that moves by less stays [rad].
 _STAYS = 1e-9
 #: Time between two set-points that are tried [s], and most of them.
@@ -108,9 +116,20 @@ def timed(
     """
     samples = sample(robot, path, start, tcp)
     edges = [0, *(index + 1 for index in rests)]
-    sections = tuple(constraints(robot, path, samples, a, b) for a, b in pairwise(edges))
-    timing = PathTiming(tuple(path.marks[edge] for edge in edges[1:]), sections)
-    _check_jumps(robot, path, samples, timing)
+    sections = [constraints(robot, path, samples, a, b) for a, b in pairwise(edges)]
+    slowed = [np.ones_like(section.s) for section in sections]
+    for attempt in count(1):
+        timing = PathTiming(
+            tuple(path.marks[edge] for edge in edges[1:]),
+            tuple(section.slower(factors) for section, factors in zip(sections, slowed, strict=True)),
+        )
+        found = _excess(robot, path, samples, timing)
+        if found is None:
+            break
+        for section, factors in zip(sections, slowed, strict=True):
+            found.slow(section.s, factors)
+        if attempt == _ATTEMPTS or max(factors.max() for factors in slowed) > _SLOWEST:
+            raise found.error
     fractions = [
         np.linspace(low, high, len(q)) for q, (low, high) in zip(samples.q, pairwise(path.marks), strict=True)
     ]
@@ -119,38 +138,85 @@ def timed(
     return Plan(motion, start, samples.q[-1][-1], path, timing, lengths, tuple(marks), table)
 
 
-def _check_jumps(robot: RobotModel, path: CompositePath, samples: PathSamples, timing: PathTiming) -> None:
-    """Refuse a path on which A3 cannot stay, if set-points would then jump between two arm positions.
+@dataclass(frozen=True, slots=True)
+class _Excess:
+    """Where set-points are too fast for an axis.
 
-    There each joint position depends on the one before, so the few samples of the path do not show the jumps.
+    Attributes:
+        axis: the worst, 1 to 7.
+        place: s there.
+        places: all s at which an axis is too fast, shape (n,).
+        factors: by which the motion has to be slower at each, shape (n,).
+        why: why set-points jump there.
+    """
+
+    axis: int
+    place: float
+    places: Array
+    factors: Array
+    why: str
+
+    def slow(self, s: Array, factors: Array) -> None:
+        """Make factors at the samples s, shape (n,), larger around the places."""
+        nearest = np.searchsorted(s, self.places)
+        most = np.ones_like(factors)
+        for shift in range(-_AROUND, _AROUND + 1):
+            np.maximum.at(most, np.clip(nearest + shift, 0, len(s) - 1), self.factors)
+        inside = (self.places.min() <= s[-1]) and (self.places.max() >= s[0])
+        if inside:
+            factors *= most
+
+    @property
+    def error(self) -> PlanError:
+        """What refuses the path."""
+        return PlanError(
+            "planning",
+            f"Can not plan motion: A{self.axis} would have to jump at {100 * self.place:.0f} % of the path{self.why} "
+            "(singularity); move there by a PTP, or give the end an E1",
+        )
+
+
+def _excess(
+    robot: RobotModel, path: CompositePath, samples: PathSamples, timing: PathTiming
+) -> _Excess | None:
+    """Where set-points on a path near a singularity are too fast for an axis; None: nowhere.
+
+    There joints turn fast within a short part of the path, and where A3 cannot stay each joint position depends on the
+    one before: samples may miss both, so the set-points themselves are looked at.
 
     Raises:
-        PlanError: a set-point jumps, or has no joint position next to the one before.
+        PlanError: a set-point has no joint position next to the one before.
     """
-    if not any(
-        segment.path.keeps_a3 and np.ptp(q[:, 2]) > _STAYS
-        for segment, q in zip(path.segments, samples.q, strict=True)
-    ):
-        return
+    followed = [
+        (one.path, q) for one, q in zip(path.segments, samples.q, strict=True) if one.path.line is None
+    ]
+    does_a3_move = any(one.keeps_a3 and np.ptp(q[:, 2]) > _STAYS for one, q in followed)
+    if not (does_a3_move or any(_is_near_singular(robot, q) for _, q in followed)):
+        return None
+    why = ", where A3 cannot stay at its angle" if does_a3_move else ""
     profile = timing.profile
-    count = min(max(2, ceil(profile.duration / _TICK)), _MOST_TICKS)
-    times = np.linspace(0.0, profile.duration, count + 1)
-    places = [profile.at(time)[0] for time in times.tolist()]
-    joints, axis, failed = np.zeros((count + 1, len(samples.q[0][0]))), 3, 0
-    near = samples.q[0][0]
-    try:
-        for index, s in enumerate(places):
-            failed = index
+    ticks = min(max(3, ceil(profile.duration / _TICK)), _MOST_TICKS)
+    times = np.linspace(0.0, profile.duration, ticks + 1)
+    places = np.array([profile.at(time)[0] for time in times.tolist()])
+    joints, near = np.empty((ticks + 1, _JOINTS)), samples.q[0][0]
+    for index, s in enumerate(places.tolist()):
+        try:
             joints[index] = near = path.at(s, near)
-    except Unreachable:
-        pass
-    else:
-        jumps = np.abs(np.diff(joints, 2, axis=0)) / (times[1] ** 2 * robot.ddq_max)
-        if jumps.max() <= _JUMPS:
-            return
-        failed, axis = (int(n) + 1 for n in np.unravel_index(int(jumps.argmax()), jumps.shape))
-    raise PlanError(
-        "planning",
-        f"Can not plan motion: A{axis} would have to jump at {100 * places[failed]:.0f} % of the path, where A3 cannot "
-        "stay at its angle (singularity); move there by a PTP, or give the end an E1",
-    )
+        except Unreachable:
+            raise _Excess(4, s, places, np.ones_like(places), why).error from None
+    period = float(times[1])
+    speeds = np.abs(np.diff(joints, axis=0)) / (period * robot.dq_max)
+    changes = np.abs(np.diff(joints, 2, axis=0)) / (period**2 * robot.ddq_max)
+    needed = np.maximum(speeds[1:], np.sqrt(changes))
+    if needed.max() <= _MOST:
+        return None
+    index, axis = (int(n) for n in np.unravel_index(int(needed.argmax()), needed.shape))
+    most = needed.max(axis=1)
+    fast = most > _MOST
+    return _Excess(axis + 1, float(places[index + 1]), places[1:-1][fast], most[fast] * _SPARE, why)
+
+
+def _is_near_singular(robot: RobotModel, q: Array) -> bool:
+    """Whether samples may miss what the joints do on a path in space, at joint positions of shape (n, 7) [rad]."""
+    moving = jacobian_batch(robot, q)[:, :, [0, 1, 3, 4, 5, 6]]  # A3 is given
+    return bool(np.linalg.svd(moving, compute_uv=False)[:, -1].min() < _SINGULAR)

@@ -91,6 +91,17 @@ class PathConstraints:
         before, after = np.diff(self.s, prepend=self.s[0]), np.diff(self.s, append=self.s[-1])
         return np.abs(self.first) + np.abs(self.third) * (np.maximum(before, after) ** 2 / 8)[:, None]
 
+    def slower(self, factors: Array) -> PathConstraints:
+        """The same path, passed more slowly by factors at the samples, shape (n,)."""
+        by = factors[:, None]
+        return replace(
+            self,
+            fastest=self.fastest / factors,
+            velocity=self.velocity / by,
+            acceleration=self.acceleration / by**2,
+            jerk=self.jerk / by**3,
+        )
+
     def stop_limits(self, s: float, speed: float) -> ProfileLimits:
         """Limits of s for coming to rest from a place and a speed ds/dt."""
         low = max(0, int(np.searchsorted(self.s, s, side="right")) - 1)
