@@ -338,7 +338,7 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     replay = arm.replay(covered, by="spline", speed_scaling=0.3, on_progress=fractions.append)
     assert fractions == sorted(fractions) and fractions[-1] == 1.0
     assert replay.result.arrived and replay.deviation < 0.05
-    assert replay.result.duration == pytest.approx(covered.duration / 0.3, rel=0.05), "in the taught time"
+    assert replay.result.duration == pytest.approx(covered.duration / 0.3, abs=0.3), "in the taught time"
     assert np.abs(arm.wait_for_rest().q - covered.q[-1]).max() < 2e-3
     replay = retry(lambda: arm.replay(covered, speed_scaling=0.5), starved)
     assert replay.result.arrived and replay.deviation < 0.3

@@ -214,6 +214,7 @@ def test_a_robot_outside_t1_is_refused_and_yes_is_for_simulators_only(
     arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("heptarm.testing.commissioning.run.has_operator", lambda _: False)
+    arm.wait_until(lambda s: s.safety.mode is OperationMode.AUT, timeout=30.0)  # the run before ends with it
     with pytest.raises(ModeConflict, match=r"must be T1 .*, got AUT"):
         commissioning.commission(arm, Answering())
     monkeypatch.setattr(type(arm), "is_virtual", property(lambda _: False))
