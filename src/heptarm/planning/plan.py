@@ -158,13 +158,11 @@ class _Excess:
 
     def slow(self, s: Array, factors: Array) -> None:
         """Make factors at the samples s, shape (n,), larger around the places."""
-        nearest = np.searchsorted(s, self.places)
-        most = np.ones_like(factors)
+        here = (self.places >= s[0]) & (self.places <= s[-1])
+        nearest, most = np.searchsorted(s, self.places[here]), np.ones_like(factors)
         for shift in range(-_AROUND, _AROUND + 1):
-            np.maximum.at(most, np.clip(nearest + shift, 0, len(s) - 1), self.factors)
-        inside = (self.places.min() <= s[-1]) and (self.places.max() >= s[0])
-        if inside:
-            factors *= most
+            np.maximum.at(most, np.clip(nearest + shift, 0, len(s) - 1), self.factors[here])
+        factors *= most
 
     @property
     def error(self) -> PlanError:

@@ -30,6 +30,8 @@ _SETTLED, _STILL = 5e-3, 0.02
 _AT_START = 1e-4
 #: A target of a stream is reached so long after the next one comes, so that the arm does not brake for a late one [s].
 _OVERLAP = 0.005
+#: Longest trajectory to a target [s]; see `min_trajectory_time` of `Arm.servo`.
+_LONGEST = 1.0
 #: Of a spline: the relative difference in duration that is none, and how many plans may be made for it.
 _SAME_TIME, _PLANS = 0.005, 10
 #: Points of a trajectory with which a position is compared.
@@ -163,7 +165,7 @@ class _Run:
     def by_servo(self, rate: float, watchdog: float | None) -> Replay:
         """Follow it by a stream of targets."""
         trajectory, per_second = self.trajectory, self.speed_scaling * self.arm.real_time_factor
-        ahead = 1.0 / rate + _OVERLAP
+        ahead = min(1.0 / rate + _OVERLAP, _LONGEST)
         seen: list[tuple[float, Array]] = []
         due = 0
         with self.arm.servo(
