@@ -235,7 +235,7 @@ def _stream(
         if f"{FRI}q_cmd" in run:
             t, q = run[f"{FRI}t"], run[f"{FRI}q_cmd"]
     elif not measured:
-        mode = _mode_at(run, motion.begin)
+        mode = _mode_at(run, 0.5 * (motion.begin + until))  # it is reported a moment after the begin
     inside = (t >= motion.begin) & (t <= until) & ~np.isnan(q).any(axis=1)
     times, rows = np.unique(t[inside], return_index=True)
     points = q[inside][rows]

@@ -178,7 +178,8 @@ class Twin(Value):
             CommandRejected: the file exists, or cannot be written.
         """
         where = refuse_existing(path_of(path), overwrite=flag(overwrite, "overwrite"))
-        return merge(where, {"recorded": self.recorded, "simulated": self.simulated})
+        simulated = self.simulated.between(float(self.recorded.t[0]), "end")  # time zero is the first state of both
+        return merge(where, {"recorded": self.recorded, "simulated": simulated})
 
     def __str__(self) -> str:
         """A few lines: whether both are alike, how far they deviate, what became of the motions."""

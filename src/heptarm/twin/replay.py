@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from math import isnan
@@ -28,7 +28,7 @@ from heptarm.twin.comparison import (
     bands_of,
     deviations_of,
 )
-from heptarm.values.checks import Array, callback, instance, within
+from heptarm.values.checks import instance, within
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.robot import known_robot
@@ -58,7 +58,6 @@ def replay_in_sim(
     mode: Mode | None = None,
     tool: Tool | None = None,
     bands: Mapping[str, float] | None = None,
-    on_progress: Callable[[float], None] | None = None,
 ) -> Twin:
     """Carry out in the simulator what a recording commands, and compare both over one time line.
 
@@ -79,7 +78,6 @@ def replay_in_sim(
         tool: what if: the tool on the flange, in place of the recorded ones. Motions, conditions and modes find the
             frames that they name by the same names. None: as recorded.
         bands: largest deviations that are no difference, by signal; of those left out `heptarm.twin.comparison.BANDS`.
-        on_progress: called with the completed fraction, [0, 1], after each motion.
 
     Returns:
         Both recordings, how far each signal deviates, and where they part.
@@ -95,8 +93,6 @@ def replay_in_sim(
     check_mode(mode)
     if tool is not None:
         instance(tool, Tool, "tool")
-    if on_progress is not None:
-        callback(on_progress, "on_progress")
     limits = bands_of(bands)
     commands = commands_of(run)
     with (
@@ -104,7 +100,7 @@ def replay_in_sim(
         connect(_target(target, commands), watchdog=5.0, black_box=False, state_rate=_RATE, timeout=30.0) as sim,
     ):
         _check_robot(sim, commands, run)
-        runner = _Run(sim, commands, speed, mode, tool, on_progress)
+        runner = _Run(sim, commands, speed, mode, tool)
         runner.prepare()
         path = Path(folder) / "simulated.mcap"
         with sim.record(path, rate=_RATE):
@@ -157,7 +153,6 @@ class _Run:
         speed: factor on the override.
         mode: control mode of every motion; None: as recorded.
         tool: on the flange; None: as recorded.
-        on_progress: see `replay_in_sim`.
 
     Attributes:
         repetitions: what ran.
@@ -171,11 +166,9 @@ class _Run:
         speed: float,
         mode: Mode | None,
         tool: Tool | None,
-        on_progress: Callable[[float], None] | None,
     ) -> None:
         self._arm, self._commands = arm, commands
         self._speed, self._mode, self._tool = speed, mode, tool
-        self._on_progress = on_progress
         self._handles: list[tuple[Section, MotionHandle]] = []
         self._numbers: dict[int, int] = {}  # of the recording's programs in the twin
         self.repetitions: list[Repetition] = []
@@ -204,16 +197,12 @@ class _Run:
         # what was set before the first program holds when it begins
         queue: list[tuple[float, Section | Step]] = [(max(one.t, first), one) for one in steps if one.t >= 0.0 or not one.word]
         queue += [(one.sent, one) for one in sections]
-        done = 0
         for t, one in sorted(queue, key=lambda pair: pair[0]):
             self._wait_until(t)
             if isinstance(one, Step):
                 self._repeat(one)
                 continue
             self._begin(one)
-            done += 1
-            if self._on_progress is not None:
-                self._on_progress(done / len(sections))
         self._wait_for_rest()
 
     # ---------------------------------------------------------------------------------------- programs
