@@ -25,7 +25,10 @@ def read_usd(path: str) -> dict[str, Any]:
                 found["masses"][one.GetName()] = UsdPhysics.MassAPI(one).GetMassAttr().Get()
         elif one.IsA(UsdPhysics.RevoluteJoint):
             joint = UsdPhysics.RevoluteJoint(one)
-            found["joints"][one.GetName()] = [joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()]
+            found["joints"][one.GetName()] = [
+                joint.GetLowerLimitAttr().Get(),
+                joint.GetUpperLimitAttr().Get(),
+            ]
     return found
 
 
@@ -40,4 +43,6 @@ def read_urdf(path: str, q: list[float]) -> dict[str, Any]:
 
 if __name__ == "__main__":
     usd, urdf, joints = sys.argv[1:]
-    print(json.dumps({"usd": read_usd(usd), "urdf": read_urdf(urdf, [float(one) for one in joints.split(",")])}))
+    print(
+        json.dumps({"usd": read_usd(usd), "urdf": read_urdf(urdf, [float(one) for one in joints.split(",")])})
+    )

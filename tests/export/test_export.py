@@ -56,9 +56,9 @@ def expected(q: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, np.ndarray[A
 
 def test_read_back(exported: Path) -> None:
     """Each format by the reader that this environment has."""
-    {".urdf": by_pinocchio, ".sdf": by_its_elements, ".xml": by_mujoco, ".usda": by_its_text}[exported.suffix](
-        exported
-    )
+    {".urdf": by_pinocchio, ".sdf": by_its_elements, ".xml": by_mujoco, ".usda": by_its_text}[
+        exported.suffix
+    ](exported)
 
 
 def by_pinocchio(path: Path) -> None:
@@ -104,7 +104,9 @@ def by_mujoco(path: Path) -> None:
             name = own.body(index).name.replace("/", "_")
             assert np.abs(data.body(name).xipos - same.xipos[index]).max() < NEAR, name
             assert model.body(name).mass == pytest.approx(own.body_mass[index], abs=NEAR)
-            assert np.sort(model.body(name).inertia) == pytest.approx(np.sort(own.body_inertia[index]), abs=NEAR)
+            assert np.sort(model.body(name).inertia) == pytest.approx(
+                np.sort(own.body_inertia[index]), abs=NEAR
+            )
     assert model.body("gripper").mass == pytest.approx(TOOL.mass, abs=NEAR)
 
 
@@ -115,7 +117,9 @@ def by_its_elements(path: Path) -> None:
     joints = {one.findtext("child"): one for one in model.findall("joint")}
 
     def placed(name: str, q: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-        one = next(each for each in (*model.findall("link"), *model.findall("frame")) if each.get("name") == name)
+        one = next(
+            each for each in (*model.findall("link"), *model.findall("frame")) if each.get("name") == name
+        )
         pose = one.find("pose")
         assert pose is not None and pose.text is not None
         x, y, z, roll, pitch, yaw = map(float, pose.text.split())
@@ -149,17 +153,24 @@ def by_its_text(path: Path) -> None:
     """USD has no reader here either (see the long test): poses at joint position 0, from the text."""
     text = path.read_text()
     number = r"[-+.e\d]+"
-    pattern = (
-        r'def Xform "(\w+)"[^{]*\{\s*double3 xformOp:translate = \(([^)]*)\)\s*quatd xformOp:orient = \(([^)]*)\)'
-    )
+    pattern = r'def Xform "(\w+)"[^{]*\{\s*double3 xformOp:translate = \(([^)]*)\)\s*quatd xformOp:orient = \(([^)]*)\)'
     places = {
-        name: ha.Pose.of([float(one) for one in xyz.split(",")], np.roll([float(one) for one in quat.split(",")], -1))
+        name: ha.Pose.of(
+            [float(one) for one in xyz.split(",")], np.roll([float(one) for one in quat.split(",")], -1)
+        )
         for name, xyz, quat in re.findall(pattern, text)
     }
     found = places["link_7"] @ places["flange"]
     assert np.abs(found.matrix - expected(np.zeros(7))["flange"]).max() < NEAR
-    assert np.abs((places["gripper"] @ places["gripper_tcp"]).matrix - expected(np.zeros(7))["gripper_tcp"]).max() < NEAR
-    assert len(re.findall(rf"float physics:mass = {number}", text)) == 8 + 1 + 3  # links, tool, bodies of the scene
+    assert (
+        np.abs(
+            (places["gripper"] @ places["gripper_tcp"]).matrix - expected(np.zeros(7))["gripper_tcp"]
+        ).max()
+        < NEAR
+    )
+    assert (
+        len(re.findall(rf"float physics:mass = {number}", text)) == 8 + 1 + 3
+    )  # links, tool, bodies of the scene
 
 
 @pytest.mark.long

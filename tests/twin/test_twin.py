@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import heptarm as ha
@@ -30,7 +29,10 @@ def recorded(cabinet: RunningCabinet, tmp_path_factory: pytest.TempPathFactory) 
         arm.attach_tool(STICK)
         arm.move(ha.ptp(HOME))
         with arm.record(file):
-            arm.move([ha.ptp(HOME + 0.1, speed=0.3), ha.lin_rel(z=0.05, frame="base")], mode=JointImpedance(stiffness=[800.0] * 7))
+            arm.move(
+                [ha.ptp(HOME + 0.1, speed=0.3), ha.lin_rel(z=0.05, frame="base")],
+                mode=JointImpedance(stiffness=[800.0] * 7),
+            )
             arm.set_override(0.5)
             moved = arm.move(ha.lin_rel(z=-0.1, frame="base"), until=path.after(0.03))
             arm.wait_for_rest()
@@ -53,7 +55,9 @@ def test_a_twin_of_the_simulator_is_alike(
     saved = twin.save(tmp_path / "both.mcap")
     both = {name: ha.load(saved, arm=name) for name in ("recorded", "simulated")}
     assert both["recorded"].t == pytest.approx(recorded.t, abs=1e-8)
-    assert (both["recorded"]["q"] == recorded["q"]).all() and len(both["recorded"].events) == len(recorded.events)
+    assert (both["recorded"]["q"] == recorded["q"]).all() and len(both["recorded"].events) == len(
+        recorded.events
+    )
     kept = twin.simulated.t >= 0.0
     assert both["simulated"].t == pytest.approx(twin.simulated.t[kept], abs=1e-8)
     assert (both["simulated"]["tau"] == twin.simulated["tau"][kept]).all()
@@ -64,7 +68,9 @@ def test_a_twin_of_the_simulator_is_alike(
 
 def test_what_if(cabinet: RunningCabinet, recorded: Recording) -> None:
     """Half the speed, a soft spring: both part, at a time within the first motion, and the text has it."""
-    slow = ha.replay_in_sim(recorded, target=cabinet.target, speed=0.5, mode=JointImpedance(stiffness=[60.0] * 7))
+    slow = ha.replay_in_sim(
+        recorded, target=cabinet.target, speed=0.5, mode=JointImpedance(stiffness=[60.0] * 7)
+    )
     first = recorded.motions[0]
     assert not slow.is_alike and first.begin <= slow.parts <= first.end
     assert not slow["q"].is_inside and "part at" in str(slow)
@@ -151,8 +157,12 @@ def test_a_deviation_has_a_band(recorded: Recording) -> None:
         other = replace(recorded, signals={**recorded.signals, "q": q})
         (one,) = (
             found
-            for found in deviations_of(recorded, other, recorded.t, dict.fromkeys(
-                ("q", "q_cmd", "dq", "xyz", "tau", "tau_ext", "force", "torque"), 0.005))
+            for found in deviations_of(
+                recorded,
+                other,
+                recorded.t,
+                dict.fromkeys(("q", "q_cmd", "dq", "xyz", "tau", "tau_ext", "force", "torque"), 0.005),
+            )
             if found.signal == "q"
         )
         assert one.largest == pytest.approx(largest) and one.entry == entry

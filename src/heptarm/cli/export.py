@@ -30,7 +30,8 @@ def export(
     model: Annotated[Model, Parameter(help="Robot, with its media flange.")] = "iiwa14",
     scene: Annotated[str, Parameter(help="A ready scene, or a file (MJCF). Default: none.")] = "",
     tool: Annotated[
-        str, Parameter(help="A tool of the saved target, with its load data, shapes and frames. Default: none.")
+        str,
+        Parameter(help="A tool of the saved target, with its load data, shapes and frames. Default: none."),
     ] = "",
     target: Annotated[str, Parameter(help="The saved target that has the tool (heptarm targets).")] = "",
     overwrite: Overwrite = False,

@@ -32,11 +32,15 @@ def twin(
     speed: Annotated[float, Parameter(help="What if: a factor on the speed, (0, 1].")] = 1.0,
     stiffness: Annotated[
         float | None,
-        Parameter(help="What if: Cartesian impedance of this stiffness in every direction [N/m], for every motion."),
+        Parameter(
+            help="What if: Cartesian impedance of this stiffness in every direction [N/m], for every motion."
+        ),
     ] = None,
     band: Annotated[
         tuple[str, ...],
-        Parameter(help="SIGNAL=LARGEST: a deviation that is no difference, such as q=0.01 [rad]; may be repeated."),
+        Parameter(
+            help="SIGNAL=LARGEST: a deviation that is no difference, such as q=0.01 [rad]; may be repeated."
+        ),
     ] = (),
     signals: Annotated[
         str, Parameter(help="What is drawn: names with commas between. Default: the usual ones.")

@@ -168,7 +168,7 @@ def poses_in_base(bodies: Sequence[TreeBody]) -> dict[str, Pose]:
     return found
 
 
-def _name( model: mujoco.MjModel, body: int) -> str:
+def _name(model: mujoco.MjModel, body: int) -> str:
     """Name of a body; the scene's without their prefix, as far as that is unique."""
     if body == 0:
         return BASE

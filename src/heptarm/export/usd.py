@@ -34,8 +34,8 @@ def prim(name: str) -> str:
 def usd(name: str, bodies: Sequence[TreeBody]) -> str:
     """A tree as a stage of USD, with all meshes inside.
 
-    Bodies are side by side below the root, each with its pose in the base at joint position 0 (double precision); a frame
-    is below its body. The schema of UsdPhysics has masses and the frames of joints in single precision.
+    Bodies are side by side below the root, each with its pose in the base at joint position 0 (double precision); a
+    frame is below its body. The schema of UsdPhysics has masses and the frames of joints in single precision.
 
     Args:
         name: of the model.
@@ -79,7 +79,11 @@ def _body(body: TreeBody, place: Pose, frames: Sequence[TreeBody]) -> list[str]:
     if body.mass > 0.0:
         schemas.append('"PhysicsMassAPI"')
     head = f'def Xform "{prim(body.name)}"'
-    lines = [f"{head} (", f"    prepend apiSchemas = [{', '.join(schemas)}]", ")", "{"] if schemas else [head, "{"]
+    lines = (
+        [f"{head} (", f"    prepend apiSchemas = [{', '.join(schemas)}]", ")", "{"]
+        if schemas
+        else [head, "{"]
+    )
     lines += _lines(_place(place))
     if body.mass > 0.0:
         moments, axes = np.linalg.eigh(body.inertia)

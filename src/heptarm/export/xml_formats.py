@@ -52,7 +52,7 @@ def _pieces(shape: Geometry) -> Iterator[Geometry]:
     if shape.kind != "capsule":
         yield shape
         return
-    radius, half, _ = shape.size.tolist()
+    half = float(shape.size[1])
     parts = [("cylinder", 0.0), ("sphere", half), ("sphere", -half)]
     for kind, z in parts:
         pose = shape.pose @ Pose.of((0.0, 0.0, z))
@@ -259,7 +259,11 @@ def mjcf(name: str, bodies: Sequence[TreeBody], meshes: str) -> str:
             if body.mass > 0.0:
                 entries = (*body.inertia.diagonal(), *body.inertia[[0, 0, 1], [1, 2, 2]])
                 _add(
-                    one, "inertial", pos=numbers(body.com), mass=number(body.mass), fullinertia=numbers(entries)
+                    one,
+                    "inertial",
+                    pos=numbers(body.com),
+                    mass=number(body.mass),
+                    fullinertia=numbers(entries),
                 )
             _mjcf_joint(one, body.joint)
         for shape in body.shapes:

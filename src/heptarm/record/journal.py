@@ -145,9 +145,7 @@ def _restored_message(content: Any, kind: Any) -> Any:
     unknown = content.keys() - known.keys() - {"type"}
     if unknown:
         raise ValueError(f"{kind.__name__} has an unknown field {min(unknown)!r}")
-    missing = [
-        name for name, field in known.items() if field.default is MISSING and name not in content
-    ]
+    missing = [name for name, field in known.items() if field.default is MISSING and name not in content]
     if missing:
         raise ValueError(f"{kind.__name__} lacks {missing[0]!r}")
     hints = _hints(kind)

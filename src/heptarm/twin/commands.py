@@ -40,7 +40,9 @@ _STOPS = (
     (wire.SafetyBits.OPERATOR_SAFETY_OPEN, "operator_safety"),
     (wire.SafetyBits.PROTECTIVE_STOP, "protective_stop"),
 )
-_ANY_STOP = wire.SafetyBits.EMERGENCY_STOP | wire.SafetyBits.OPERATOR_SAFETY_OPEN | wire.SafetyBits.PROTECTIVE_STOP
+_ANY_STOP = (
+    wire.SafetyBits.EMERGENCY_STOP | wire.SafetyBits.OPERATOR_SAFETY_OPEN | wire.SafetyBits.PROTECTIVE_STOP
+)
 #: A joint that moves less than this in a stream rests [rad].
 _STILL = 1e-4
 #: FRI's client command modes that superpose a load.
@@ -186,9 +188,7 @@ def _unusable(run: RecordedData, why: str, hint: str) -> CommandRejected:
 # ------------------------------------------------------------------------------------------------- programs
 
 
-def _sections(
-    run: RecordedData, requests: dict[int, RecordedEvent], notes: list[str]
-) -> Iterator[Section]:
+def _sections(run: RecordedData, requests: dict[int, RecordedEvent], notes: list[str]) -> Iterator[Section]:
     """Programs of the recording: as they were sent where that is recorded, otherwise their set-points."""
     last = float(run.t[-1])
     for motion in run.motions:
@@ -198,9 +198,13 @@ def _sections(
             continue
         name = "" if request is None else request.name
         program = restored(request.content, wire.Run) if request is not None and name == "Run" else None
-        is_guided = program is not None and any(isinstance(one.motion, wire.HandGuide) for one in program.items)
+        is_guided = program is not None and any(
+            isinstance(one.motion, wire.HandGuide) for one in program.items
+        )
         if is_guided:
-            notes.append(f"motion {motion.id}: hand guiding is repeated by the positions to which the arm was guided")
+            notes.append(
+                f"motion {motion.id}: hand guiding is repeated by the positions to which the arm was guided"
+            )
         before = int(np.searchsorted(run.t, motion.begin)) - 1
         is_whole = before >= 0 or motion.begin - float(run.t[0]) >= 0.0
         if program is not None and request is not None and is_whole and not is_guided:

@@ -165,7 +165,9 @@ class Twin(Value):
         if isnan(self.parts):
             return chart
         zero = self.recorded.motions[0].begin
-        return Chart(chart.title, chart.rows, marks=(*chart.marks, Mark(self.parts - zero, "parts", is_alarm=True)))
+        return Chart(
+            chart.title, chart.rows, marks=(*chart.marks, Mark(self.parts - zero, "parts", is_alarm=True))
+        )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write a recording with both: `heptarm.load(path, arm="recorded")` and `arm="simulated"`.
@@ -178,7 +180,9 @@ class Twin(Value):
             CommandRejected: the file exists, or cannot be written.
         """
         where = refuse_existing(path_of(path), overwrite=flag(overwrite, "overwrite"))
-        simulated = self.simulated.between(float(self.recorded.t[0]), "end")  # time zero is the first state of both
+        simulated = self.simulated.between(
+            float(self.recorded.t[0]), "end"
+        )  # time zero is the first state of both
         return merge(where, {"recorded": self.recorded, "simulated": simulated})
 
     def __str__(self) -> str:

@@ -61,12 +61,13 @@ def replay_in_sim(
 ) -> Twin:
     """Carry out in the simulator what a recording commands, and compare both over one time line.
 
-    Programs are sent as they were sent, with their control modes, break conditions, triggers and tools; so are pauses,
-    stops and changes of the override, at their times after the begin of the running motion. Emergency stops, opened
-    safeguards and protective stops come when they came. What the arm does by itself, such as a break condition that fires
-    or a drive that trips, has to happen in the simulator as well. Where no program is in the file (a servo stream, an FRI
-    session, another client's motion, one that began before the file), the recorded set-points are repeated as a stream,
-    in the recorded control mode. Pauses between motions take no longer than the arm needs to come to rest.
+    Programs are sent as they were sent, with their control modes, break conditions, triggers and tools; so are
+    pauses, stops and changes of the override, at their times after the begin of the running motion. Emergency stops,
+    opened safeguards and protective stops come when they came. What the arm does by itself, such as a break condition
+    that fires or a drive that trips, has to happen in the simulator as well. Where no program is in the file (a servo
+    stream, an FRI session, another client's motion, one that began before the file), the recorded set-points are
+    repeated as a stream, in the recorded control mode. Pauses between motions take no longer than the arm needs to
+    come to rest.
 
     Args:
         recording: the file, or what `load` has read; a black box is one, too.
@@ -83,8 +84,8 @@ def replay_in_sim(
         Both recordings, how far each signal deviates, and where they part.
 
     Raises:
-        CommandRejected: the recording commands nothing, is of another robot than the simulator, or a later version wrote
-            it; or the target is no simulator. LimitError: a speed or a band outside its range.
+        CommandRejected: the recording commands nothing, is of another robot than the simulator, or a later version
+            wrote it; or the target is no simulator. LimitError: a speed or a band outside its range.
         MissingExtra: the packages of the simulator or of recordings are not installed.
         ConnectFailed: the simulator does not start.
     """
@@ -97,7 +98,9 @@ def replay_in_sim(
     commands = commands_of(run)
     with (
         tempfile.TemporaryDirectory(prefix="heptarm-twin-") as folder,
-        connect(_target(target, commands), watchdog=5.0, black_box=False, state_rate=_RATE, timeout=30.0) as sim,
+        connect(
+            _target(target, commands), watchdog=5.0, black_box=False, state_rate=_RATE, timeout=30.0
+        ) as sim,
     ):
         _check_robot(sim, commands, run)
         runner = _Run(sim, commands, speed, mode, tool)
@@ -195,7 +198,9 @@ class _Run:
         sections, steps = self._commands.sections, self._commands.steps
         first = min(one.sent for one in sections)
         # what was set before the first program holds when it begins
-        queue: list[tuple[float, Section | Step]] = [(max(one.t, first), one) for one in steps if one.t >= 0.0 or not one.word]
+        queue: list[tuple[float, Section | Step]] = [
+            (max(one.t, first), one) for one in steps if one.t >= 0.0 or not one.word
+        ]
         queue += [(one.sent, one) for one in sections]
         for t, one in sorted(queue, key=lambda pair: pair[0]):
             self._wait_until(t)
@@ -237,7 +242,9 @@ class _Run:
         assert section.stream is not None
         self._wait_for_rest()
         self._approach(section)
-        mode = self._mode if self._mode is not None else None if section.mode is None else _mode_of(section.mode)
+        mode = (
+            self._mode if self._mode is not None else None if section.mode is None else _mode_of(section.mode)
+        )
         number = 0
 
         def note(_: float) -> None:
@@ -342,7 +349,8 @@ class _Run:
         if not seen:
             seen = [
                 connection.wait_for(
-                    lambda state: handle.done or (state.motion is not None and state.motion.id == number), _BEGINS
+                    lambda state: handle.done or (state.motion is not None and state.motion.id == number),
+                    _BEGINS,
                 )
             ]
         return seen[0].stamp * 1e-9
