@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.cli.twin import twin as command
 from heptarm.modes import JointImpedance
 from heptarm.record.recording import Recording
 from heptarm.twin.commands import commands_of
@@ -66,18 +70,38 @@ def test_a_twin_of_the_simulator_is_alike(
     assert twin.chart("q").save(tmp_path / "twin.png").stat().st_size > 1000
 
 
-def test_what_if(cabinet: RunningCabinet, recorded: Recording) -> None:
-    """Half the speed, a soft spring: both part, at a time within the first motion, and the text has it."""
-    slow = ha.replay_in_sim(
-        recorded, target=cabinet.target, speed=0.5, mode=JointImpedance(stiffness=[60.0] * 7)
-    )
+def test_what_if(
+    cabinet: RunningCabinet, recorded: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Half the speed and a soft spring, by the command: both part, within the first motion, and the text has it."""
+    plot, both = tmp_path / "twin.svg", tmp_path / "both.mcap"
+    what_if: dict[str, Any] = {"sim": cabinet.target, "speed": 0.5, "stiffness": 500.0, "band": ("dq=9",)}
+    assert command(recorded.path, out=plot, save=both, signals="q", as_json=True, **what_if) == 0
+    found = json.loads(capsys.readouterr().out)
     first = recorded.motions[0]
-    assert not slow.is_alike and first.begin <= slow.parts <= first.end
-    assert not slow["q"].is_inside and "part at" in str(slow)
-    assert slow.chart("q").marks[-1].text == "parts"
-    wide = dict.fromkeys(("q", "q_cmd", "dq", "xyz", "tau", "tau_ext", "force", "torque"), 1e3)
-    same = deviations_of(slow.recorded, slow.simulated, slow.recorded.t, wide)
-    assert all(one.is_inside for one in same)
+    assert not found["alike"] and first.begin <= found["parts_s"] <= first.end
+    by_name = {one["signal"]: one for one in found["deviations"]}
+    assert (
+        by_name["q"]["parts"] is not None and by_name["dq"]["parts"] is None and by_name["dq"]["band"] == 9.0
+    )
+    assert plot.read_text().count("parts") >= 1 and len(ha.load(both, arm="simulated")) > 100
+    with pytest.raises(ha.CommandRejected, match="overwrite"):
+        command(recorded.path, save=both)
+    with pytest.raises(ha.CommandRejected, match="SIGNAL=LARGEST"):
+        command(recorded.path, band=("q:1",))
+
+
+@pytest.mark.long
+def test_a_stream_is_repeated_by_its_set_points(tmp_path: Path) -> None:
+    """A servo stream has no program: its set-points are the stream of the twin."""
+    file = tmp_path / "stream.mcap"
+    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0, state_rate=250) as arm:
+        arm.move(ha.ptp(HOME))
+        with arm.record(file), arm.servo(rate=100, watchdog=2.0) as servo:
+            while servo.tick() and servo.t < 3.0:
+                servo.set(HOME + 0.1 * np.sin(2.0 * servo.t) * np.eye(7)[5])
+    twin = ha.replay_in_sim(file, bands={"dq": 1.0, "q": 0.02, "q_cmd": 0.02, "xyz": 0.01})
+    assert twin["q"].is_inside and twin["q"].rms < 5e-3, str(twin)
 
 
 def test_a_black_box_reproduces_its_stop() -> None:
