@@ -31,9 +31,9 @@ def export_model(
     """Write the model of an arm with its flange, its tool and its scene for another program.
 
     The file has frames, masses, inertias, limits and shapes of the virtual cabinet. The root is `base`, the links are
-    `link_0` to `link_7`, the joints `A1` to `A7`, then come `flange`, the tool and its frames as NAME_FRAME, and the
-    bodies of the scene as scene_NAME. URDF, SDF and MJCF have their meshes in the folder NAME-meshes beside the file; USD has
-    them inside.
+    `link_0` to `link_7`, the joints `A1` to `A7`, then come `flange`, the tool and its frames as NAME_FRAME, and
+    the bodies of the scene as scene_NAME. URDF, SDF and MJCF have their meshes in the folder NAME-meshes beside the
+    file; USD has them inside.
 
     Args:
         path: the file; its ending chooses the format: .urdf, .sdf (1.8), .xml or .mjcf (MuJoCo), .usda (UsdPhysics).
