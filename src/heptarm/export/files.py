@@ -50,7 +50,11 @@ def export_model(
             exists or cannot be written.
         MissingExtra: the packages of the simulator are not installed.
     """
-    where = path_of(path)
+    where, model = path_of(path), model_of(robot)
+    if tool is not None:
+        instance(tool, Tool, "tool")
+    instance(scene, str, "scene")
+    flag(overwrite, "overwrite")
     kind = FORMATS.get(where.suffix.lower())
     if kind is None:
         endings = ", ".join(FORMATS)
@@ -60,11 +64,7 @@ def export_model(
             value=str(where),
             allowed=endings,
         )
-    model = model_of(robot)
-    if tool is not None:
-        instance(tool, Tool, "tool")
-    instance(scene, str, "scene")
-    refuse_existing(where, overwrite=flag(overwrite, "overwrite"))
+    refuse_existing(where, overwrite=overwrite)
     bodies = tree_of(model, tool=tool, scene=scene)
     name = re.sub(r"\W", "_", model.name, flags=re.ASCII)
     folder = where.with_name(f"{where.stem}-meshes")

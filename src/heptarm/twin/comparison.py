@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, ShapeError
 from heptarm.record.mcap_file import merge
 from heptarm.record.plot.chart import Chart
 from heptarm.record.plot.content import Mark
@@ -18,7 +18,7 @@ from heptarm.record.plot.signals import compare
 from heptarm.record.recorded import RecordedMotion
 from heptarm.record.recording import Recording
 from heptarm.record.samples import labels
-from heptarm.values.checks import Array, Value, flag, within
+from heptarm.values.checks import Array, Value, flag, shown, within
 from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.text import aligned, fixed, lines
 
@@ -134,7 +134,10 @@ class Twin(Value):
                 return one
         known = ", ".join(one.signal for one in self.deviations)
         raise CommandRejected(
-            f"signal must be one of {known}, got {signal!r}", parameter="signal", value=signal, allowed=known
+            f"signal must be one of {known}, got {shown(signal)}",
+            parameter="signal",
+            value=signal,
+            allowed=known,
         )
 
     @property
@@ -225,14 +228,22 @@ def bands_of(given: Mapping[str, float] | None) -> dict[str, float]:
     """The bands of all signals, some of which a user gave.
 
     Raises:
-        CommandRejected: no such signal; LimitError: a band that is negative or no number.
+        ShapeError: no mapping. CommandRejected: no such signal. LimitError: a band that is negative or no number.
     """
     bands = dict(BANDS)
-    for name, band in (given or {}).items():
+    if given is None:
+        return bands
+    if not isinstance(given, Mapping):
+        raise ShapeError(
+            f"bands must be a dictionary such as {{'q': 0.01}}, got {shown(given)}",
+            parameter="bands",
+            value=given,
+        )
+    for name, band in given.items():
         if name not in SIGNALS:
             known = ", ".join(SIGNALS)
             raise CommandRejected(
-                f"bands must be of {known}, got {name!r}", parameter="bands", value=name, allowed=known
+                f"bands must be of {known}, got {shown(name)}", parameter="bands", value=name, allowed=known
             )
         bands[name] = within(band, f"bands[{name!r}]", 0.0, 1e6, unit=SIGNALS[name][0])
     return bands

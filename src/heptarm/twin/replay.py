@@ -29,6 +29,7 @@ from heptarm.twin.comparison import (
     deviations_of,
 )
 from heptarm.values.checks import instance, within
+from heptarm.values.frames import FLANGE
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.robot import known_robot
@@ -89,12 +90,27 @@ def replay_in_sim(
         MissingExtra: the packages of the simulator or of recordings are not installed.
         ConnectFailed: the simulator does not start.
     """
-    run = recording if isinstance(recording, Recording) else load(recording, arm=arm)
+    instance(arm, str, "arm")
+    if target is not None and not instance(target, str, "target").startswith("sim://"):
+        raise CommandRejected(
+            f"target must be a simulator, sim://..., got {target!r}: a twin moves unattended",
+            parameter="target",
+            value=target,
+            hint="replay a trajectory on a robot with arm.replay(run.trajectory())",
+        )
     within(speed, "speed", 0.0, 1.0, above=True)
     check_mode(mode)
     if tool is not None:
         instance(tool, Tool, "tool")
     limits = bands_of(bands)
+    if isinstance(recording, Recording) and arm:
+        raise CommandRejected(
+            "arm must be chosen when the recording is read",
+            parameter="arm",
+            value=arm,
+            hint="ha.load(path, arm=...)",
+        )
+    run = recording if isinstance(recording, Recording) else load(recording, arm=arm)
     commands = commands_of(run)
     with (
         tempfile.TemporaryDirectory(prefix="heptarm-twin-") as folder,
@@ -116,18 +132,11 @@ def replay_in_sim(
 
 
 def _target(target: str | None, commands: Commands) -> str:
-    """The simulator, checked before it starts."""
+    """The simulator; a private one is as fast as what it has to repeat allows."""
     speed = 1.0 if any(one.stream is not None for one in commands.sections) else _FASTER
     if target is None:
         name, _, flange = commands.robot.name.partition("+")
         return f"sim://{name}?speed={speed:g}" + (f"&flange={flange}" if flange else "")
-    if not instance(target, str, "target").startswith("sim://"):
-        raise CommandRejected(
-            f"target must be a simulator, sim://..., got {target!r}: a twin moves as the recording did, unattended",
-            parameter="target",
-            value=target,
-            hint="replay a trajectory on a robot with arm.replay(run.trajectory())",
-        )
     parsed = parse_target(target)
     if not parsed.is_private or "speed" in dict(parsed.options):
         return target
@@ -187,7 +196,8 @@ class _Run:
             for one in commands.tools:
                 self._request(wire.DefineTool(tool=one))
             if commands.tool:
-                self._request(wire.AttachTool(name=commands.tool, frame=commands.frame))
+                frame = "" if commands.frame == FLANGE else commands.frame
+                self._request(wire.AttachTool(name=commands.tool, frame=frame))
             if commands.workpiece in known:
                 self._request(wire.AttachLoad(load=known[commands.workpiece], attached=True))
         self._approach(commands.sections[0])
