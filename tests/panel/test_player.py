@@ -69,5 +69,5 @@ def test_what_cannot_be_played(tmp_path: Path) -> None:
     ):
         with pytest.raises(ha.CommandRejected, match="cannot be played"):
             Player(broken, PanelOptions(port=0))
-    with pytest.raises(ha.CommandRejected, match="recording"):
+    with pytest.raises(ha.CommandRejected, match="cannot be read"):
         open_player(tmp_path / "none.mcap", PanelOptions(port=0))

@@ -79,7 +79,7 @@ class Player:
         begin, end = float(self._t[0]), float(self._t[-1])
         self.slider = server.gui.add_slider("time [s]", begin, max(end, begin + _STEP), _STEP, begin)
         self.is_playing = server.gui.add_checkbox("play", True)
-        self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), "1")
+        self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         self.events = server.gui.add_markdown("")
         server.initial_camera.position = (1.7, -1.5, 1.15)
         server.initial_camera.look_at = (0.15, 0.0, 0.5)
