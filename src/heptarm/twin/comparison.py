@@ -47,6 +47,8 @@ _ONSET, _NEAR, _STEPS = 1.0, 0.3, 12
 _SHOWS = 1e-3
 #: Time after a motion in which the arm comes to rest, which is compared as well [s].
 SETTLE = 0.5
+#: Between two states of the twin that are farther apart nothing is compared: a busy machine has missed some [s].
+_GAP = 0.01
 #: Shortest stretch of the time line [s].
 _SHORTEST = 1e-9
 
@@ -360,12 +362,14 @@ def _shift(recorded: Recording, simulated: Recording, begin: float, section: Sec
     if len(t) < 3 or float(np.ptp(q, axis=0).max()) < _SHOWS:
         return 0.0
     own_t, own_q = simulated.t, simulated["q_cmd"]
+    lost = _gaps(own_t)
     slopes = np.gradient(own_q, own_t, axis=0)
     shift = 0.0
     for _ in range(_STEPS):
         at = t - there + begin + shift
         now = np.stack([np.interp(at, own_t, column) for column in own_q.T], axis=1)
         speed = np.stack([np.interp(at, own_t, column) for column in slopes.T], axis=1)
+        speed[_is_lost(at, own_t, lost)] = 0.0  # such rows do not count
         weight = float((speed**2).sum())
         step = float((speed * (q - now)).sum()) / weight if weight > 0.0 else 0.0
         shift = float(np.clip(shift + step, -_NEAR, _NEAR))
@@ -391,6 +395,9 @@ def _deviation(
     """The deviation of a signal; None: one of the recordings does not have it."""
     if name not in recorded or name not in simulated or not len(times):
         return None
+    times = times[~_is_lost(times, simulated.t, _gaps(simulated.t))]
+    if not len(times):
+        return None
     rows = np.searchsorted(recorded.t, times)
     own = np.stack([np.interp(times, simulated.t, column) for column in simulated[name].T], axis=1)
     difference = np.abs(recorded[name][rows] - own)
@@ -409,6 +416,16 @@ def _deviation(
         float(np.sqrt((difference**2).mean())),
         _leaves(t, difference.max(axis=1) > band),
     )
+
+
+def _gaps(t: Array) -> Array:
+    """Whether a state is missing before each of the states at these times, and behind the last, shape (n + 1,)."""
+    return np.concatenate([[0.0], np.diff(t) > _GAP, [0.0]])
+
+
+def _is_lost(times: Array, t: Array, gaps: Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """Which times, shape (m,), are where states at times of shape (n,) are missing."""
+    return gaps[np.searchsorted(t, times)] > 0.0
 
 
 def _leaves(t: Array, is_outside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> float:
