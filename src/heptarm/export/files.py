@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from heptarm.errors import CommandRejected
-from heptarm.export.tree import Geometry, TreeBody, tree_of
+from heptarm.export.tree import TreeShape, TreeBody, tree_of
 from heptarm.export.usd import usd
 from heptarm.export.xml_formats import mjcf, sdf, urdf
 from heptarm.values.checks import flag, instance, shown
@@ -88,7 +88,7 @@ def _write_meshes(folder: Path, bodies: Sequence[TreeBody]) -> None:
         (folder / f"{name}.obj").write_text(_obj(mesh), encoding="utf-8")
 
 
-def _obj(mesh: Geometry) -> str:
+def _obj(mesh: TreeShape) -> str:
     vertices = (f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in mesh.vertices.tolist())
     faces = (f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces.tolist())
     return "\n".join((*vertices, *faces, ""))

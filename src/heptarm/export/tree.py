@@ -27,7 +27,7 @@ _THICKNESS, _WIDEST = 0.02, 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Geometry(Value):
+class TreeShape(Value):
     """A shape of a body.
 
     Attributes:
@@ -104,7 +104,7 @@ class TreeBody(Value):
     com: Array = field(default_factory=lambda: np.zeros(3))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
     joint: TreeJoint | None = None
-    shapes: tuple[Geometry, ...] = ()
+    shapes: tuple[TreeShape, ...] = ()
 
     @property
     def is_frame(self) -> bool:
@@ -211,13 +211,14 @@ def _joint(model: mujoco.MjModel, index: int, robot: RobotModel) -> TreeJoint:
     if kind == "free":
         return TreeJoint(name, kind, np.array([0.0, 0.0, 1.0]), np.zeros(3))
     dof = int(model.jnt_dofadr[index])
-    limits = model.jnt_range[index].tolist() if model.jnt_limited[index] else (-inf, inf)
+    low, high = model.jnt_range[index].tolist() if model.jnt_limited[index] else (-inf, inf)
     made = TreeJoint(
         name,
         kind,
         np.array(model.jnt_axis[index]),
         np.array(model.jnt_pos[index]),
-        *limits,
+        low,
+        high,
         damping=float(model.dof_damping[dof]),
         armature=float(model.dof_armature[dof]),
     )
@@ -232,7 +233,7 @@ def _joint(model: mujoco.MjModel, index: int, robot: RobotModel) -> TreeJoint:
     )
 
 
-def _shapes(model: mujoco.MjModel, body: int) -> Iterator[Geometry]:
+def _shapes(model: mujoco.MjModel, body: int) -> Iterator[TreeShape]:
     from heptarm.sim.plant.appearance import HIDDEN_GROUP
 
     first = int(model.body_geomadr[body])
@@ -243,7 +244,7 @@ def _shapes(model: mujoco.MjModel, body: int) -> Iterator[Geometry]:
             continue
         pose = Pose.of(model.geom_pos[index], np.roll(model.geom_quat[index], -1))
         material = int(model.geom_matid[index])
-        made = Geometry(
+        made = TreeShape(
             names[kind],
             np.array(model.geom_size[index]),
             pose,
@@ -274,7 +275,7 @@ def _tool(tool: Tool) -> list[TreeBody]:
     for one in tool.shapes:
         radius, length, _ = one.size.tolist()
         size = 0.5 * one.size if one.kind == "box" else np.array([radius, 0.5 * length, 0.0])
-        shapes.append(Geometry(one.kind, size, one.pose, colour, collides=True, is_drawn=True))
+        shapes.append(TreeShape(one.kind, size, one.pose, colour, collides=True, is_drawn=True))
     name = tool.name.replace("/", "_").replace(" ", "_")
     body = TreeBody(name, FLANGE, ORIGIN, tool.mass, tool.com, symmetric(tool.inertia), None, tuple(shapes))
     frames = [TreeBody(f"{name}_{frame}".replace(" ", "_"), name, pose) for frame, pose in tool.frames]

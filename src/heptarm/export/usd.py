@@ -8,7 +8,7 @@ from math import degrees, isfinite
 
 import numpy as np
 
-from heptarm.export.tree import BASE, Geometry, TreeBody, poses_in_base
+from heptarm.export.tree import BASE, TreeShape, TreeBody, poses_in_base
 from heptarm.export.xml_formats import number
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
@@ -106,7 +106,7 @@ def _body(body: TreeBody, place: Pose, frames: Sequence[TreeBody]) -> list[str]:
     return [*lines, "}"]
 
 
-def _shape(name: str, shape: Geometry) -> list[str]:
+def _shape(name: str, shape: TreeShape) -> list[str]:
     radius, half, _ = shape.size.tolist()
     kinds = {"box": "Cube", "sphere": "Sphere", "ellipsoid": "Sphere", "mesh": "Mesh"}
     kind = kinds.get(shape.kind, shape.kind.capitalize())

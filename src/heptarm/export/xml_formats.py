@@ -8,7 +8,7 @@ from math import atan2, hypot, isfinite
 
 import numpy as np
 
-from heptarm.export.tree import BASE, Geometry, TreeBody, TreeJoint
+from heptarm.export.tree import BASE, TreeShape, TreeBody, TreeJoint
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 
@@ -47,7 +47,7 @@ def _add(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.
     return one
 
 
-def _pieces(shape: Geometry) -> Iterator[Geometry]:
+def _pieces(shape: TreeShape) -> Iterator[TreeShape]:
     """A capsule as a cylinder and two spheres, for formats that have none."""
     if shape.kind != "capsule":
         yield shape
@@ -56,10 +56,10 @@ def _pieces(shape: Geometry) -> Iterator[Geometry]:
     parts = [("cylinder", 0.0), ("sphere", half), ("sphere", -half)]
     for kind, z in parts:
         pose = shape.pose @ Pose.of((0.0, 0.0, z))
-        yield Geometry(kind, shape.size, pose, shape.colour, shape.collides, shape.is_drawn)
+        yield TreeShape(kind, shape.size, pose, shape.colour, shape.collides, shape.is_drawn)
 
 
-def _purposes(shape: Geometry) -> list[str]:
+def _purposes(shape: TreeShape) -> list[str]:
     return ["visual"] * shape.is_drawn + ["collision"] * shape.collides
 
 
@@ -100,7 +100,7 @@ def _urdf_origin(parent: ET.Element, pose: Pose) -> None:
     _add(parent, "origin", xyz=numbers(pose.xyz), rpy=numbers(roll_pitch_yaw(pose)))
 
 
-def _urdf_shape(parent: ET.Element, shape: Geometry, meshes: str, *, is_visual: bool) -> None:
+def _urdf_shape(parent: ET.Element, shape: TreeShape, meshes: str, *, is_visual: bool) -> None:
     _urdf_origin(parent, shape.pose)
     geometry = _add(parent, "geometry")
     radius, half, _ = shape.size.tolist()
@@ -192,7 +192,7 @@ def _sdf_pose(parent: ET.Element, pose: Pose, *, relative_to: str = "") -> None:
     _add(parent, "pose", text, **({"relative_to": relative_to} if relative_to else {}))
 
 
-def _sdf_geometry(geometry: ET.Element, shape: Geometry, meshes: str) -> None:
+def _sdf_geometry(geometry: ET.Element, shape: TreeShape, meshes: str) -> None:
     radius, half, _ = shape.size.tolist()
     if shape.kind == "mesh":
         _add(_add(geometry, "mesh"), "uri", f"{meshes}/{shape.name}.obj")
@@ -257,7 +257,7 @@ def mjcf(name: str, bodies: Sequence[TreeBody], meshes: str) -> str:
         if body.parent:
             made[body.name] = one = _add(made[body.parent], "body", name=body.name, **_mjcf_place(body.pose))
             if body.mass > 0.0:
-                entries = (*body.inertia.diagonal(), *body.inertia[[0, 0, 1], [1, 2, 2]])
+                entries = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
                 _add(
                     one,
                     "inertial",
@@ -290,7 +290,7 @@ def _mjcf_joint(body: ET.Element, joint: TreeJoint | None) -> None:
     )  # fmt: skip
 
 
-def _mjcf_shape(body: ET.Element, shape: Geometry) -> None:
+def _mjcf_shape(body: ET.Element, shape: TreeShape) -> None:
     contact = {} if shape.collides else {"contype": "0", "conaffinity": "0"}
     group = "2" if shape.is_drawn else "3"
     common = {"rgba": numbers(shape.colour), "group": group, "mass": "0", **contact}

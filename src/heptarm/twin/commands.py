@@ -73,7 +73,7 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class RepeatedStep:
     """What happened besides programs.
 
     Attributes:
@@ -105,7 +105,7 @@ class Commands:
 
     robot: RobotModel
     sections: tuple[Section, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[RepeatedStep, ...]
     tools: tuple[wire.ToolInfo, ...] = ()
     tool: str = ""
     frame: str = ""
@@ -272,11 +272,11 @@ def _mode_at(run: RecordedData, t: float) -> wire.Mode | None:
 # --------------------------------------------------------------------------------------- what else happened
 
 
-def _steps(run: RecordedData) -> Iterator[Step]:
+def _steps(run: RecordedData) -> Iterator[RepeatedStep]:
     """Requests besides programs, and what came from outside."""
     for event in run.events:
         if event.kind == REQUEST and event.name in _KINDS:
-            yield Step(event.t, restored(event.content, _KINDS[event.name]))
+            yield RepeatedStep(event.t, restored(event.content, _KINDS[event.name]))
     changes = [
         (event.t, restored(event.content, wire.SafetyChanged))
         for event in run.events
@@ -287,9 +287,9 @@ def _steps(run: RecordedData) -> Iterator[Step]:
     first = (changes[0][0], wire.SafetyChanged(bits=wire.SafetyBits.NONE, mode=changes[0][1].mode, text=""))
     for (_, before), (t, now) in pairwise([first, *changes]):
         if now.mode != before.mode:
-            yield Step(t, word=now.mode.name.lower())
+            yield RepeatedStep(t, word=now.mode.name.lower())
         begun = next((word for bit, word in _STOPS if now.bits & ~before.bits & bit), "")
         if begun:
-            yield Step(t, word=begun)
+            yield RepeatedStep(t, word=begun)
         elif before.bits & ~now.bits & _ANY_STOP and not now.bits & _ANY_STOP:
-            yield Step(t, word="clear")
+            yield RepeatedStep(t, word="clear")

@@ -19,7 +19,7 @@ from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.translate.modes import mode_message, read_mode
 from heptarm.errors import CommandRejected, HeptarmError, MotionError
 from heptarm.record.recording import Recording, load
-from heptarm.twin.commands import Commands, Section, Step, commands_of
+from heptarm.twin.commands import Commands, Section, RepeatedStep, commands_of
 from heptarm.twin.comparison import (
     SETTLE,
     Repetition,
@@ -208,13 +208,13 @@ class _Run:
         sections, steps = self._commands.sections, self._commands.steps
         first = min(one.sent for one in sections)
         # what was set before the first program holds when it begins
-        queue: list[tuple[float, Section | Step]] = [
+        queue: list[tuple[float, Section | RepeatedStep]] = [
             (max(one.t, first), one) for one in steps if one.t >= 0.0 or not one.word
         ]
         queue += [(one.sent, one) for one in sections]
         for t, one in sorted(queue, key=lambda pair: pair[0]):
             self._wait_until(t)
-            if isinstance(one, Step):
+            if isinstance(one, RepeatedStep):
                 self._repeat(one)
                 continue
             self._begin(one)
@@ -283,7 +283,7 @@ class _Run:
         self._numbers[section.motion.id] = number
         self.repetitions.append(Repetition(section, number, refusal))
 
-    def _stops_within(self, section: Section) -> list[Step]:
+    def _stops_within(self, section: Section) -> list[RepeatedStep]:
         return [
             one for one in self._commands.steps if one.word and section.motion.begin <= one.t <= section.until
         ]
@@ -298,7 +298,7 @@ class _Run:
 
     # --------------------------------------------------------------------------------- what else happened
 
-    def _repeat(self, step: Step) -> None:
+    def _repeat(self, step: RepeatedStep) -> None:
         """Repeat a request, or what came from outside."""
         running = self._running(step.t)
         if step.word:
