@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from heptarm.errors import CommandRejected
-from heptarm.export.tree import TreeShape, TreeBody, tree_of
+from heptarm.export.tree import TreeBody, TreeShape, tree_of
 from heptarm.export.usd import usd
 from heptarm.export.xml_formats import mjcf, sdf, urdf
 from heptarm.values.checks import flag, instance, shown

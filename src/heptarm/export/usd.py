@@ -8,7 +8,7 @@ from math import degrees, isfinite
 
 import numpy as np
 
-from heptarm.export.tree import BASE, TreeShape, TreeBody, poses_in_base
+from heptarm.export.tree import BASE, TreeBody, TreeShape, poses_in_base
 from heptarm.export.xml_formats import number
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose

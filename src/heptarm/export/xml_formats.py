@@ -8,7 +8,7 @@ from math import atan2, hypot, isfinite
 
 import numpy as np
 
-from heptarm.export.tree import BASE, TreeShape, TreeBody, TreeJoint
+from heptarm.export.tree import BASE, TreeBody, TreeJoint, TreeShape
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 

@@ -19,7 +19,7 @@ from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.translate.modes import mode_message, read_mode
 from heptarm.errors import CommandRejected, HeptarmError, MotionError
 from heptarm.record.recording import Recording, load
-from heptarm.twin.commands import Commands, Section, RepeatedStep, commands_of
+from heptarm.twin.commands import Commands, RepeatedStep, Section, commands_of
 from heptarm.twin.comparison import (
     SETTLE,
     Repetition,
