@@ -111,7 +111,7 @@ def by_mujoco(path: Path) -> None:
 
 
 def by_its_elements(path: Path) -> None:
-    """SDF has no reader here: its elements are put together as its specification says."""
+    """SDF has no reader here: its elements are put together as its specification defines."""
     model = ET.parse(path).getroot().find("model")
     assert model is not None
     joints = {one.findtext("child"): one for one in model.findall("joint")}

@@ -73,7 +73,7 @@ def test_a_twin_of_the_simulator_is_alike(
 def test_what_if(
     cabinet: RunningCabinet, recorded: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Half the speed and a soft spring, by the command: both part, within the first motion, and the text has it."""
+    """Half the speed and a weak spring, by the command: both part, within the first motion, and the text has it."""
     plot, both = tmp_path / "twin.svg", tmp_path / "both.mcap"
     what_if: dict[str, Any] = {"sim": cabinet.target, "speed": 0.5, "stiffness": 500.0, "band": ("dq=9",)}
     assert command(recorded.path, out=plot, save=both, signals="q", as_json=True, **what_if) == 0

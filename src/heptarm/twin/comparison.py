@@ -352,7 +352,7 @@ class _TimeLine:
 
 
 def _shift(recorded: Recording, simulated: Recording, begin: float, section: Section) -> float:
-    """By how much later than its event says the recorded motion begins, in the twin's terms [s]."""
+    """By how much later than its event states the recorded motion begins, in the twin's terms [s]."""
     there = section.motion.begin
     length = min(_ONSET, section.until - there)
     chosen = (recorded.t >= there - 0.02) & (recorded.t <= there + length)
