@@ -49,6 +49,8 @@ _SHOWS = 1e-3
 SETTLE = 0.5
 #: Between two states of the twin that are farther apart nothing is compared: a busy machine has missed some [s].
 _GAP = 0.01
+#: So late the event of an end may come at most, to be that of a motion which took no longer than the recorded one [s].
+_LATE = 0.3
 #: Shortest stretch of the time line [s].
 _SHORTEST = 1e-9
 
@@ -304,10 +306,12 @@ def aligned_twin(
         moves = (last if isnan(end) else end) - begin
         # the one before may have taken longer than it was recorded
         there = max([wanted[index], *targets[-1:]])
-        rest = SETTLE
-        if index + 1 < len(ran):
-            rest = min(rest, begins[index + 1] - begin - moves, wanted[index + 1] - there - moves)
-        length = max(moves + max(min(rest, last - begin - moves), 0.0), _SHORTEST)
+        length = min(moves + SETTLE, last - begin)
+        if index + 1 < len(ran):  # the event of an end may come after the next begin
+            length = min(length, begins[index + 1] - begin)
+            if wanted[index + 1] > there:
+                length = min(length, max(moves - _LATE, wanted[index + 1] - there))
+        length = max(length, _SHORTEST)
         sources += [begin, begin + length]
         targets += [there, there + length]
         spans.append((there, there + length))
