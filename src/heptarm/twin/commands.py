@@ -285,11 +285,14 @@ def _steps(run: RecordedData) -> Iterator[RepeatedStep]:
     if not changes:
         return
     first = (changes[0][0], wire.SafetyChanged(bits=wire.SafetyBits.NONE, mode=changes[0][1].mode, text=""))
-    for (_, before), (t, now) in pairwise([first, *changes]):
+    seen = run["safety"] if "safety" in run else np.zeros(len(run.t), np.int64)
+    for (last, before), (t, now) in pairwise([first, *changes]):
         if now.mode != before.mode:
             yield RepeatedStep(t, word=now.mode.name.lower())
         begun = next((word for bit, word in _STOPS if now.bits & ~before.bits & bit), "")
         if begun:
-            yield RepeatedStep(t, word=begun)
+            bit = next(bit for bit, word in _STOPS if word == begun)
+            states = run.t[((seen & int(bit)) != 0) & (run.t <= t) & ((run.t > last) | (last == t))]
+            yield RepeatedStep(float(states[0]) if len(states) else t, word=begun)  # an event may come late
         elif before.bits & ~now.bits & _ANY_STOP and not now.bits & _ANY_STOP:
             yield RepeatedStep(t, word="clear")

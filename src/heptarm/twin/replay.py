@@ -133,7 +133,10 @@ def replay_in_sim(
 
 def _target(target: str | None, commands: Commands) -> str:
     """The simulator; a private one is as fast as what it has to repeat allows."""
-    speed = 1.0 if any(one.stream is not None for one in commands.sections) else _FASTER
+    is_timed = any(one.word for one in commands.steps) or any(
+        one.stream is not None for one in commands.sections
+    )
+    speed = 1.0 if is_timed else _FASTER
     if target is None:
         name, _, flange = commands.robot.name.partition("+")
         return f"sim://{name}?speed={speed:g}" + (f"&flange={flange}" if flange else "")
@@ -213,7 +216,9 @@ class _Run:
         ]
         queue += [(one.sent, one) for one in sections]
         for t, one in sorted(queue, key=lambda pair: pair[0]):
-            self._wait_until(t)
+            # what comes from outside is scheduled before its time: the simulator keeps that to a tick
+            if isinstance(one, Section) or not one.word or self._running(t) is None:
+                self._wait_until(t)
             if isinstance(one, RepeatedStep):
                 self._repeat(one)
                 continue
