@@ -39,6 +39,8 @@ COMMANDS = {
     "record": "record:record",
     "plot": "plot:plot",
     "convert": "record:convert",
+    "twin": "twin:twin",
+    "export": "export:export",
     "doctor": "doctor:doctor",
     "bench": "bench:bench",
     "check": "check:check",
