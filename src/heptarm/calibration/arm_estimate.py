@@ -46,6 +46,8 @@ _MOST, _SEARCHED = 6000, 1500
 #: Speeds of transition, and of fading breakaway friction by that, which are tried [rad/s].
 _TRANSITIONS = np.geomspace(2e-3, 0.08, 9)
 _FADINGS = (1.5, 2.5, 4.0, 8.0)
+#: Moments of a window at which its friction is computed.
+_MOMENTS = 11
 #: Steps of Gauss-Newton.
 _STEPS = 6
 #: Duration of a part of the recording whose residuals may depend on each other [s].
@@ -59,8 +61,21 @@ _SURE, _LEAST_LOAD = 4.0, 0.05
 _KNOWN_STIFFNESS, _KNOWN_BREAKAWAY = 0.25, 0.33
 #: Least noise, as a fraction of the highest torque, of ideal sensors; of a position [rad].
 LEAST_NOISE, _LEAST_POSITION = 2e-5, 1e-7
-#: A shorter delay is none [s].
-_LEAST_DELAY = 2e-4
+#: A shorter delay is none, and the least standard deviation of one [s].
+_LEAST_DELAY, _SURE_DELAY = 2e-4, 2e-5
+#: Least standard deviations of what is reported, as fractions of the value: the curve is a model, and the torques of a
+#: state may belong to positions of the millisecond before. The asymmetry's is one of the Coulomb friction.
+_MODEL = {
+    "coulomb": 0.005,
+    "breakaway": 0.008,
+    "viscous": 0.015,
+    "rotor": 0.015,
+    "stiffness": 0.006,
+    "transition": 0.01,
+    "stribeck": 0.01,
+    "torque_noise": 0.01,
+    "position_noise": 0.01,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +138,9 @@ def _rough_delay(windows: Windows) -> float:
 def _curve(windows: Windows, transition: float, stribeck: float) -> tuple[Array, Array, Array]:
     """Means over each window of what multiplies Coulomb, slow and asymmetric friction, shape (m, 7) each."""
     sums = [np.zeros_like(windows.dq) for _ in range(3)]
-    for weight, offset in zip(windows.centre, windows.offsets, strict=True):
+    some = np.linspace(0, len(windows.offsets) - 1, _MOMENTS).astype(np.intp)
+    weights = windows.centre[some] / windows.centre[some].sum()
+    for weight, offset in zip(weights, windows.offsets[some], strict=True):
         dq = windows.dq + offset * windows.ddq
         turn = np.tanh(dq / transition)
         sums[0] += weight * turn
@@ -181,7 +198,6 @@ class _Solution:
         transition: speed of the transition of Coulomb friction [rad/s].
         stribeck: speed at which breakaway friction fades [rad/s].
         external: external torques that remain, shape (m, 7) [Nm].
-        noise: standard deviation of an external torque of a window, shape (7,) [Nm].
         has_load: whether a load that nobody declared is there.
     """
 
@@ -190,7 +206,6 @@ class _Solution:
     transition: float
     stribeck: float
     external: Array
-    noise: Array
     has_load: bool
 
     def of(self, name: str) -> Array:
@@ -264,8 +279,12 @@ def _gauss_newton(
         for kind, axis, columns, aim in rows:
             off = aim - columns @ x
             noise[kind][axis] = max(float(np.sqrt(np.mean(off**2))), 0.1 * least[axis])
-        transition = float(np.clip(transition + np.clip(x[_SHAPE_AT][0], -0.5 * transition, transition), low, high))
-        stribeck = float(np.clip(stribeck + np.clip(x[_SHAPE_AT][1], -0.5 * stribeck, stribeck), transition, 1.0))
+        transition = float(
+            np.clip(transition + np.clip(x[_SHAPE_AT][0], -0.5 * transition, transition), low, high)
+        )
+        stribeck = float(
+            np.clip(stribeck + np.clip(x[_SHAPE_AT][1], -0.5 * stribeck, stribeck), transition, 1.0)
+        )
     score = np.diag(prior**-2.0)
     parts = np.zeros((len(design.parts), len(x)))
     external = np.zeros_like(windows.tau)
@@ -281,7 +300,11 @@ def _gauss_newton(
         parts += np.add.reduceat(each, design.parts, axis=0)
     many = len(parts) / max(1, len(parts) - 1)
     score += many * parts.T @ parts
-    return _Solution(x, inverse @ score @ inverse, transition, stribeck, external, noise[1], has_load)
+    covariance = inverse @ score @ inverse
+    # with few parts the scatter may be small by chance: at least what white noise gives
+    more = np.sqrt(np.maximum(np.diagonal(inverse) / np.diagonal(covariance), 1.0))
+    covariance *= np.outer(more, more)
+    return _Solution(x, covariance, transition, stribeck, external, has_load)
 
 
 def _rows(
@@ -329,9 +352,7 @@ def _inverse(information: Array) -> Array:
     return np.asarray(np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale))
 
 
-def _touched(
-    design: _Design, found: _Solution, model: RobotModel
-) -> tuple[npt.NDArray[np.bool_], list[str]]:
+def _touched(design: _Design, found: _Solution, model: RobotModel) -> tuple[npt.NDArray[np.bool_], list[str]]:
     """Windows with an external torque that nothing explains, and sentences about them."""
     usual = 1.4826 * np.median(np.abs(found.external - np.median(found.external, axis=0)), axis=0)
     bound = np.maximum(_UNEXPLAINED * usual, _TOUCHED * model.tau_max)
@@ -374,7 +395,9 @@ def _stiffness(design: _Design, found: _Solution) -> tuple[Array, Array, Array, 
         solution = inverse @ (columns.T @ windows.error[chosen, axis])
         off = windows.error[chosen, axis] - columns @ solution
         part = np.floor(windows.t[chosen] / _PART)
-        sums = np.add.reduceat(columns * off[:, None], np.flatnonzero(np.r_[True, np.diff(part) > 0.0]), axis=0)
+        sums = np.add.reduceat(
+            columns * off[:, None], np.flatnonzero(np.r_[True, np.diff(part) > 0.0]), axis=0
+        )
         sigma = np.sqrt(np.diagonal(inverse @ (sums.T @ sums) @ inverse))
         if solution[0] > 0.0:
             # the torques that wind the joint are not known exactly either
@@ -396,8 +419,10 @@ def _numbers(
     values: dict[str, tuple[Array, Array]] = {}
 
     def put(name: str, value: Array, sigma: Array) -> None:
-        kind = QUANTITIES[name]
-        values[name] = np.clip(value, kind.low, kind.high), sigma
+        kind, size = QUANTITIES[name], _MODEL.get(name, 0.0) * np.abs(value)
+        if name == "asymmetry":
+            size = _MODEL["coulomb"] * found.of("coulomb")
+        values[name] = np.clip(value, kind.low, kind.high), np.hypot(sigma, size)
 
     put("coulomb", found.of("coulomb"), found.sigma_of("coulomb"))
     slow, sigma_slow = found.of("slow"), found.sigma_of("slow")
@@ -410,20 +435,22 @@ def _numbers(
     for name in ("viscous", "asymmetry", "rotor", "torque_offset", "torque_gain"):
         put(name, found.of(name), found.sigma_of(name))
     put("transition", np.array([found.transition]), found.sigma[_SHAPE_AT][:1])
-    freedom = (len(windows.offsets) - 3) * len(windows.t)
+    freedom = 0.5 * len(windows.offsets) * len(windows.t)
     for name, noise in (("torque_noise", windows.tau_noise), ("position_noise", windows.q_noise)):
         put(name, noise, noise / math.sqrt(2.0 * freedom))
     stiffness, sigma, late, sigma_late = _stiffness(design, found)
     unknown = ~(sigma < _KNOWN_STIFFNESS * stiffness)
     if unknown.any():
         axes = ", ".join(f"A{axis + 1}" for axis in np.flatnonzero(unknown))
-        remarks.append(f"stiffness: friction and load wind {axes} too little; mount a known load and record again")
+        remarks.append(
+            f"stiffness: friction and load wind {axes} too little; mount a known load and record again"
+        )
     else:
         put("stiffness", stiffness, sigma)
     weights = sigma_late**-2.0
     more, spread = float(np.average(late, weights=weights)), float(np.sum(weights) ** -0.5)
     if delay + more > max(_LEAST_DELAY, 2.0 * spread):
-        put("state_delay", np.array([delay + more]), np.array([spread]))
+        put("state_delay", np.array([delay + more]), np.array([math.hypot(spread, _SURE_DELAY)]))
     if found.has_load:
         covariance = found.covariance[_LOAD_AT, _LOAD_AT]
         put("load", consistent(found.x[_LOAD_AT], covariance), np.sqrt(np.diagonal(covariance)))

@@ -1,4 +1,8 @@
-"""What a recording shows of an arm, reduced to short windows: positions with their derivatives, torques, noise."""
+"""What a recording shows of an arm, reduced to short windows: positions with their derivatives, torques, noise.
+
+One smooth kernel filters every signal, and its derivatives give velocities and accelerations. So an equation between
+signals holds between the filtered ones, too, whatever the jerk of a motion is.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +21,8 @@ _AXES = 7
 _NAMES = ("q", "q_cmd", "tau", "tau_ext", "tau_cmd")
 #: Those that are measured, and so late by the delay of the states.
 _MEASURED = ("q", "tau", "tau_ext")
-#: Length of a window [s], and the fewest samples in one.
-_WINDOW, _FEWEST = 0.04, 7
+#: Length of a window [s], and the fewest samples in one. Of the kernel's weight, half is within a sixth of it.
+_WINDOW, _FEWEST = 0.1, 15
 #: Least rate of a recording [Hz].
 _SLOWEST = 190.0
 #: Least duration of the parts in which an axis moves [s], and the speed from which on it does [rad/s].
@@ -81,9 +85,7 @@ class ArmSamples(Value):
             CommandRejected: it lacks positions or torques, or the robot reports no commanded torques.
         """
         instance(run, RecordedData, "run")
-        cycles, states = (
-            len(run[f"{prefix}t"]) if f"{prefix}t" in run else 0 for prefix in (FRI, "")
-        )
+        cycles, states = (len(run[f"{prefix}t"]) if f"{prefix}t" in run else 0 for prefix in (FRI, ""))
         prefix = FRI if cycles > states else ""
         lacking = [name for name in _NAMES if f"{prefix}{name}" not in run]
         if lacking or not max(cycles, states):
@@ -115,12 +117,12 @@ class ArmSamples(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """Samples reduced to windows of 40 ms, by parabolas; arrays of shape (m, 7) unless said otherwise.
+    """Samples filtered over windows of 100 ms that overlap by half; arrays of shape (m, 7) unless said otherwise.
 
     Attributes:
         t: middle of each window, shape (m,) [s].
         offsets: of the samples of a window from its middle, shape (w,) [s].
-        centre: weights of the samples for a value in the middle, shape (w,).
+        centre: weights of the samples, their sum is 1, shape (w,).
         q: positions in the middle [rad].
         dq: velocities [rad/s].
         ddq: accelerations [rad/s²].
@@ -128,8 +130,7 @@ class Windows:
         tau: torques of the sensors [Nm].
         tau_ext: external torques [Nm].
         excess: commanded torques minus those that the controller's model expects [Nm].
-        single: torques of the sensors of the one sample in the middle [Nm].
-        commanded: commanded torques of that sample [Nm].
+        commanded: commanded torques [Nm].
         is_wound: the axis has moved in one direction for a while.
         q_noise: standard deviation of a single position, shape (7,) [rad].
         tau_noise: of a single torque, shape (7,) [Nm].
@@ -145,7 +146,6 @@ class Windows:
     tau: Array
     tau_ext: Array
     excess: Array
-    single: Array
     commanded: Array
     is_wound: npt.NDArray[np.bool_]
     q_noise: Array
@@ -166,7 +166,7 @@ class Windows:
     @property
     def seconds(self) -> float:
         """Time that the windows cover [s]."""
-        return len(self.t) * float(self.offsets[-1] - self.offsets[0])
+        return 0.5 * len(self.t) * float(self.offsets[-1] - self.offsets[0])
 
 
 def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
@@ -202,7 +202,7 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
             arrays[name] = np.column_stack(late)
     index = starts[:, None] + np.arange(count)
     offsets = period * (np.arange(count) - count // 2)
-    weights = np.linalg.pinv(np.column_stack([np.ones(count), offsets, 0.5 * offsets**2]))
+    weights = _kernels(offsets)
     middle = starts + count // 2
 
     def fitted(values: Array, order: int) -> Array:
@@ -221,19 +221,32 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
         tau,
         tau_ext,
         fitted(arrays["tau_cmd"], 0) - tau - tau_ext,
-        arrays["tau"][middle],
-        arrays["tau_cmd"][middle],
+        fitted(arrays["tau_cmd"], 0),
         _wound(samples.t[middle], dq),
-        _noise(arrays["q"][index], weights, offsets),
-        _noise(arrays["tau"][index], weights, offsets),
+        _noise(arrays["q"][index]),
+        _noise(arrays["tau"][index]),
     )
+
+
+def _kernels(offsets: Array) -> tuple[Array, Array, Array]:
+    """Weights of the samples of a window for the filtered value and its first and second derivative.
+
+    The kernel is (1 - x²)³; its derivatives are exact for a parabola.
+    """
+    x = offsets / (offsets[-1] + offsets[1] - offsets[0])
+    bell = 1.0 - x**2
+    centre = bell**3 / (bell**3).sum()
+    slope = x * bell**2
+    bend = 4.0 * x**2 * bell - bell**2
+    bend -= bend.sum() * centre
+    return centre, slope / (slope @ offsets), 2.0 * bend / (bend @ offsets**2)
 
 
 def _in_a_row(t: Array, period: float, count: int) -> npt.NDArray[np.intp]:
     """First samples of windows in which no state is missing, shape (m,)."""
     breaks = np.flatnonzero(np.abs(np.diff(t) - period) > 0.5 * period) + 1
     edges = np.r_[0, breaks, len(t)]
-    found = [np.arange(a, b - count + 1, count) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    found = [np.arange(a, b - count + 1, count // 2) for a, b in zip(edges[:-1], edges[1:], strict=True)]
     return np.concatenate(found).astype(np.intp)
 
 
@@ -242,22 +255,26 @@ def _wound(t: Array, dq: Array) -> npt.NDArray[np.bool_]:
     turned = np.where(np.abs(dq) > MOVING, np.sign(dq), 0.0)
     result = np.zeros(dq.shape, dtype=bool)
     for axis in range(_AXES):
-        changed = np.r_[True, turned[1:, axis] != turned[:-1, axis]] | np.r_[True, np.diff(t) > 4.0 * _WINDOW]
+        changed = np.r_[True, turned[1:, axis] != turned[:-1, axis]] | np.r_[True, np.diff(t) > 2.0 * _WINDOW]
         since = np.maximum.accumulate(np.where(changed, t, -math.inf))
         result[:, axis] = (turned[:, axis] != 0.0) & (t - since >= WOUND)
     return result
 
 
-def _noise(values: Array, weights: Array, offsets: Array) -> Array:
-    """Standard deviation of single samples about the parabolas of their windows, shape (7,).
+def _noise(values: Array) -> Array:
+    """Standard deviation of single samples about parabolas in the middle of their windows, shape (7,).
 
     That of the median window, so that jerks of the motion do not count; of a chi-square distribution its median is
     about 1 - 2 / 9 n, cubed (Wilson, Hilferty, 1931).
+
+    Args:
+        values: of the samples of each window, shape (m, w, 7).
     """
-    some = values[:: max(1, len(values) // 2000)]
-    powers = np.column_stack([np.ones(len(offsets)), offsets, 0.5 * offsets**2])
-    left = some - np.einsum("kp,pl,mlj->mkj", powers, weights, some)
-    freedom = len(offsets) - 3
+    count = values.shape[1]
+    some = values[:: max(1, len(values) // 2000), count // 4 : count - count // 4]
+    powers = np.vander(np.linspace(-1.0, 1.0, some.shape[1]), 3)
+    left = some - np.einsum("kl,mlj->mkj", powers @ np.linalg.pinv(powers), some)
+    freedom = some.shape[1] - 3
     square = (left**2).sum(axis=1) / freedom
     return np.asarray(np.sqrt(np.median(square, axis=0) / (1.0 - 2.0 / (9.0 * freedom)) ** 3))
 

@@ -136,7 +136,9 @@ def excitation(
     model = instance(arm, ArmVerbs, "arm").robot
     least = within(seconds, "seconds", 1.0, 3600.0, unit="s")
     fastest = min(within(speed, "speed", 0.0, 1.0, above=True), arm.speed)
-    far = array(np.broadcast_to(np.asarray(reach, dtype=np.float64), 7) if np.ndim(reach) == 0 else reach, 7, "reach")
+    far = array(
+        np.broadcast_to(np.asarray(reach, dtype=np.float64), 7) if np.ndim(reach) == 0 else reach, 7, "reach"
+    )
     for index, one in enumerate(far.tolist()):
         within(one, f"reach[{index}]", 0.05, 3.0, unit="rad")
     postures, speeds, duration = [np.asarray(arm.state.q_cmd)], [], 0.0

@@ -298,7 +298,9 @@ def _numbers(file: Path, name: str, table: Any) -> FittedNumbers:
         raise _bad(file, f"{name} must be a table of one of {', '.join(QUANTITIES)}")
     unknown = [key for key in table if key not in _KEYS]
     if unknown or "value" not in table:
-        raise _bad(file, f"[{name}] must have value and may have {', '.join(_KEYS[1:])}, got {', '.join(table)}")
+        raise _bad(
+            file, f"[{name}] must have value and may have {', '.join(_KEYS[1:])}, got {', '.join(table)}"
+        )
     texts = {key: table[key] for key in ("source", "date") if key in table}
     size = QUANTITIES[name].size
     sigma = table.get("sigma", [float("nan")] * size)

@@ -257,7 +257,9 @@ class Plant:
             self._gripper = SimulatedGripper(self.model, self.data, self.signals, scene.wiring)
         monitor = DriveMonitor(self.robot) if monitored else None
         ranges = None if monitor is None else monitor.scales
-        self._native = NativeTick(self.robot, self.model, self.data, self.shared, arm, gains=gains, ranges=ranges)
+        self._native = NativeTick(
+            self.robot, self.model, self.data, self.shared, arm, gains=gains, ranges=ranges
+        )
         self._sensed = MeasuredState(
             arm.q, arm.dq, arm.mass[:7, :7], arm.bias, arm.passive, arm.q, arm.q, arm.q
         )
