@@ -1,7 +1,7 @@
 """Calibration: what is on the flange, its tip (TCP) and its load data, and what the arm itself is like.
 
-Poses, joint positions, torques and recordings come in; an estimate goes out, with the standard deviation of each number.
-Nothing is changed by measuring: an estimate becomes a `Tool` by `to_tool`, a tool of a saved target or the file of a
+Poses, joint positions, torques and recordings come in; an estimate goes out, with the standard deviation of each
+number. Nothing is changed by measuring: an estimate becomes a `Tool` by `to_tool`, a tool of a saved target or the file of a
 fitted arm by `save`.
 """
 

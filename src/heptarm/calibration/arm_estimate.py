@@ -37,8 +37,8 @@ _EACH, _LOAD = len(_UNKNOWNS), 10
 #: Places of the load and of the two speeds of the friction curve among all unknowns.
 _LOAD_AT = slice(_AXES * _EACH, _AXES * _EACH + _LOAD)
 _SHAPE_AT = slice(_LOAD_AT.stop, _LOAD_AT.stop + 2)
-#: Prior standard deviations that mean nothing: friction [Nm, Nm s/rad], rotors [kg m²]; the load: mass [kg], first moments
-#: [kg m], inertia [kg m²].
+#: Prior standard deviations that mean nothing: friction [Nm, Nm s/rad], rotors [kg m²]; the load: mass [kg], first
+#: moments [kg m], inertia [kg m²].
 _ANY, _ANY_ROTOR = 20.0, 3.0
 _ANY_LOAD = (30.0, *[10.0] * 3, *[0.3] * 6)
 #: Windows that are used, and those of a search over the speeds of the friction curve.
@@ -52,8 +52,8 @@ _MOMENTS = 11
 _STEPS = 6
 #: Duration of a part of the recording whose residuals may depend on each other [s].
 _PART = 1.0
-#: Torque that nothing explains: so many standard deviations, and a fraction of the highest torque of an axis. The largest
-#: part of the windows in which there may be one.
+#: Torque that nothing explains: so many standard deviations, and a fraction of the highest torque of an axis. The
+#: largest part of the windows in which there may be one.
 _UNEXPLAINED, _TOUCHED, _TOUCHED_PART = 8.0, 0.005, 0.3
 #: A load is there from so many standard deviations and so much mass on [kg].
 _SURE, _LEAST_LOAD = 4.0, 0.05
@@ -366,8 +366,8 @@ def _touched(design: _Design, found: _Solution, model: RobotModel) -> tuple[npt.
         row, axis = np.unravel_index(int(part[group].argmax()), part[group].shape)
         begin, end = design.windows.t[[group[0], group[-1]]]
         sentences.append(
-            f"from {fixed(begin, 1)} to {fixed(end, 1)} s: {found.external[group[row], axis]:.1f} Nm act on A{axis + 1} "
-            "from outside"
+            f"from {fixed(begin, 1)} to {fixed(end, 1)} s: {found.external[group[row], axis]:.1f} Nm act on "
+            f"A{axis + 1} from outside"
         )
     return touched, sentences
 

@@ -30,8 +30,6 @@ _AXES = 7
 WITHIN_NOISE = 1.2
 #: Windows at which a prediction is compared.
 _MOST = 3000
-#: A torque that the masses of the model leave is reported from this fraction of the highest torque of an axis on.
-_MASSES = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,8 +69,9 @@ class Validation(Value):
         for axis in range(_AXES):
             if self.ratio[axis] > WITHIN_NOISE:
                 found.append(
-                    f"{self.source}: torques of A{axis + 1} are {self.torque[axis]:.2f} Nm off the prediction, and their "
-                    f"noise is {self.noise[axis]:.2f} Nm; the controller's masses explain {self.masses[axis]:.2f} Nm"
+                    f"{self.source or 'samples'}: torques of A{axis + 1} are {self.torque[axis]:.2f} Nm off the "
+                    f"prediction, and their noise is {self.noise[axis]:.2f} Nm; "
+                    f"masses of the controller that are not heptarm's explain {self.masses[axis]:.2f} Nm"
                 )
         return tuple(found)
 

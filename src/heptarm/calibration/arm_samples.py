@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -107,7 +108,8 @@ class ArmSamples(Value):
                 hint="record an FRI session, whose cycles have them",
             )
         date = str(run.facts.get("date", run.facts.get("begin", "")))
-        return ArmSamples(times[good], *(one[good] for one in rows), source=run.path.name, date=date)
+        q, q_cmd, tau, tau_ext, tau_cmd = (one[good] for one in rows)
+        return ArmSamples(times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=date)
 
     @property
     def rate(self) -> float:
@@ -201,7 +203,7 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
             late = [np.interp(samples.t - delay, samples.t, column) for column in arrays[name].T]
             arrays[name] = np.column_stack(late)
     index = starts[:, None] + np.arange(count)
-    offsets = period * (np.arange(count) - count // 2)
+    offsets: Array = frozen(period * (np.arange(count) - count // 2))
     weights = _kernels(offsets)
     middle = starts + count // 2
 
@@ -246,7 +248,7 @@ def _in_a_row(t: Array, period: float, count: int) -> npt.NDArray[np.intp]:
     """First samples of windows in which no state is missing, shape (m,)."""
     breaks = np.flatnonzero(np.abs(np.diff(t) - period) > 0.5 * period) + 1
     edges = np.r_[0, breaks, len(t)]
-    found = [np.arange(a, b - count + 1, count // 2) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    found = [np.arange(a, b - count + 1, count // 2) for a, b in pairwise(edges)]
     return np.concatenate(found).astype(np.intp)
 
 

@@ -83,7 +83,7 @@ class ExcitationPlan(Value):
 
 
 def candidates(
-    model: RobotModel, start: Array, *, reach: npt.ArrayLike, seed: int
+    model: RobotModel, start: Array, *, reach: Array | float, seed: int
 ) -> Iterator[tuple[Array, float]]:
     """Endless postures around the first one, and the relative speed of the motion to each.
 
@@ -141,7 +141,7 @@ def excitation(
     )
     for index, one in enumerate(far.tolist()):
         within(one, f"reach[{index}]", 0.05, 3.0, unit="rad")
-    postures, speeds, duration = [np.asarray(arm.state.q_cmd)], [], 0.0
+    postures, speeds, duration = [np.asarray(arm.state.q_cmd)], list[float](), 0.0
     tried = 0
     for posture, part in candidates(model, postures[0], reach=far, seed=integer(seed, "seed", 0, 2**31)):
         goes_back = duration >= least and len(speeds) >= len(_SPEEDS)

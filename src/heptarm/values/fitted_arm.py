@@ -61,8 +61,8 @@ class Quantity:
     size: int = _AXES
 
 
-#: All quantities by their names in the file. A load is its mass [kg], its first moments [kg m], and its inertia about the
-#: flange xx yy zz xy xz yz [kg m²].
+#: All quantities by their names in the file. A load is its mass [kg], its first moments [kg m], and its inertia about
+#: the flange xx yy zz xy xz yz [kg m²].
 QUANTITIES: dict[str, Quantity] = {
     "coulomb": Quantity("Coulomb friction", "Nm", 0.0, 100.0),
     "breakaway": Quantity("breakaway friction", "Nm", 0.0, 100.0),

@@ -66,8 +66,8 @@ class ArmOptions:
     fitted: Annotated[
         Path | None,
         Parameter(
-            help="File of a measured arm, of heptarm calibrate arm: its friction, its stiffness in position control and "
-            "the errors of its sensors. Default: what the simulator assumes."
+            help="File of a measured arm, of heptarm calibrate arm: its friction, its stiffness in position control, the "
+            "errors of its sensors. Default: what the simulator assumes."
         ),
     ] = DEFAULTS.fitted
     verbose: Annotated[

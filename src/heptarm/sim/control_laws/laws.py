@@ -33,7 +33,7 @@ STIFFNESS_DAMPING = 0.004
 
 
 def position_gains(stiffness: Array) -> Array:
-    """Gains of position control for `ht_position` of tick.c: stiffness of the axes, shape (7,) [Nm/rad], and damping."""
+    """Gains of position control for `ht_position` of tick.c: stiffness, shape (7,) [Nm/rad], and damping."""
     return frozen([*stiffness, MASS_DAMPING, STIFFNESS_DAMPING])
 
 
