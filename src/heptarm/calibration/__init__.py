@@ -1,8 +1,8 @@
 """Calibration: what is on the flange, its tip (TCP) and its load data, and what the arm itself is like.
 
 Poses, joint positions, torques and recordings come in; an estimate goes out, with the standard deviation of each
-number. Nothing is changed by measuring: an estimate becomes a `Tool` by `to_tool`, a tool of a saved target or the file of a
-fitted arm by `save`.
+number. Nothing is changed by measuring: an estimate becomes a `Tool` by `to_tool`, a tool of a saved target or the file
+of a fitted arm by `save`.
 """
 
 from heptarm.calibration.arm_fit import ArmFit, Validation, simulator, validate

@@ -22,8 +22,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.calibration.arm_samples import MOVING, ArmSamples, Windows, check_moved, windows_of
-from heptarm.calibration.load_estimate import GAIN, OFFSET, consistent, load_regressor
+from heptarm.calibration.arm_samples import (
+    MOVING,
+    ArmSamples,
+    Windows,
+    aligned_windows,
+    check_moved,
+    windows_of,
+)
+from heptarm.calibration.load_estimate import GAIN, OFFSET, consistent, load_regressors
 from heptarm.errors import CommandRejected
 from heptarm.values.checks import Array, frozen
 from heptarm.values.fitted_arm import QUANTITIES, FittedArm, FittedNumbers
@@ -46,6 +53,8 @@ _MOST, _SEARCHED = 6000, 1500
 #: Speeds of transition, and of fading breakaway friction by that, which are tried [rad/s].
 _TRANSITIONS = np.geomspace(2e-3, 0.08, 9)
 _FADINGS = (1.5, 2.5, 4.0, 8.0)
+#: By how much the speeds may leave those of the grid: about its spacing.
+_NEAR = 1.8
 #: Moments of a window at which its friction is computed.
 _MOMENTS = 11
 #: Steps of Gauss-Newton.
@@ -59,6 +68,8 @@ _UNEXPLAINED, _TOUCHED, _TOUCHED_PART = 8.0, 0.005, 0.3
 _SURE, _LEAST_LOAD = 4.0, 0.05
 #: Largest standard deviation of what is reported, by its value: stiffness; breakaway friction beyond Coulomb friction.
 _KNOWN_STIFFNESS, _KNOWN_BREAKAWAY = 0.25, 0.33
+#: Residuals up to about so many standard deviations count fully.
+_TRUSTED = 6.0
 #: Least noise, as a fraction of the highest torque, of ideal sensors; of a position [rad].
 LEAST_NOISE, _LEAST_POSITION = 2e-5, 1e-7
 #: A shorter delay is none, and the least standard deviation of one [s].
@@ -101,8 +112,8 @@ def estimate_arm(samples: ArmSamples, model: RobotModel, *, acceleration: npt.Ar
     first = windows_of(samples)
     check_moved(first)
     delay = _rough_delay(first)
-    windows = (windows_of(samples, delay=delay) if delay else first).thinned(_MOST)
-    design = _Design(windows, model, acceleration)
+    windows = aligned_windows(samples, model, delay=delay, acceleration=acceleration).thinned(_MOST)
+    design = _Design.of(windows, model, acceleration)
     found = _solved(design, model)
     touched, contradictions = _touched(design, found, model)
     if touched.any():
@@ -160,32 +171,20 @@ class _Design:
 
     __slots__ = ("by_load", "parts", "windows")
 
-    def __init__(
-        self,
-        windows: Windows,
-        model: RobotModel,
-        acceleration: npt.ArrayLike,
-        by_load: Array | None = None,
-    ) -> None:
-        self.windows = windows
-        if by_load is None:
-            rows = zip(windows.q, windows.dq, windows.ddq, strict=True)
-            by_load = np.array([load_regressor(model, *row, acceleration=acceleration) for row in rows])
-        self.by_load = by_load
+    def __init__(self, windows: Windows, by_load: Array) -> None:
+        self.windows, self.by_load = windows, by_load
         part = np.floor((windows.t - windows.t[0]) / _PART)
         self.parts = np.flatnonzero(np.r_[True, np.diff(part) > 0.0])
 
+    @classmethod
+    def of(cls, windows: Windows, model: RobotModel, acceleration: npt.ArrayLike) -> _Design:
+        """Compute the torques of a load."""
+        moments = (windows.q, windows.dq, windows.ddq)
+        return cls(windows, load_regressors(model, *moments, acceleration=acceleration))
+
     def some(self, chosen: npt.NDArray[np.bool_]) -> _Design:
         """Some of the windows."""
-        made = _Design.__new__(_Design)
-        made.windows, made.by_load = self.windows.some(chosen), self.by_load[chosen]
-        part = np.floor((made.windows.t - made.windows.t[0]) / _PART)
-        made.parts = np.flatnonzero(np.r_[True, np.diff(part) > 0.0])
-        return made
-
-    def moves(self, axis: int) -> npt.NDArray[np.bool_]:
-        """Windows in which an axis moves: at rest its friction may have any value."""
-        return np.asarray(np.abs(self.windows.dq[:, axis]) > MOVING)
+        return _Design(self.windows.some(chosen), self.by_load[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -256,85 +255,97 @@ def _searched(design: _Design) -> tuple[float, float]:
 def _gauss_newton(
     design: _Design, model: RobotModel, shape: tuple[float, float], *, has_load: bool
 ) -> _Solution:
-    """Solve the torques from speeds of the friction curve that are about right."""
+    """Solve the torques from speeds of the friction curve that are about right.
+
+    Windows in which something touches the arm count little (weights of Cauchy).
+    """
     windows, torque = design.windows, model.tau_max
     transition, stribeck = shape
     least = LEAST_NOISE * torque
     single = np.maximum(windows.tau_noise, least) * math.sqrt(float(windows.centre @ windows.centre))
-    noise = [single.copy(), single.copy()]
+    noise, trust = np.array([single, single]), np.ones(len(windows.t))
     x = np.zeros(_SHAPE_AT.stop)
     expected = windows.tau + windows.tau_ext
-    low, high = _TRANSITIONS[0] / 3.0, 3.0 * _TRANSITIONS[-1]
+    bounds = np.outer([1.0 / _NEAR, _NEAR], shape)
     for _ in range(_STEPS):
         prior = _prior(torque, transition, stribeck, has_load=has_load)
         held = expected + design.by_load @ x[_LOAD_AT]
         rows = _rows(design, x, transition, stribeck, held)
         normal, right = np.diag(prior**-2.0), np.zeros(len(x))
-        for kind, axis, columns, aim in rows:
-            weighted = columns / noise[kind][axis] ** 2
-            normal += weighted.T @ columns
-            right += weighted.T @ aim
+        for one in rows:
+            weighted = one.columns * (trust[one.chosen] / noise[one.kind, one.axis] ** 2)[:, None]
+            normal[np.ix_(one.places, one.places)] += weighted.T @ one.columns
+            right[one.places] += weighted.T @ one.aim
         inverse = _inverse(normal)
         x = inverse @ right
-        for kind, axis, columns, aim in rows:
-            off = aim - columns @ x
-            noise[kind][axis] = max(float(np.sqrt(np.mean(off**2))), 0.1 * least[axis])
-        transition = float(
-            np.clip(transition + np.clip(x[_SHAPE_AT][0], -0.5 * transition, transition), low, high)
-        )
-        stribeck = float(
-            np.clip(stribeck + np.clip(x[_SHAPE_AT][1], -0.5 * stribeck, stribeck), transition, 1.0)
-        )
-    score = np.diag(prior**-2.0)
+        off = np.zeros((2, _AXES, len(windows.t)))
+        for one in rows:
+            left = one.aim - one.columns @ x[one.places]
+            off[one.kind, one.axis, one.chosen] = left
+            usual = 1.4826 * float(np.median(np.abs(left)))
+            noise[one.kind, one.axis] = max(usual, 0.1 * least[one.axis])
+        trust = 1.0 / (1.0 + np.max((off / (_TRUSTED * noise[:, :, None])) ** 2, axis=(0, 1)) ** 2)
+        steps = np.clip(x[_SHAPE_AT], [-0.5 * transition, -0.5 * stribeck], [transition, stribeck])
+        transition, stribeck = np.clip(np.add([transition, stribeck], steps), *bounds).tolist()
     parts = np.zeros((len(design.parts), len(x)))
-    external = np.zeros_like(windows.tau)
-    for kind, axis, columns, aim in rows:
-        off = aim - columns @ x
-        each = columns * (off / noise[kind][axis] ** 2)[:, None]
-        if kind:
-            external[:, axis] = off
-        else:
-            whole = np.zeros((len(windows.t), len(x)))
-            whole[design.moves(axis)] = each
-            each = whole
-        parts += np.add.reduceat(each, design.parts, axis=0)
+    for one in rows:
+        each = np.zeros((len(windows.t), len(one.places)))
+        left = trust[one.chosen] * off[one.kind, one.axis, one.chosen] / noise[one.kind, one.axis] ** 2
+        each[one.chosen] = one.columns * left[:, None]
+        parts[:, one.places] += np.add.reduceat(each, design.parts, axis=0)
     many = len(parts) / max(1, len(parts) - 1)
-    score += many * parts.T @ parts
-    covariance = inverse @ score @ inverse
+    covariance = inverse @ (np.diag(prior**-2.0) + many * parts.T @ parts) @ inverse
     # with few parts the scatter may be small by chance: at least what white noise gives
     more = np.sqrt(np.maximum(np.diagonal(inverse) / np.diagonal(covariance), 1.0))
     covariance *= np.outer(more, more)
-    return _Solution(x, covariance, transition, stribeck, external, has_load)
+    return _Solution(x, covariance, transition, stribeck, off[1].T, has_load)
 
 
-def _rows(
-    design: _Design, x: Array, transition: float, stribeck: float, held: Array
-) -> list[tuple[int, int, Array, Array]]:
-    """Rows of the torques: kind (0: excess, 1: external), axis, columns of all unknowns, what they have to give."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Equations of one axis.
+
+    Attributes:
+        kind: 0: commanded torques beyond those expected; 1: external torques.
+        axis: from 0.
+        places: of their unknowns among all, shape (k,).
+        columns: shape (c, k).
+        aim: what they have to give, shape (c,) [Nm].
+        chosen: their windows, shape (m,).
+    """
+
+    kind: int
+    axis: int
+    places: npt.NDArray[np.intp]
+    columns: Array
+    aim: Array
+    chosen: npt.NDArray[np.bool_]
+
+
+def _rows(design: _Design, x: Array, transition: float, stribeck: float, held: Array) -> list[_Rows]:
+    """The equations of the torques about a solution."""
     windows = design.windows
     curve = _curve(windows, transition, stribeck)
     faster = _curve(windows, 1.01 * transition, stribeck)
     longer = _curve(windows, transition, 1.01 * stribeck)
     found = []
+    load, shape = np.arange(_LOAD_AT.start, _LOAD_AT.stop), np.arange(_SHAPE_AT.start, _SHAPE_AT.stop)
     for axis in range(_AXES):
-        at = axis * _EACH
-        known = x[at : at + 4]
-        excess = np.zeros((len(windows.t), _SHAPE_AT.stop))
-        for place, one in enumerate((curve[0], curve[1], windows.dq, curve[2], windows.ddq)):
-            excess[:, at + place] = one[:, axis]
-        excess[:, _LOAD_AT] = design.by_load[:, axis]
-        for place, other, step in ((0, faster, transition), (1, longer, stribeck)):
-            by = sum(
-                known[index] * (other[curved] - curve[curved])[:, axis]
-                for index, curved in ((0, 0), (1, 1), (3, 2))
-            )
-            excess[:, _SHAPE_AT.start + place] = by / (0.01 * step)
-        moves = design.moves(axis)
-        found.append((0, axis, excess[moves], windows.excess[moves, axis]))
-        external = np.zeros((len(windows.t), _SHAPE_AT.stop))
-        external[:, at + 5], external[:, at + 6] = -1.0, -held[:, axis]
-        external[:, _LOAD_AT] = -design.by_load[:, axis]
-        found.append((1, axis, external, windows.tau_ext[:, axis]))
+        own = axis * _EACH + np.arange(_EACH)
+        known = dict(zip(_UNKNOWNS, x[own].tolist(), strict=True))
+        factors = (known["coulomb"], known["slow"], known["asymmetry"])
+        columns = [curve[0], curve[1], windows.dq, curve[2], windows.ddq]
+        by_shape = [
+            sum(by * (other[k] - curve[k])[:, axis] for k, by in enumerate(factors)) / (0.01 * speed)
+            for other, speed in ((faster, transition), (longer, stribeck))
+        ]
+        rows = np.column_stack([*(one[:, axis] for one in columns), design.by_load[:, axis], *by_shape])
+        moves = np.abs(windows.dq[:, axis]) > MOVING
+        places = np.concatenate([own[:5], load, shape])
+        found.append(_Rows(0, axis, places, rows[moves], windows.excess[moves, axis], moves))
+        rows = np.column_stack([-np.ones(len(windows.t)), -held[:, axis], -design.by_load[:, axis]])
+        every = np.ones(len(windows.t), dtype=bool)
+        found.append(_Rows(1, axis, np.concatenate([own[5:], load]), rows, windows.tau_ext[:, axis], every))
     return found
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.calibration.arm_estimate import LEAST_NOISE, estimate_arm
-from heptarm.calibration.arm_samples import ArmSamples, windows_of
+from heptarm.calibration.arm_samples import ArmSamples, aligned_windows
 from heptarm.errors import CommandRejected
-from heptarm.model.dynamics import GRAVITY, inverse_dynamics
+from heptarm.model.dynamics import GRAVITY, inverse_dynamics_rows
 from heptarm.record.recorded import RecordedData
 from heptarm.record.recording import load as load_recording
 from heptarm.values.checks import Array, Value, array, frozen, instance
@@ -123,7 +123,7 @@ def simulator(
 ) -> ArmFit:
     """Identify an arm from a recording, so that a virtual cabinet behaves like it.
 
-    Record the motions of `heptarm.calibration.excitation` at 1 kHz, with nothing that touches the arm, for a minute or
+    Record the motions of `heptarm.calibration.excitation` at 500 Hz or, by FRI, at 1 kHz, with nothing that touches the arm, for a minute or
     longer. Friction, rotors and load come from the commanded torques beyond those that the controller expects; offset,
     gain and noise of the torque sensors from the external torques; stiffness and delay from the distance between
     commanded and measured positions.
@@ -170,13 +170,13 @@ def validate(
     """
     model = instance(arm, FittedArm, "arm").model
     samples, _ = _samples(run, "run")
-    windows = windows_of(samples, delay=float(arm.value("state_delay", 0.0)[0])).thinned(_MOST)
-    fall = array(acceleration, 3, "acceleration")
+    delay, fall = float(arm.value("state_delay", 0.0)[0]), array(acceleration, 3, "acceleration")
+    windows = aligned_windows(samples, model, delay=delay, acceleration=fall).thinned(_MOST)
     used = None if declared is None else instance(declared, Body, "declared")
     load = arm.load if used is None else used if arm.load is None else used.joined(arm.load)
-    rows = list(zip(windows.q, windows.dq, windows.ddq, strict=True))
-    rigid = np.array([inverse_dynamics(model, *row, load=load, acceleration=fall) for row in rows])
-    expected = np.array([inverse_dynamics(model, *row, load=used, acceleration=fall) for row in rows])
+    moments = (windows.q, windows.dq, windows.ddq)
+    rigid = inverse_dynamics_rows(model, *moments, load=load, acceleration=fall)
+    expected = inverse_dynamics_rows(model, *moments, load=used, acceleration=fall)
     shown = rigid + arm.value("torque_gain", 0.0) * rigid + arm.value("torque_offset", 0.0)
     friction = np.zeros_like(rigid) if arm.friction is None else arm.friction.at(windows.dq)
     motor = rigid + friction + arm.value("rotor", 0.0) * windows.ddq

@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
+from heptarm.model.dynamics import inverse_dynamics_rows
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.values.checks import Array, Value, finite_entries, frozen, instance, numbers
+from heptarm.values.robot import RobotModel
 
 _AXES = 7
 #: Names of the arrays, here and in a recording.
@@ -28,6 +30,8 @@ _WINDOW, _FEWEST = 0.1, 15
 _SLOWEST = 190.0
 #: Least duration of the parts in which an axis moves [s], and the speed from which on it does [rad/s].
 _MOVED, MOVING = 3.0, 1e-3
+#: Shift by which the skew of the torques is found, and the largest skew [s].
+_SHIFT, _MOST_SKEW = 1e-3, 5e-3
 #: Time for which an axis must have moved in one direction, so that its joint is wound [s].
 WOUND = 0.3
 
@@ -93,7 +97,7 @@ class ArmSamples(Value):
             raise CommandRejected(
                 f"the recording must have {', '.join(_NAMES)}, it lacks {', '.join(lacking) or 'all states'}",
                 parameter="run",
-                hint='subscribe the groups "joints" and "torques" at 1000 Hz: arm.record(path, rate=1000)',
+                hint='subscribe the groups "joints" and "torques": arm.record(path, rate=500)',
             )
         # the controller's clock; the times of FRI cycles are those of their receipt
         stamps = np.asarray(run[f"{prefix}stamp"], dtype=np.float64)
@@ -171,12 +175,13 @@ class Windows:
         return 0.5 * len(self.t) * float(self.offsets[-1] - self.offsets[0])
 
 
-def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
+def windows_of(samples: ArmSamples, *, delay: float = 0.0, skew: float = 0.0) -> Windows:
     """Reduce samples to windows.
 
     Args:
         samples: what was recorded.
         delay: by which measured values come later than commanded ones [s].
+        skew: by which the torques of a state belong to an earlier moment than its positions [s].
 
     Raises:
         CommandRejected: the recording is too slow, or has too few states in a row.
@@ -186,7 +191,7 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
             f"the recording must have at least 200 states per second, got {samples.rate:.0f}",
             parameter="run",
             value=samples.rate,
-            hint="arm.record(path, rate=1000)",
+            hint="arm.record(path, rate=500)",
         )
     period = 1.0 / samples.rate
     count = max(_FEWEST, round(_WINDOW / period) // 2 * 2 + 1)
@@ -207,10 +212,15 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
     weights = _kernels(offsets)
     middle = starts + count // 2
 
+    later = _kernels(offsets - skew)[0] if skew else weights[0]
+
     def fitted(values: Array, order: int) -> Array:
         return np.asarray(np.einsum("k,mkj->mj", weights[order], values[index]))
 
-    tau, tau_ext = fitted(arrays["tau"], 0), fitted(arrays["tau_ext"], 0)
+    def torque(name: str) -> Array:
+        return np.asarray(np.einsum("k,mkj->mj", later, arrays[name][index]))
+
+    tau, tau_ext, tau_cmd = torque("tau"), torque("tau_ext"), torque("tau_cmd")
     dq = fitted(arrays["q"], 1)
     return Windows(
         samples.t[middle],
@@ -222,8 +232,8 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0) -> Windows:
         fitted(arrays["q_cmd"], 0) - fitted(arrays["q"], 0),
         tau,
         tau_ext,
-        fitted(arrays["tau_cmd"], 0) - tau - tau_ext,
-        fitted(arrays["tau_cmd"], 0),
+        tau_cmd - tau - tau_ext,
+        tau_cmd,
         _wound(samples.t[middle], dq),
         _noise(arrays["q"][index]),
         _noise(arrays["tau"][index]),
@@ -235,13 +245,36 @@ def _kernels(offsets: Array) -> tuple[Array, Array, Array]:
 
     The kernel is (1 - x²)³; its derivatives are exact for a parabola.
     """
-    x = offsets / (offsets[-1] + offsets[1] - offsets[0])
-    bell = 1.0 - x**2
+    x = 2.0 * offsets / (offsets[-1] - offsets[0] + 2.0 * (offsets[1] - offsets[0]))
+    bell = np.maximum(1.0 - x**2, 0.0)
     centre = bell**3 / (bell**3).sum()
     slope = x * bell**2
     bend = 4.0 * x**2 * bell - bell**2
     bend -= bend.sum() * centre
     return centre, slope / (slope @ offsets), 2.0 * bend / (bend @ offsets**2)
+
+
+def aligned_windows(
+    samples: ArmSamples, model: RobotModel, *, delay: float, acceleration: npt.ArrayLike
+) -> Windows:
+    """Reduce samples to windows, with the torques shifted to the positions that they belong to.
+
+    What the controller expects, measured plus external torques, leads or lags the torques of the rigid arm at the
+    positions by a part of a cycle, which differs between robots and rates.
+
+    Args:
+        samples: what was recorded.
+        model: the robot.
+        delay: by which measured values come later than commanded ones [s].
+        acceleration: of gravity in the base frame, shape (3,) [m/s²].
+    """
+    first, later = windows_of(samples, delay=delay), windows_of(samples, delay=delay, skew=_SHIFT)
+    rigid = inverse_dynamics_rows(model, first.q, first.dq, first.ddq, acceleration=acceleration)
+    slope = (later.tau + later.tau_ext - first.tau - first.tau_ext) / _SHIFT
+    missed = rigid - first.tau - first.tau_ext
+    # masses that are not heptarm's leave torques, too, but these do not go along with the slope
+    skew = float((slope * missed).sum()) / max(float((slope**2).sum()), 1e-9)
+    return windows_of(samples, delay=delay, skew=min(max(skew, -_MOST_SKEW), _MOST_SKEW))
 
 
 def _in_a_row(t: Array, period: float, count: int) -> npt.NDArray[np.intp]:

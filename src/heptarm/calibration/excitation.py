@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,18 +24,20 @@ from heptarm.values.text import lines
 
 _log = logging.getLogger("heptarm.calibration")
 
-#: Default duration [s], fraction of each axis' maximum in the fastest motion, and largest distance from the start [rad].
+#: Default duration [s], fraction of each axis' maximum in the fastest motion, largest distance from the start [rad].
 SECONDS, SPEED, REACH = 60.0, 0.4, 0.6
 #: Speeds of the motions in turn, by the fastest one: the slow ones show breakaway friction.
-_SPEEDS = (1.0, 0.25, 0.06, 0.5, 0.12, 0.02)
+_SPEEDS = (1.0, 0.06, 0.25, 0.02, 0.5, 0.12)
 #: The slow motions are shorter by this root of their speed, or they would take all of the time.
 _SHORTER = 0.7
+#: Part of the axes that change their direction in a motion.
+_TO_AND_FRO = 0.75
 #: Room that is left to the limits of the joints [rad].
 _ROOM = math.radians(5.0)
 #: Postures that are tried for a motion before the room is taken as too narrow.
 _TRIES = 40
-#: Rate of the recording [Hz].
-_RATE = 1000.0
+#: Rate of the recording, the most that a cabinet pushes [Hz]; an FRI session beside it adds its cycles at 1 kHz.
+_RATE = 500.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,28 +84,32 @@ class ExcitationPlan(Value):
         return lines(f"Identify the {self.robot.title}", rows)
 
 
-def candidates(
-    model: RobotModel, start: Array, *, reach: Array | float, seed: int
-) -> Iterator[tuple[Array, float]]:
-    """Endless postures around the first one, and the relative speed of the motion to each.
+def next_posture(
+    model: RobotModel,
+    start: Array,
+    before: Array,
+    *,
+    reach: Array | float,
+    turn: int,
+    random: np.random.Generator,
+) -> tuple[Array, float]:
+    """Draw the posture after one, and the relative speed of the motion to it.
 
     Args:
         model: the robot.
-        start: joint positions, shape (7,) [rad].
-        reach: the most by which an axis moves from there, one number or shape (7,) [rad].
-        seed: the same one gives the same postures.
+        start: middle of the range, shape (7,) [rad].
+        before: the posture where the motion begins, shape (7,) [rad].
+        reach: the most by which an axis moves from `start`, one number or shape (7,) [rad].
+        turn: number of the motion.
+        random: draws the posture.
     """
-    random, turn = np.random.default_rng(seed), 0
     low = np.maximum(start - reach, model.q_min + _ROOM)
     high = np.minimum(start + reach, model.q_max - _ROOM)
-    while True:
-        speed = _SPEEDS[turn % len(_SPEEDS)]
-        size = speed**_SHORTER
-        # the corners of the range move most; slow motions go less far, from wherever they begin
-        corner = np.where(random.random(7) < 0.5, low, high)
-        inside = start + size * random.uniform(0.6, 1.0, 7) * (corner - start)
-        yield np.clip(inside, np.minimum(low, start), np.maximum(high, start)), speed
-        turn += 1
+    speed = _SPEEDS[turn % len(_SPEEDS)]
+    # most axes turn back, but not all of them together
+    is_up = np.where(random.random(7) < _TO_AND_FRO, before < start, before >= start)
+    part = speed**_SHORTER * random.uniform(0.6, 1.0, 7)
+    return before + part * (np.where(is_up, high, low) - before), speed
 
 
 def excitation(
@@ -142,9 +148,13 @@ def excitation(
     for index, one in enumerate(far.tolist()):
         within(one, f"reach[{index}]", 0.05, 3.0, unit="rad")
     postures, speeds, duration = [np.asarray(arm.state.q_cmd)], list[float](), 0.0
-    tried = 0
-    for posture, part in candidates(model, postures[0], reach=far, seed=integer(seed, "seed", 0, 2**31)):
+    tried, goes_back = 0, False
+    random = np.random.default_rng(integer(seed, "seed", 0, 2**31))
+    while not goes_back or tried:
         goes_back = duration >= least and len(speeds) >= len(_SPEEDS)
+        posture, part = next_posture(
+            model, postures[0], postures[-1], reach=far, turn=len(speeds), random=random
+        )
         goal, one = (postures[0], fastest) if goes_back else (posture, part * fastest)
         taken = _duration(arm, postures[-1], goal, speed=one, collision_check=collision_check)
         if taken is None:
@@ -161,8 +171,6 @@ def excitation(
         postures.append(goal)
         speeds.append(one)
         duration += taken
-        if goes_back:
-            break
     places = np.array([forward(model, q)[:3, 3] for q in postures])
     return ExcitationPlan(
         model,

@@ -66,7 +66,7 @@ class ArmOptions:
     fitted: Annotated[
         Path | None,
         Parameter(
-            help="File of a measured arm, of heptarm calibrate arm: its friction, its stiffness in position control, the "
+            help="File of a measured arm, of heptarm calibrate arm: friction, stiffness in position control, the "
             "errors of its sensors. Default: what the simulator assumes."
         ),
     ] = DEFAULTS.fitted
