@@ -81,7 +81,7 @@ _MODEL = {
     "breakaway": 0.008,
     "viscous": 0.015,
     "rotor": 0.015,
-    "stiffness": 0.006,
+    "stiffness": 0.012,
     "transition": 0.01,
     "stribeck": 0.01,
     "torque_noise": 0.01,
