@@ -8,6 +8,7 @@ of a fitted arm by `save`.
 from heptarm.calibration.arm_fit import ArmFit, Validation, simulator, validate
 from heptarm.calibration.arm_samples import ArmSamples
 from heptarm.calibration.excitation import ExcitationPlan, excitation, record_excitation
+from heptarm.calibration.links import KinematicFit, kinematics
 from heptarm.calibration.load_estimate import IdentifiedLoad, LoadSamples, estimate_load
 from heptarm.calibration.load_motion import LoadPlan, load, load_plan
 from heptarm.calibration.tip import TcpEstimate, record_poses, tcp
@@ -20,12 +21,14 @@ __all__ = [
     "FittedArm",
     "FittedNumbers",
     "IdentifiedLoad",
+    "KinematicFit",
     "LoadPlan",
     "LoadSamples",
     "TcpEstimate",
     "Validation",
     "estimate_load",
     "excitation",
+    "kinematics",
     "load",
     "load_fitted",
     "load_plan",
