@@ -33,7 +33,7 @@ def identification() -> Iterator[Figure]:
 
 @benchmark("identification_sigma")
 def identification_sigma() -> Iterator[Figure]:
-    """Fraction of 100 arms, drawn at random, whose numbers are within two standard deviations of the identified ones."""
+    """Fraction of 100 arms, drawn at random, whose numbers are within two sigma of the identified ones."""
     along = trajectory(20.0)
     names = (
         "coulomb",

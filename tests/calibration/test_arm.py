@@ -9,16 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import heptarm as ha
 from heptarm import calibration
 from heptarm.calibration import ArmSamples, FittedArm
 from heptarm.calibration.load_estimate import load_regressor
+from heptarm.cli import calibrate
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.model.dynamics import GRAVITY
+from heptarm.rl.sim.randomisation import MILD, Randomisation
 from heptarm.sim.plant.plant import Plant, fitted_arm
 from heptarm.values.checks import Array
 from heptarm.values.robot import Body, robot
 from tests.calibration.hidden_arm import HIDDEN, IIWA, START, computed, drawn, number, recorded, trajectory
 from tests.long import longer
+from tests.simulators import FASTER
 
 Along = tuple[Array, Array, Array, Array, Array]
 TWO_SIGMA = (
@@ -215,3 +219,37 @@ def test_a_plant_of_another_arm_has_its_rotors() -> None:
     assert (Plant(fitted=FittedArm("iiwa14", (number("rotor", 0.4),))).model.dof_armature[:7] == 0.4).all()
     with pytest.raises(LimitError, match="too long for a stiffer one|must be in"):
         Plant(fitted=FittedArm("iiwa14", (number("stiffness", 45e3),)))
+
+
+@pytest.mark.long
+def test_a_virtual_cabinet_of_a_fitted_arm_is_identified_again(tmp_path: Path) -> None:
+    file = tmp_path / "my-arm.toml"
+    HIDDEN.save(file)
+    with ha.connect(f"sim://iiwa14?speed={FASTER:g}&fitted={file}", state_rate=500.0, timeout=30.0) as arm:
+        arm.move(ha.ptp(START))
+        plan = calibration.excitation(arm, seconds=20.0, collision_check=ha.CollisionModel("iiwa14"))
+        assert plan.is_checked and "none foreseen" in str(plan)
+        with pytest.raises(CommandRejected, match="nothing was moved"):
+            calibration.record_excitation(arm, tmp_path / "no.mcap", plan=plan, confirm=lambda plan: False)
+        run = calibration.record_excitation(arm, tmp_path / "run.mcap", plan=plan)
+    fit = calibration.simulator(run)
+    assert fit.validation.is_good
+    assert np.allclose(fit.arm["coulomb"].value, HIDDEN["coulomb"].value, rtol=0.05)
+    saved = tmp_path / "found.toml"
+    assert calibrate.arm(run, save=saved, validate=run) == 0
+    assert calibration.load_fitted(saved)["coulomb"] == fit.arm["coulomb"]
+
+
+def test_a_cabinet_refuses_a_file_that_is_not_right(tmp_path: Path) -> None:
+    with pytest.raises(ha.HeptarmError, match="cannot be read|no such file"):
+        ha.connect(f"sim://iiwa14?fitted={tmp_path / 'none.toml'}")
+
+
+def test_learning_takes_its_ranges_from_the_arm() -> None:
+    load = replace(number("load", [1.0, *[0.0] * 9]), sigma=np.full(10, 0.1))
+    late = replace(number("state_delay", 0.02), sigma=np.array([0.001]))
+    ranges = Randomisation.of_arm(FittedArm("iiwa14", (load, late)), period=0.015)
+    assert ranges.latency == (1, 2) and ranges.payload == pytest.approx((0.8, 1.2))
+    assert ranges.bandwidth == MILD.bandwidth
+    with pytest.raises(LimitError, match="period must be"):
+        Randomisation.of_arm(FittedArm("iiwa14"), period=0.0)

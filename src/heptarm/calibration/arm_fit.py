@@ -123,10 +123,10 @@ def simulator(
 ) -> ArmFit:
     """Identify an arm from a recording, so that a virtual cabinet behaves like it.
 
-    Record the motions of `heptarm.calibration.excitation` at 500 Hz or, by FRI, at 1 kHz, with nothing that touches the arm, for a minute or
-    longer. Friction, rotors and load come from the commanded torques beyond those that the controller expects; offset,
-    gain and noise of the torque sensors from the external torques; stiffness and delay from the distance between
-    commanded and measured positions.
+    Record the motions of `heptarm.calibration.excitation` at 500 Hz or, by FRI, at 1 kHz, with nothing that touches the
+    arm, for a minute or longer. Friction, rotors and load come from the commanded torques beyond those that the
+    controller expects; offset, gain and noise of the torque sensors from the external torques; stiffness and delay from
+    the distance between commanded and measured positions.
 
     Args:
         run: what was recorded: samples, a recording, or the name of its file.
