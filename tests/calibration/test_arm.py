@@ -237,7 +237,8 @@ def test_a_virtual_cabinet_of_a_fitted_arm_is_identified_again(tmp_path: Path) -
     assert np.allclose(fit.arm["coulomb"].value, HIDDEN["coulomb"].value, rtol=0.05)
     saved = tmp_path / "found.toml"
     assert calibrate.arm(run, save=saved, validate=run) == 0
-    assert calibration.load_fitted(saved)["coulomb"] == fit.arm["coulomb"]
+    assert calibration.load_fitted(saved)["coulomb"].value == pytest.approx(fit.arm["coulomb"].value)
+    assert fit.arm["coulomb"].date.startswith("20") and "run.mcap" in fit.arm["coulomb"].source
 
 
 def test_a_cabinet_refuses_a_file_that_is_not_right(tmp_path: Path) -> None:

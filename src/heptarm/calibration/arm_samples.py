@@ -6,9 +6,11 @@ signals holds between the filtered ones, too, whatever the jerk of a motion is.
 
 from __future__ import annotations
 
+import datetime
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -111,14 +113,22 @@ class ArmSamples(Value):
                 parameter="run",
                 hint="record an FRI session, whose cycles have them",
             )
-        date = str(run.facts.get("date", run.facts.get("begin", "")))
         q, q_cmd, tau, tau_ext, tau_cmd = (one[good] for one in rows)
-        return ArmSamples(times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=date)
+        return ArmSamples(times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=_written(run.path))
 
     @property
     def rate(self) -> float:
         """Samples per second [Hz]."""
         return 1.0 / float(np.median(np.diff(self.t)))
+
+
+def _written(path: Path) -> str:
+    """When a file was written, ISO 8601; empty: it is gone."""
+    try:
+        seconds = path.stat().st_mtime
+    except OSError:
+        return ""
+    return datetime.datetime.fromtimestamp(seconds, datetime.timezone.utc).isoformat(timespec="seconds")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
