@@ -76,8 +76,8 @@ def recorded(arm: FittedArm, seconds: float, *, seed: int = 0) -> ArmSamples:
 
 
 def _samples(table: Array) -> ArmSamples:
-    parts = [np.ascontiguousarray(table[:, 1 + 7 * i : 8 + 7 * i]) for i in range(5)]
-    return ArmSamples(table[:, 0].copy(), *parts)
+    q, q_cmd, tau, tau_ext, tau_cmd = np.split(table[:, 1:], 5, axis=1)
+    return ArmSamples(table[:, 0].copy(), q, q_cmd, tau, tau_ext, tau_cmd)
 
 
 #: Rate of samples that are computed without a simulator [Hz].

@@ -140,7 +140,7 @@ def test_a_push_is_named_and_left_out(along: Along) -> None:
 def test_what_cannot_be_identified_is_refused(samples: ArmSamples) -> None:
     def some(**changed: object) -> ArmSamples:
         names = ("t", "q", "q_cmd", "tau", "tau_ext", "tau_cmd")
-        return ArmSamples(**({name: getattr(samples, name)[:3000] for name in names} | changed))  # type: ignore[arg-type]
+        return ArmSamples(**({name: getattr(samples, name)[:3000] for name in names} | changed))
 
     still = np.tile(START, (3000, 1))
     with pytest.raises(CommandRejected, match=r"every axis must move for at least 3 s, got 0.0 s of A1"):

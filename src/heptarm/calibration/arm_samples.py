@@ -109,12 +109,14 @@ class ArmSamples(Value):
         good &= np.r_[True, np.diff(np.maximum.accumulate(times)) > 0.0]
         if good.sum() < 2 or not np.any(rows[-1][good]):
             raise CommandRejected(
-                "the recording has no commanded torques: friction cannot be told from the sensors' errors",
+                "the recording has no commanded torques: friction cannot be separated from the sensors' errors",
                 parameter="run",
                 hint="record an FRI session, whose cycles have them",
             )
         q, q_cmd, tau, tau_ext, tau_cmd = (one[good] for one in rows)
-        return ArmSamples(times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=_written(run.path))
+        return ArmSamples(
+            times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=_written(run.path)
+        )
 
     @property
     def rate(self) -> float:
@@ -269,8 +271,8 @@ def aligned_windows(
 ) -> Windows:
     """Reduce samples to windows, with the torques shifted to the positions that they belong to.
 
-    What the controller expects, measured plus external torques, leads or lags the torques of the rigid arm at the
-    positions by a part of a cycle, which differs between robots and rates.
+    What the controller expects, measured plus external torques, is ahead of the torques of the rigid arm at the
+    positions, or behind them, by a part of a cycle, which differs between robots and rates.
 
     Args:
         samples: what was recorded.

@@ -91,7 +91,7 @@ def load_regressor(
         Shape (7, 10): by mass, first moments x y z [kg m], inertia about the flange xx yy zz xy xz yz [kg m²].
     """
     rows = (array(one, _AXES, name)[None] for one, name in ((q, "q"), (dq, "dq"), (ddq, "ddq")))
-    return load_regressors(model, *rows, acceleration=acceleration)[0]
+    return np.asarray(load_regressors(model, *rows, acceleration=acceleration)[0])
 
 
 def load_regressors(
