@@ -30,8 +30,8 @@ _NUMBERS = 6
 _MEETS_ARM = 2
 #: Compliance of boxes, MuJoCo's time constant [s] and damping ratio.
 COMPLIANCE = (0.03, 1.0)
-#: How a contact grows harder with its depth, MuJoCo's `solimp`: 15 N of a tool go 0.1 to 0.2 mm deep, as its mounting is
-#: about that compliant. With MuJoCo's own, 0.9 at depth 0, it is micrometres, and what slides under a force hops.
+#: How a contact grows harder with its depth, MuJoCo's `solimp`: 15 N of a tool go 0.1 to 0.2 mm deep, as its mounting
+#: is about that compliant. With MuJoCo's own, 0.9 at depth 0, it is micrometres, and what slides under a force hops.
 ONSET = (0.0, 0.95, 0.0005, 0.5, 2.0)
 
 
