@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, require
+from heptarm.errors import require
 from heptarm.record.camera import Picture
 from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
 from heptarm.record.layout import (
@@ -44,6 +44,7 @@ from heptarm.record.layout import (
 )
 from heptarm.record.samples import RestWatch, StateSample, state_rows
 from heptarm.values.camera import Camera
+from heptarm.values.files import unwritable
 from heptarm.values.robot import known_robot
 from heptarm.wire import messages as wire
 
@@ -99,7 +100,7 @@ class RecordingFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("wb")
         except OSError as error:
-            raise _unwritable(path, error) from error
+            raise unwritable(path, error) from error
         self._epoch = epoch
         self._out: Any = writer.Writer(self._file, chunk_size=chunk)
         try:
@@ -107,7 +108,7 @@ class RecordingFile:
             self._begin(facts, arm)
         except OSError as error:
             self.abandon()
-            raise _unwritable(path, error) from error
+            raise unwritable(path, error) from error
 
     def beside(self, facts: Mapping[str, str], arm: str) -> RecordingFile:
         """A writer of another arm's part of the same file; `flush`, `finish` and `abandon` are left to this one."""
@@ -289,12 +290,3 @@ def sampling_times(stamps: npt.NDArray[np.int64], to_ours: Callable[[int], int])
     begin, end = to_ours(first), to_ours(last)
     rate = (end - begin) / (last - first) if last > first else 1.0
     return (begin + (stamps - first) * rate).astype(np.int64)
-
-
-def _unwritable(path: Path, error: OSError) -> CommandRejected:
-    return CommandRejected(
-        f"{path} cannot be written: {error.strerror}",
-        parameter="path",
-        value=str(path),
-        hint="choose a folder in which this user may write, on a disk that has space",
-    )
