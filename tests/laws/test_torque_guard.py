@@ -103,7 +103,7 @@ def test_at_the_end_the_torques_bring_the_arm_to_rest() -> None:
     assert not trial.error and np.abs(trial.final_speed).max() < 0.02
 
 
-@pytest.mark.parametrize("broken", [np.full(7, np.nan), np.full(7, np.inf)])
+@pytest.mark.parametrize("broken", [np.full(7, np.nan), np.full(7, np.inf), np.full(7, -5e302)])
 def test_without_positions_there_are_no_torques(broken: np.ndarray) -> None:
     made = guard()
     assert made.limit([50.0] * 7, q=broken, dq=STILL, period=PERIOD) == [0.0] * 7

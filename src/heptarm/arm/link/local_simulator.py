@@ -181,9 +181,7 @@ class PrivateCabinet:
             hint = "run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'"
             if wrong_option.is_set():
                 hint = f'correct the target "{target}"'
-            raise ConnectFailed(
-                f"{_NOT_STARTED}: {' | '.join(output) or 'no output'}", hint=hint
-            )
+            raise ConnectFailed(f"{_NOT_STARTED}: {' | '.join(output) or 'no output'}", hint=hint)
         for note in found.notes:
             _log.warning("%s", note)
         return cls(process, found.port, found.model, readers, replies, scene, positions)

@@ -16,7 +16,15 @@ from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
 from heptarm.arm.motion.program_request import CheckedProgram, ProgramTerms, checked
-from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, ShapeError, Timeout, require, system_errors
+from heptarm.errors import (
+    CollisionForeseen,
+    CommandRejected,
+    ModeConflict,
+    ShapeError,
+    Timeout,
+    require,
+    system_errors,
+)
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
