@@ -50,10 +50,17 @@ struct torque_guard {
 /* Part of the acceleration that a wrench can cause by which it plans to brake, and least planned deceleration: of that of the axis. */
 #define AUTHORITY 0.4
 #define LEAST_DECELERATION 0.02
-/* Weight of an exceeded range of accelerations: this is the square of an acceleration, over the speed of its axis, that is hardly
+/* Weight of a range of accelerations that is exceeded: the square of an acceleration, over the speed of its axis, that is hardly
    worth a wrench [1/s2]; largest number of sweeps, and change at which they end. */
 #define WRENCH_SLACK 1e-2
 #define WRENCH_SWEEPS 60
+/* Power that a wrench may still give the arm where an axis reaches its bound, none from a part of that beyond it [W]: in a singular
+   posture what brakes one axis would drive another one. */
+#define WRENCH_POWER 20.0
+#define WRENCH_OVER 0.1
+/* Singular value of the Jacobian below which a wrench moves the arm more slowly, and least fraction of its speed there. */
+#define NEAR_SINGULAR 0.1
+#define LEAST_FRACTION 0.3
 #define WRENCH_EXACT 1e-7
 
 /* While the arm brakes: time constant with which a motion decays [s], and fraction of the largest speed with which a spring that the
@@ -113,7 +120,7 @@ static inline void start_torque_guard(struct torque_guard *g) {
 struct reserve {
     double speed, distance, deceleration;
 };
-static const struct reserve of_torques = {GUARDED_SPEED, GUARDED_DISTANCE, 1.0}, of_wrench = {0.35, 0.03, 0.4};
+static const struct reserve of_torques = {GUARDED_SPEED, GUARDED_DISTANCE, 1.0}, of_wrench = {0.5, 0.03, 0.4};
 
 /* What a guard knows of a cycle.
 
@@ -238,15 +245,16 @@ static inline int guard_torques(struct torque_guard *g, const double *q, const d
    A quadratic program with slack, by dual coordinate ascent (Hildreth, "A quadratic programming procedure", 1957). A wrench has one
    direction less than the arm has joints, and its size is bounded: where no wrench keeps all ranges, it is the one that
    exceeds them least, relative to the speed of each axis.
-   effect: accelerations by the largest components of the wrench, over each axis' speed [1/s]; low, high: ranges, likewise.
+   effect: accelerations by the largest components of the wrench, over each axis' speed [1/s], then the power that they give the arm,
+      over WRENCH_POWER; low, high: ranges, likewise.
    wrench: fractions of the largest components; replaced. */
-static inline void nearest_wrench(double effect[N][6], const double *low, const double *high, double *wrench) {
-    double size[N], pull[N], push[6];
-    for (int i = 0; i < N; i++) size[i] = dot(effect[i], effect[i], 6) + WRENCH_SLACK, pull[i] = 0.0;
+static inline void nearest_wrench(double effect[N + 1][6], const double *low, const double *high, double *wrench) {
+    double size[N + 1], pull[N + 1], push[6];
+    for (int i = 0; i <= N; i++) size[i] = dot(effect[i], effect[i], 6) + WRENCH_SLACK, pull[i] = 0.0;
     for (int r = 0; r < 6; r++) push[r] = 0.0;
     for (int sweep = 0; sweep < WRENCH_SWEEPS; sweep++) {
         double largest = 0.0;
-        for (int i = 0; i < N; i++) {
+        for (int i = 0; i <= N; i++) {
             double now = dot(effect[i], wrench, 6) + WRENCH_SLACK * pull[i], up = (now - high[i]) / size[i], down = (now - low[i]) / size[i];
             /* one of the two multipliers is zero: positive ones are of the lower bound */
             double next = pull[i] - up < 0.0 ? pull[i] - up : pull[i] - down > 0.0 ? pull[i] - down : 0.0;
@@ -265,13 +273,32 @@ static inline void nearest_wrench(double effect[N][6], const double *low, const 
     }
 }
 
+/* Fraction of its bounds of the speeds that a wrench may use in a posture: near a singularity a small motion of the flange
+   becomes a large one of two axes against each other, which no wrench can brake.
+
+   By the smallest singular value of the Jacobian, from inverse iteration on its square. */
+static inline double fraction_near_singularity(double j[6][N]) {
+    double square[36], x[6], size = 1.0;
+    for (int r = 0; r < 6; r++) {
+        x[r] = 1.0;
+        for (int k = 0; k < 6; k++) square[6 * r + k] = dot(j[r], j[k], N);
+    }
+    if (!factorise(square, 6)) return LEAST_FRACTION;
+    for (int round = 0; round < 3; round++) {
+        for (int r = 0; r < 6; r++) x[r] /= size;
+        solve(square, 6, x);
+        size = sqrt(dot(x, x, 6));
+    }
+    return guard_clamp(1.0 / (sqrt(size) * NEAR_SINGULAR), LEAST_FRACTION, 1.0);
+}
+
 /* Limit a wrench on the flange [N, Nm], base axes, by the motion to which it leads; arguments and result as above.
 
    most: largest components of the wrench. */
 static inline int guard_wrench(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, const double *most,
                                double *wrench) {
     struct cycle c;
-    double j[6][N], tau[N], caused[6][N], effect[N][6], authority[N], low[N], high[N], target[6], sent[N];
+    double j[6][N], tau[N], caused[6][N], effect[N + 1][6], authority[N], low[N + 1], high[N + 1], target[6], sent[N], over = 0.0;
     if (!look(g, q, dq, &c)) {
         for (int r = 0; r < 6; r++) wrench[r] = 0.0;
         return 0;
@@ -289,7 +316,9 @@ static inline int guard_wrench(struct torque_guard *g, const double *q, const do
             tau[i] += j[r][i] * wrench[r];
         }
     }
-    int found = find_ranges(g, &of_wrench, authority, q, dq, dt, is_braking, tau, &c);
+    struct reserve kept = of_wrench;
+    kept.speed *= fraction_near_singularity(j);
+    int found = find_ranges(g, &kept, authority, q, dq, dt, is_braking, tau, &c);
     if (is_braking) { /* the wrench that is nearest to the decay of the motion */
         double square[36];
         for (int r = 0; r < 6; r++) {
@@ -305,6 +334,9 @@ static inline int guard_wrench(struct torque_guard *g, const double *q, const do
     }
     if (found || is_braking) {
         for (int i = 0; i < N; i++) low[i] = c.low[i] / g->dq_max[i], high[i] = c.high[i] / g->dq_max[i];
+        for (int i = 0; i < N; i++) over = fmax(over, (fabs(dq[i]) / g->dq_max[i] / kept.speed - 1.0) / WRENCH_OVER);
+        for (int r = 0; r < 6; r++) effect[N][r] = over > 0.0 ? dot(j[r], dq, N) * most[r] / WRENCH_POWER : 0.0;
+        low[N] = -INFINITY, high[N] = fmax(0.0, 1.0 - over);
         nearest_wrench(effect, low, high, target);
         for (int r = 0; r < 6; r++) wrench[r] = target[r] * most[r];
     }

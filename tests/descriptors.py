@@ -36,7 +36,7 @@ def spare(number: int) -> Iterator[None]:
 
 
 def refused_with_fewer(number: int, attempt: Callable[[], object]) -> None:
-    """Check that an attempt ends in an error of heptarm that names the remedy, with 0 up to so many descriptors less one.
+    """Check that an attempt with fewer descriptors than so many ends in an error of heptarm that names the remedy.
 
     Whatever it has opened is closed again after each attempt.
     """

@@ -27,7 +27,7 @@ from tests.descriptors import refused_with_fewer, spare
     ("number", "attempt"),
     [
         pytest.param(1, lambda: tcp.connect("127.0.0.1", 9, timeout=1.0), id="connection"),
-        pytest.param(1, lambda: tcp.TcpListener(), id="listener"),
+        pytest.param(1, tcp.TcpListener, id="listener"),
         pytest.param(1, lambda: UdpSocket(0), id="UDP"),
         pytest.param(1, lambda: own_address("127.0.0.1"), id="own address"),
         pytest.param(1, lambda: MemoryBlock(64), id="shared memory"),
