@@ -712,7 +712,8 @@ class Interpolator:
 
         Where an axis would get beyond its range for the sake of a faster one, each brakes as hard as it may; so do the
         axes of an overlay or of a servo motion in joint space, which have no path in common. Those of an overlay do so
-        as soon as the guard of the client expects. A jerk as gentle as that of a motion would take several degrees more.
+        as soon as the guard of the client expects: a jerk as gentle as that of a motion would take several degrees
+        more.
         """
         here, speed = self._command.after, self._command.speed
         is_apart = run.phase == "overlaid" or isinstance(run.follower, SmartFollower | DirectFollower)
