@@ -19,8 +19,8 @@ _MOST = 512
 @contextlib.contextmanager
 def spare(number: int) -> Iterator[None]:
     """Leave so many file descriptors to this process."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (min(soft, _MOST), hard))
+    usual, highest = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(usual, _MOST), highest))
     taken: list[int] = []
     try:
         with contextlib.suppress(OSError):
@@ -32,7 +32,7 @@ def spare(number: int) -> Iterator[None]:
     finally:
         for one in taken:
             os.close(one)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (usual, highest))
 
 
 def refused_with_fewer(number: int, attempt: Callable[[], object]) -> None:
