@@ -17,7 +17,7 @@ from typing import Annotated, NoReturn
 from cyclopts import App, CycloptsError, Parameter, UnknownOptionError, UnusedCliTokensError
 
 from heptarm import __version__
-from heptarm.errors import HeptarmError, missing_extra
+from heptarm.errors import HeptarmError, missing_extra, shortage
 
 #: Exit code after misuse of a command, as of other tools.
 _USAGE = 2
@@ -159,6 +159,11 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone, as in `heptarm state --watch | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        remedy = shortage(error)
+        if not remedy or os.environ.get("HEPTARM_DEBUG"):
+            raise
+        _fail(f"{(error.strerror or '').lower()} ({remedy})")
     sys.exit(code if isinstance(code, int) else 0)
 
 
