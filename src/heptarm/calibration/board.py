@@ -34,7 +34,7 @@ _SCENE = """<mujoco model="board">
   <asset>
     <texture name="board" type="2d" file="{picture}"/>
     <material name="board" texture="board" specular="0" shininess="0"/>
-    <mesh name="board" inertia="shell" vertex="{vertices}" texcoord="0 0 1 0 1 1 0 1" face="0 1 2 0 2 3"/>
+    <mesh name="board" inertia="shell" vertex="{vertices}" texcoord="0 0 1 0 1 1 0 1" face="0 2 1 0 3 2"/>
   </asset>
   <worldbody>
     <body name="{body}">
@@ -226,7 +226,7 @@ class Board:
             refuse_existing(one, overwrite=overwrite)
         image = require("PIL.Image", extra="vision").fromarray(self.picture(pixels=128))
         middle = self.centre + (0.0, 0.0, 0.5 * _PLATE)
-        numbers = {
+        numbers: dict[str, npt.ArrayLike] = {
             "vertices": self.outline - (0.0, 0.0, _ABOVE),
             "pos": at.xyz,
             "quat": np.roll(at.quat, 1),
@@ -277,7 +277,7 @@ class Board:
                 return np.zeros(0, np.int64), np.zeros((0, 2))
             return np.ravel(numbers).astype(np.int64), np.asarray(pixels, float).reshape(-1, 2)
         settings = cv.aruco.DetectorParameters()
-        settings.cornerRefinementMethod = cv.aruco.CORNER_REFINE_SUBPIX
+        settings.cornerRefinementMethod = cv.aruco.CORNER_REFINE_APRILTAG
         corners, tags, _ = cv.aruco.ArucoDetector(dictionary, settings).detectMarkers(gray)
         if tags is None:
             return np.zeros(0, np.int64), np.zeros((0, 2))

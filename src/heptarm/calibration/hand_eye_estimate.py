@@ -60,7 +60,36 @@ class HandEyeView(Value):
 
     def __post_init__(self) -> None:
         check_pose(self.flange, "flange")
-        instance(self.sighting, Sighting, "sighting", hint="what board.find(picture) returns, unless it is None")
+        instance(
+            self.sighting, Sighting, "sighting", hint="what board.find(picture) returns, unless it is None"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class HandEyeGuess:
+    """Parameters about which the least squares are linear.
+
+    Attributes:
+        camera: in its frame.
+        board: in the other one.
+        lens: focal lengths, centre, k1, k2, shape (6,).
+        rest: p1, p2, k3.
+    """
+
+    camera: Pose
+    board: Pose
+    lens: Array
+    rest: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def moved(self, step: Array) -> HandEyeGuess:
+        """The parameters after a step: translations in the frame's axes, rotations about them, then the lens."""
+        lens = self.lens.copy()
+        lens[: len(step) - _POSES] += step[_POSES:]
+        return HandEyeGuess(_moved(self.camera, step[:6]), _moved(self.board, step[6:12]), lens, self.rest)
+
+
+def _moved(pose: Pose, step: Array) -> Pose:
+    return Pose.of(pose.xyz + step[:3], (Pose.from_rotvec((0, 0, 0), step[3:]) @ pose).quat)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +121,14 @@ class HandEyeEstimate(Value):
     predicted: Array
     predicted_m: Array
     worst: int
+
+    @property
+    def guess(self) -> HandEyeGuess:
+        """Its numbers as parameters of `HandEyeModel`."""
+        (fx, _, cx), (_, fy, cy), _ = self.matrix.tolist()
+        k1, k2, p1, p2, k3 = self.distortion.tolist()
+        lens = np.array([fx, fy, cx, cy, k1, k2])
+        return HandEyeGuess(self.pose, self.board, lens, (p1, p2, k3))
 
     @property
     def rms(self) -> float:
@@ -129,33 +166,6 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-@dataclass(frozen=True, slots=True)
-class _Guess:
-    """Parameters about which the least squares are linear.
-
-    Attributes:
-        camera: in its frame.
-        board: in the other one.
-        lens: focal lengths, centre, k1, k2, shape (6,).
-        rest: p1, p2, k3.
-    """
-
-    camera: Pose
-    board: Pose
-    lens: Array
-    rest: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def moved(self, step: Array) -> _Guess:
-        """The parameters after a step: translations in the frame's axes, rotations about them, then the lens."""
-        lens = self.lens.copy()
-        lens[: len(step) - _POSES] += step[_POSES:]
-        return _Guess(_moved(self.camera, step[:6]), _moved(self.board, step[6:12]), lens, self.rest)
-
-
-def _moved(pose: Pose, step: Array) -> Pose:
-    return Pose.of(pose.xyz + step[:3], (Pose.from_rotvec((0, 0, 0), step[3:]) @ pose).quat)
-
-
 class HandEyeModel:
     """Where corners of a board are in pictures, for given flanges.
 
@@ -174,18 +184,22 @@ class HandEyeModel:
         self._shifts = np.array([one.xyz for one in given])
         self._points = np.concatenate([np.asarray(one) for one in points])
 
-    def seen(self, guess: _Guess) -> tuple[Array, Array]:
+    def seen(self, guess: HandEyeGuess) -> tuple[Array, Array]:
         """Pixels of all corners, shape (n, 2), and their distances along the optical axis, shape (n,) [m]."""
         at = self._in_camera(guess)[1]
         return _projected(at, guess)[0], at[:, 2]
 
-    def _in_camera(self, guess: _Guess) -> tuple[Array, Array]:
+    def _in_camera(self, guess: HandEyeGuess) -> tuple[Array, Array]:
         """All corners in the axes of the camera's frame, from the camera's place, and in the camera, shape (n, 3)."""
         at = self._points @ guess.board.rotation.T + guess.board.xyz
-        at = np.einsum("nij,nj->ni", self._turns[self.places], at) + self._shifts[self.places] - guess.camera.xyz
+        at = (
+            np.einsum("nij,nj->ni", self._turns[self.places], at)
+            + self._shifts[self.places]
+            - guess.camera.xyz
+        )
         return at, at @ guess.camera.rotation
 
-    def jacobian(self, guess: _Guess, count: int) -> Array:
+    def jacobian(self, guess: HandEyeGuess, count: int) -> Array:
         """Derivatives of the pixels by a step of so many parameters, shape (n, 2, count)."""
         beside, at = self._in_camera(guess)
         into, turn = guess.camera.rotation.T, self._turns[self.places]
@@ -208,7 +222,7 @@ def _crossing(vectors: Array) -> Array:
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
-def _projected(at: Array, guess: _Guess) -> tuple[Array, Array, Array]:
+def _projected(at: Array, guess: HandEyeGuess) -> tuple[Array, Array, Array]:
     """Pixels of points in the camera, shape (n, 2), and their derivatives by the points and by the lens.
 
     The lens is OpenCV's: radial distortion k1 k2 k3 and tangential p1 p2 (Brown, 1966).
@@ -230,7 +244,10 @@ def _projected(at: Array, guess: _Guess) -> tuple[Array, Array, Array]:
     ]
     by_point = np.moveaxis(np.array(rows) / depth, 2, 0)
     none, one = np.zeros_like(x), np.ones_like(x)
-    of_lens = [[u, none, one, none, fx * x * r, fx * x * r * r], [none, v, none, one, fy * y * r, fy * y * r * r]]
+    of_lens = [
+        [u, none, one, none, fx * x * r, fx * x * r * r],
+        [none, v, none, one, fy * y * r, fy * y * r * r],
+    ]
     return np.column_stack([fx * u + cx, fy * v + cy]), by_point, np.moveaxis(np.array(of_lens), 2, 0)
 
 
@@ -270,11 +287,11 @@ def estimate_hand_eye(
     is_refined = matrix is None if refine is None else flag(refine, "refine")
     given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
     _check_turns([one.flange for one in given])
-    lens = _first_matrix(given) if matrix is None else intrinsic(matrix)
+    lens = first_matrix(given) if matrix is None else intrinsic(matrix)
     seen = [_board_pose(one.sighting, lens, rest) for one in given]
     camera = _closed_form([one.flange if frame == "flange" else one.flange.inverse() for one in given], seen)
     first = given[0].flange if frame == "flange" else given[0].flange.inverse()
-    guess = _Guess(
+    guess = HandEyeGuess(
         camera,
         first @ camera @ seen[0],
         np.array([lens[0, 0], lens[1, 1], lens[0, 2], lens[1, 2], rest[0], rest[1]]),
@@ -332,7 +349,7 @@ def _check_turns(flanges: Sequence[Pose]) -> None:
         )
 
 
-def _first_matrix(views: Sequence[HandEyeView]) -> Array:
+def first_matrix(views: Sequence[HandEyeView]) -> Array:
     """Intrinsic matrix from the views alone (Zhang, 2000, by OpenCV)."""
     cv: Any = require("cv2", extra="vision")
     points = [one.sighting.points.astype(np.float32) for one in views]
@@ -375,7 +392,7 @@ def _closed_form(flanges: Sequence[Pose], boards: Sequence[Pose]) -> Pose:
     return Pose.from_matrix(np.column_stack([turn, shift]))
 
 
-def _solved(model: HandEyeModel, pixels: Array, guess: _Guess, count: int, loss: str) -> _Guess:
+def _solved(model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int, loss: str) -> HandEyeGuess:
     """The parameters with the least distances in the pictures."""
     optimize: Any = require("scipy.optimize", extra="vision")
 
@@ -392,7 +409,9 @@ def _solved(model: HandEyeModel, pixels: Array, guess: _Guess, count: int, loss:
     return guess.moved(found.x)
 
 
-def _judged(model: HandEyeModel, pixels: Array, guess: _Guess, count: int, frame: str) -> HandEyeEstimate:
+def _judged(
+    model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int, frame: str
+) -> HandEyeEstimate:
     """The estimate with what a jackknife over the views says of it.
 
     Raises:

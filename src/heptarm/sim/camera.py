@@ -116,8 +116,8 @@ class ArmCamera:
             self._model.geom_bodyid, (self._model.nbody, -1)
         )  # what was added to the scene; nothing
         is_geom, is_added = kinds == mujoco.mjtObj.mjOBJ_GEOM, kinds == mujoco.mjtObj.mjOBJ_UNKNOWN
-        index = np.where(is_geom, geoms, np.where(is_added & (geoms >= 0), -2, -1))
-        return np.asarray(bodies[index], np.int16)
+        chosen = np.where(is_geom, geoms, np.where(is_added & (geoms >= 0), -2, -1))
+        return np.asarray(bodies[chosen], np.int16)
 
     def _add_shapes(self) -> None:
         """Add what is on the flange to what is drawn."""
