@@ -48,7 +48,11 @@ def test_a_simulated_camera_gives_pictures_depth_and_labels_of_the_states(peer: 
         assert first.pixels.shape == (120, 160, 3) and first.pixels.dtype == np.uint8
         np.testing.assert_allclose(first.q, UPRIGHT, atol=1e-6)
         assert first.flange == ha.Pose.from_matrix(model.forward(arm.robot, first.q))
-        assert first.pose == camera.pose and np.array_equal(first.matrix, camera.matrix)
+        assert (
+            first.pose == camera.pose
+            and first.matrix is not None
+            and np.array_equal(first.matrix, camera.matrix)
+        )
         v, u = np.argwhere(first.mask("cube")).mean(axis=0)
         np.testing.assert_allclose(first.pixel((0.55, 0.0, 0.22)), (u, v), atol=1.5)
         np.testing.assert_allclose(first.point(u, v)[:2], (0.55, 0.0), atol=0.02)
@@ -88,12 +92,13 @@ def test_noise_blur_latency_and_a_camera_on_the_flange(peer: Peer) -> None:
 
 
 def test_a_function_is_a_camera(peer: Peer) -> None:
-    gate, taken = threading.Semaphore(0), []
+    gate = threading.Semaphore(0)
+    taken: list[None] = []
 
     def read() -> tuple[bool, np.ndarray]:
         gate.acquire()
         taken.append(None)
-        return True, np.full((4, 6, 3), len(taken), np.uint8)
+        return True, np.full((4, 6, 3), np.uint8(len(taken)), np.uint8)
 
     matrix = np.array([[10.0, 0, 2.5], [0, 10.0, 1.5], [0, 0, 1]])
     at = ha.Pose.at(0, 0, 0.05)
@@ -156,7 +161,7 @@ def test_what_makes_no_sense_is_refused(peer: Peer) -> None:
             ({"source": ha.Camera(), "latency": 10.0}, LimitError, r"latency must be in \[0, 2\] s"),
         ):
             with pytest.raises(error, match=words):
-                arm.camera(**given)  # type: ignore[arg-type]
+                arm.camera(**given)
         arm.subscribe(rate=100, groups=("motion",))
         with pytest.raises(StaleState, match='pictures need the state group "joints"'):
             arm.camera(print)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,8 @@ import heptarm as ha
 from heptarm import calibration, model
 from heptarm.calibration import Board, HandEyeView, Sighting, estimate_hand_eye
 from heptarm.calibration.hand_eye_estimate import HandEyeGuess, HandEyeModel
+from heptarm.cli.calibrate_eye import board, eye
+from heptarm.cli.options import Access, CommandTarget
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.robot import robot
 from tests.drawing import cannot_draw
@@ -228,6 +231,37 @@ def test_the_arm_measures_its_camera(frame: Frame, tmp_path: Path) -> None:
             calibration.hand_eye(arm, stream, Board(kind="apriltag"))
         found = calibration.hand_eye(arm, stream, BOARD, views=10, speed=1.0)
         np.testing.assert_allclose(arm.state.q_cmd, HOME, atol=1e-6)
+        if frame == "base":  # the command on the same cabinet
+            _command_measures_the_same(arm, camera, tmp_path)
     off = errors(found, camera.pose)
     assert np.linalg.norm(off[:3]) < 0.5e-3 and np.linalg.norm(off[3:]) < math.radians(0.08)
     assert len(found.residuals) >= 9 and found.rms < 0.3 and not found.is_suspect
+
+
+def _command_measures_the_same(arm: ha.Arm, camera: ha.Camera, folder: Path) -> None:
+    arm.release_control()
+    cabinet = arm.connection.cabinet
+    assert cabinet is not None
+    target = CommandTarget(text=f"sim://{cabinet.host}:{cabinet.port}")
+    given: dict[str, Any] = {
+        f"camera_{name}": ",".join(map(str, getattr(camera, name))) for name in ("place", "target")
+    }
+    given |= {"camera_frame": "base", "camera_scene": str(folder / "board.xml"), "camera_size": "640x480"}
+    eye(camera="sim", speed=1.0, views=9, out=folder / "eye.json", access=Access(target=target), **given)
+    result = json.loads((folder / "eye.json").read_text())
+    assert result["frame"] == "base" and not result["suspect"]
+    np.testing.assert_allclose(result["camera"][:3], camera.pose.xyz, atol=1e-3)
+
+
+def test_the_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert board(tmp_path / "tags.pdf", kind="apriltag", columns=4, rows=3, square=0.05) == 0
+    assert "4 by 3 AprilTags of 50 mm, markers of 37.5 mm, 200 by 150 mm" in capsys.readouterr().out
+    for given, words in (
+        ({"camera": "/dev/nowhere.avi"}, "cannot be opened"),
+        ({"camera": "0", "camera_place": "1,0,1"}, "are of a simulated camera"),
+        ({"camera": "sim", "camera_place": "1,0"}, "camera-place must be X,Y,Z in metres"),
+        ({"camera": "sim", "lens": "600"}, "lens must be FX,FY,CX,CY in pixels"),
+        ({"camera": "sim", "out": tmp_path / "tags.pdf"}, "exists"),
+    ):
+        with pytest.raises(CommandRejected, match=words):
+            eye(**given)  # type: ignore[arg-type]

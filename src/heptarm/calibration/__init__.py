@@ -1,7 +1,8 @@
 """Calibration with the arm itself: the tip of a tool (TCP), its load data, and where a camera is (hand-eye).
 
 Poses, joint positions, torques and pictures come in; an estimate goes out, with the standard deviation of each
-number. Nothing is changed by measuring: an estimate becomes a `Tool` by `to_tool`, and a tool of a saved target by `save`.
+number. Nothing is changed by measuring: an estimate becomes a `Tool` by `to_tool`, and a tool of a saved target by
+`save`.
 """
 
 from heptarm.calibration.board import Board, Sighting
