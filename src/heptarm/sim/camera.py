@@ -35,14 +35,15 @@ from heptarm.values.shape import Shape
 _QUALITY = 85
 #: Width and height of the map of shadows [pixels]: without a graphics card a larger one takes longer than the picture.
 _SHADOW_SIZE = 1024
-#: Added to the priority's number: whatever controls an arm goes first.
-_NICENESS = 10
+#: Added to the priority's number, of live pictures and of those of a recording: whatever controls an arm goes first,
+#: then a program that waits for a picture.
+_NICENESS = (3, 10)
 #: Fraction of the farthest distance that is drawn, from which on there is nothing.
 _NOTHING = 0.999
 #: Name among the labels of what is on the flange and no body of the model.
 FLANGE_LOAD = "on the flange"
-#: Shapes that a scene for the eye has room for, beside those of the model.
-_MOST_GEOMS = 2000
+#: Shapes that a scene for the eye has room for, beside those of the model; to look at its shapes takes time for each.
+_MORE_GEOMS = 100
 
 
 class ArmCamera:
@@ -66,7 +67,9 @@ class ArmCamera:
         self._has_tool = is_mounted(model)
         self._option = mujoco.MjvOption()
         self._option.sitegroup[:] = 0
-        self._renderer = mujoco.Renderer(model, height, width, max_geom=_MOST_GEOMS)
+        self._renderer = mujoco.Renderer(
+            model, height, width, max_geom=model.ngeom + model.nsite + _MORE_GEOMS
+        )
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = camera.shadows
         self._noise = np.random.default_rng(0)
         self.shapes: tuple[tuple[Shape, Pose], ...] = ()
@@ -106,9 +109,8 @@ class ArmCamera:
 
     def labels(self) -> npt.NDArray[np.int16]:
         """Index in `names` of what each pixel shows, shape (height, width); -1 where there is nothing."""
-        scene = self._renderer.scene
-        for index in range(scene.ngeom):
-            scene.geoms[index].segid = index
+        for index, geom in enumerate(self._renderer.scene.geoms[: self._renderer.scene.ngeom]):
+            geom.segid = index
         self._renderer.enable_segmentation_rendering()
         geoms, kinds = np.moveaxis(self._renderer.render(), 2, 0)
         self._renderer.disable_segmentation_rendering()
@@ -126,15 +128,16 @@ class ArmCamera:
         for one, pose in self.shapes:
             if scene.ngeom >= scene.maxgeom:
                 return
+            geom = scene.geoms[scene.ngeom]
             mujoco.mjv_initGeom(
-                scene.geoms[scene.ngeom],
+                geom,
                 GEOMS[one.kind],
                 mujoco_size(one.kind, one.size),
                 flange.xpos + turn @ pose.xyz,
                 (turn @ pose.rotation).reshape(-1),
                 np.array(COLOUR, np.float32),
             )
-            scene.geoms[scene.ngeom].objid = 0  # beside the unknown type that it has: something, not nothing
+            geom.objid = 0  # beside the unknown type that it has: something, not nothing
             scene.ngeom += 1
 
 
@@ -180,7 +183,7 @@ def main(arguments: Sequence[str]) -> int:
         os.dup2(nowhere, stream)
     settings = json.loads(arguments[0])
     with contextlib.suppress(AttributeError, OSError):  # not on Windows
-        os.nice(_NICENESS)
+        os.nice(_NICENESS["jpeg" in settings["layers"]])
     try:
         camera = _opened(settings)
     except Exception as error:  # drivers fail in many ways; all of them are reported

@@ -343,7 +343,7 @@ class CameraStream(Sealed, Iterator[Picture]):
         """Pictures of a simulated camera that were due while the one before was being drawn."""
         return self._source.dropped
 
-    def read(self, *, timeout: float = 10.0, after: int = 0) -> Picture:
+    def read(self, *, timeout: float = 30.0, after: int = 0) -> Picture:
         """The newest picture; waits until there is one that this method has not returned yet.
 
         Args:
