@@ -109,15 +109,13 @@ class ArmCamera:
 
     def labels(self) -> npt.NDArray[np.int16]:
         """Index in `names` of what each pixel shows, shape (height, width); -1 where there is nothing."""
-        for index, geom in enumerate(self._renderer.scene.geoms[: self._renderer.scene.ngeom]):
-            geom.segid = index
         self._renderer.enable_segmentation_rendering()
         geoms, kinds = np.moveaxis(self._renderer.render(), 2, 0)
         self._renderer.disable_segmentation_rendering()
         bodies = np.append(
             self._model.geom_bodyid, (self._model.nbody, -1)
         )  # what was added to the scene; nothing
-        is_geom, is_added = kinds == mujoco.mjtObj.mjOBJ_GEOM, kinds == mujoco.mjtObj.mjOBJ_UNKNOWN
+        is_geom, is_added = kinds == int(mujoco.mjtObj.mjOBJ_GEOM), kinds == int(mujoco.mjtObj.mjOBJ_UNKNOWN)
         chosen = np.where(is_geom, geoms, np.where(is_added & (geoms >= 0), -2, -1))
         return np.asarray(bodies[chosen], np.int16)
 
@@ -125,10 +123,11 @@ class ArmCamera:
         """Add what is on the flange to what is drawn."""
         scene, flange = self._renderer.scene, self._data.site("flange")
         turn = flange.xmat.reshape(3, 3)
+        geoms = scene.geoms if self.shapes else ()  # each look at them takes long
         for one, pose in self.shapes:
             if scene.ngeom >= scene.maxgeom:
                 return
-            geom = scene.geoms[scene.ngeom]
+            geom = geoms[scene.ngeom]
             mujoco.mjv_initGeom(
                 geom,
                 GEOMS[one.kind],
@@ -137,7 +136,7 @@ class ArmCamera:
                 (turn @ pose.rotation).reshape(-1),
                 np.array(COLOUR, np.float32),
             )
-            geom.objid = 0  # beside the unknown type that it has: something, not nothing
+            geom.objid, geom.segid = 0, scene.ngeom  # of an unknown type, and yet something
             scene.ngeom += 1
 
 
