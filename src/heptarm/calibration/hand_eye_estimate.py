@@ -265,7 +265,7 @@ def estimate_hand_eye(
 
     Args:
         views: four or more, six to refine the lens; twelve are good.
-        frame: "flange": the camera moves with the arm; "base": it stands beside it, and the board is on the flange.
+        frame: "flange": the camera moves with the arm; "base": it is beside the arm, and the board is on the flange.
         matrix: intrinsic matrix, shape (3, 3) [pixels]; None: from the views.
         distortion: k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
         refine: estimate focal lengths, centre, k1 and k2, too; None: if there is no matrix.
@@ -300,7 +300,7 @@ def estimate_hand_eye(
     model = HandEyeModel([one.flange for one in given], [one.sighting.points for one in given], frame)
     pixels = np.concatenate([one.sighting.pixels for one in given])
     count = _POSES + (_LENS if is_refined else 0)
-    for loss in ("soft_l1", "linear"):  # a wrong corner spoils the first steps otherwise
+    for loss in ("huber", "linear"):  # a wrong corner spoils the first steps otherwise
         guess = _solved(model, pixels, guess, count, loss)
     return _judged(model, pixels, guess, count, frame)
 
@@ -412,7 +412,7 @@ def _solved(model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int,
 def _judged(
     model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int, frame: str
 ) -> HandEyeEstimate:
-    """The estimate with what a jackknife over the views says of it.
+    """The estimate with the results of a jackknife over the views.
 
     Raises:
         CommandRejected: the views do not determine the camera.

@@ -117,7 +117,7 @@ def hand_eye(
 
     Begin where the camera sees the whole board, from the front, as large as it may become. What moves is logged, and
     shown to `confirm`, before it moves: first small turns of the flange, then the postures that were chosen. Each
-    motion is planned before, as `arm.plan` does, within `arm.workspace`; a posture on whose way `arm.collision_check`
+    motion is planned before, as `arm.plan` does, within `arm.workspace`; a posture on whose path `arm.collision_check`
     finds bodies that would touch is left out.
 
     Args:
@@ -239,7 +239,7 @@ class _Mover:
         return self._arm.find_path(q, avoid=self._avoid, speed=self._speed)
 
     def _passable(self, postures: Sequence[Array], start: Array) -> Iterator[Array]:
-        """The postures in an order of short ways, without those to or from which the arm cannot move."""
+        """The postures in an order of short motions, without those to or from which the arm cannot move."""
         left, here = list(postures), start
         while left:
             nearest = min(range(len(left)), key=lambda index: float(np.abs(left[index] - here).max()))

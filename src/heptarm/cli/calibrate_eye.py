@@ -28,7 +28,7 @@ from heptarm.values.camera import Camera
 from heptarm.values.files import refuse_existing, unwritable
 
 _ACCESS = Access()
-#: What `--camera` says of a simulated camera.
+#: The value of `--camera` for a simulated camera.
 _SIMULATED = "sim"
 
 Kind = Annotated[

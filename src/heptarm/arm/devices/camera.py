@@ -202,7 +202,7 @@ class CalledSource:
                     continue
                 last = given
                 pixels = _pixels(given)
-            except Exception as error:  # it is yours and may raise anything; whoever reads pictures gets it
+            except Exception as error:  # it is yours and may raise anything; the next read raises it
                 text = error.text if isinstance(error, HeptarmError) else f"{type(error).__name__}: {error}"
                 self._failure = CommandRejected(
                     f"the function of the camera gives no picture: {text}",
