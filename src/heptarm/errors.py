@@ -362,6 +362,7 @@ EXTRAS = {
     "record": ("mcap", "pandas", "pyarrow", "plotly"),
     "devices": ("evdev", "pyspacemouse"),
     "rerun": ("rerun",),
+    "vision": ("cv2", "scipy"),
 }
 
 

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import require
-from heptarm.record.camera import Picture
+from heptarm.record.camera import DrawnPicture
 from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
 from heptarm.record.layout import (
     CAMERA_CALIBRATION,
@@ -215,7 +215,7 @@ class RecordingFile:
             at = received + self._epoch
             self._out.add_message(self._cycles, at, data[index * size : (index + 1) * size], at)
 
-    def picture(self, camera: Camera, picture: Picture) -> None:
+    def picture(self, camera: Camera, picture: DrawnPicture) -> None:
         """Write a picture, how the camera projects, and the camera's frame: z ahead, x to the right, y down."""
         if self._camera is None:
             image = self._add("/camera/image", *COMPRESSED_IMAGE)

@@ -79,6 +79,7 @@ from heptarm.sim.plant.drive_monitor import DriveMonitor
 from heptarm.sim.plant.drives import Drives
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.flange_load import FlangeLoad
+from heptarm.sim.plant.free_bodies import FreeBodies
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.native import DONE, ELSEWHERE, LOADED, NativeTick
@@ -217,6 +218,7 @@ class Plant:
         LimitError: the fitted arm is too stiff to be simulated with its rotors.
 
     Attributes:
+        bodies: the free bodies of the scene, which can be placed.
         submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
     """
 
@@ -252,6 +254,7 @@ class Plant:
         self._load = ExternalLoad(self.model, self.data, arm)
         bare = compiled(model) if is_mounted(self.model) else None
         self._carried = FlangeLoad(self.model, self.data, arm.mass, bare=bare, limits=limits)
+        self.bodies = FreeBodies(self.model, self.data)
         self._gripper: SimulatedGripper | None = None
         if scene is not None and has_gripper(self.model):
             self._gripper = SimulatedGripper(self.model, self.data, self.signals, scene.wiring)
@@ -429,6 +432,7 @@ class Plant:
         """Whether nothing has happened since the last tick that the next one has to look at."""
         return not (
             self._carried.has_changed
+            or self.bodies.has_changed
             or self._load.is_pushed
             or self.safety.flags != self._foreseen
             or self.interpolator.is_disturbed
@@ -472,6 +476,7 @@ class Plant:
         """Compute the next tick: set-point, control law, dynamics."""
         if self._carried.has_changed:
             self._take_loads()
+        self.bodies.take()
         progress, remaining = self._advance()
         if self._gripper is not None:
             self._gripper.tick()

@@ -199,7 +199,12 @@ def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
     if camera.frame == "flange":
         flange = spec.site("flange")
         body, pose = flange.parent, Pose.of(flange.pos, np.roll(flange.quat, -1)) @ pose
-    body.add_camera(name=CAMERA, pos=pose.xyz, quat=np.roll(pose.quat, 1), fovy=degrees(camera.fov))
+    added = body.add_camera(name=CAMERA, pos=pose.xyz, quat=np.roll(pose.quat, 1), fovy=degrees(camera.fov))
+    if camera.principal is not None:
+        focal, size, matrix = camera.matrix[0, 0], np.array(camera.size), camera.matrix
+        added.resolution, added.sensor_size = size, size / focal
+        added.focal_pixel = (focal, focal)
+        added.principal_pixel = 0.5 * (size - 1.0) - matrix[:2, 2]
 
 
 def _add_arm(spec: mujoco.MjSpec, arm: OtherArm, meshes: ArmMeshes | None) -> None:
