@@ -69,9 +69,11 @@ class Forks:
 
     def close(self) -> None:
         """End the process; what it has started goes on."""
-        if self._line is not None and self._process is not None:
-            self._line.close()
-            self._process.wait()
+        with self._lock:
+            if self._line is not None and self._process is not None:
+                self._line.close()
+                self._process.wait()
+                self._line = self._process = None
 
     def suits(self, environment: Mapping[str, str]) -> bool:
         """Whether a program with this environment may run in a fork."""
@@ -152,7 +154,7 @@ def _serve(line: socket.socket) -> dict[str, Any]:
         if not (between := os.fork()):
             if number := os.fork():
                 os.write(send, str(number).encode())
-                os._exit(0)  # so that whoever asks becomes its parent
+                os._exit(0)  # so that the process that asks becomes its parent
             for file in (received, send):
                 os.close(file)
             asked: dict[str, Any] = json.loads(message)
