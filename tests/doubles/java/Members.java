@@ -59,7 +59,7 @@ public class Members extends RoboticsAPIApplication {
     /** A condition of the application's own, without `and`. */
     private static final class Own implements ICondition {
         @Override
-        public ICondition or(ICondition... others) {
+        public ICondition or(ICondition other, ICondition... more) {
             return this;
         }
 

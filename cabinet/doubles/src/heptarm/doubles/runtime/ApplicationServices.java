@@ -149,6 +149,11 @@ public final class ApplicationServices implements IApplicationData, IApplication
     }
 
     @Override
+    public IProcessData tryGetProcessData(String id) {
+        return station.processData.containsKey(id) ? getProcessData(id) : null;
+    }
+
+    @Override
     public IProcessData getProcessData(final String id) {
         if (!station.processData.containsKey(id)) {
             throw new PersistenceException("no process data " + id + " in the project");

@@ -7,6 +7,7 @@ import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
 import java.util.concurrent.TimeUnit;
 
+import com.kuka.med.deviceModel.LBRMed;
 import com.kuka.roboticsAPI.RoboticsAPIContext;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
@@ -58,7 +59,8 @@ public final class Station {
             return thread;
         });
         this.controller = new SunriseController("KUKA_Sunrise_Cabinet_1", this);
-        this.robot = new SunriseLBR(description.title.replace(' ', '_') + "_1", controller, this);
+        String name = description.title.replace(' ', '_') + "_1";
+        this.robot = name.contains("_Med_") ? new LBRMed(name, controller, this) : new SunriseLBR(name, controller, this);
     }
 
     /** Creates the cabinet; called once, before anything else. */
@@ -131,6 +133,15 @@ public final class Station {
             frame = frame.getChild(part);
         }
         frame.setRedundancyInformation(robot, new LBRE1Redundancy(e1, status, turn));
+    }
+
+    /** Sets an additional parameter that a taught frame is stored with. */
+    public void setParameter(String path, String name, Object value) {
+        ObjectFrame frame = World.Current.getRootFrame();
+        for (String part : path.split("/")) {
+            frame = frame.getChild(part);
+        }
+        frame.setAdditionalParameter(name, value);
     }
 
     /** The safety state has changed; called on the realtime thread of the plant. */

@@ -2,10 +2,10 @@ package com.kuka.roboticsAPI.conditionModel;
 
 /** A condition, monitored while a motion runs. */
 public interface ICondition {
-    ICondition or(ICondition... others);
+    ICondition or(ICondition other, ICondition... more);
 
     /** An application's own condition may lack it; the virtual cabinet can monitor its own conditions only. */
-    default ICondition and(ICondition... others) {
+    default ICondition and(ICondition other, ICondition... more) {
         throw new UnsupportedOperationException("the virtual cabinet cannot combine a condition of class " + getClass().getName());
     }
 

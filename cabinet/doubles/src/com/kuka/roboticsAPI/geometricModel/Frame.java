@@ -47,16 +47,6 @@ public class Frame extends AbstractFrame {
         return fromParent;
     }
 
-    public Frame copy() {
-        return new Frame(parent, fromParent);
-    }
-
-    public Frame copyWithRedundancy() {
-        Frame copy = copy();
-        copyRedundancyTo(copy);
-        return copy;
-    }
-
     /** Another frame as seen from this one, now. */
     public Transformation staticTransformationTo(Frame other) {
         return transformationTo(other);

@@ -24,6 +24,16 @@ public class SmartServo extends ServoMotionJP<SmartServo> {
         return running(waitForActivation);
     }
 
+    /** Of each axis; NaN where not set. */
+    public double[] getJointVelocityRel() {
+        return jointDynamics().velocity.clone();
+    }
+
+    /** See {@link #getJointVelocityRel}. */
+    public double[] getJointAccelerationRel() {
+        return jointDynamics().acceleration.clone();
+    }
+
     public JointPosition getStart() {
         return new JointPosition(start);
     }

@@ -26,19 +26,21 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     private static final double STIFFEST_ROTATION = 300.0;
     /** Largest stiffness that the plant takes [Nm/rad]. */
     private static final double PLANT_NULL_SPACE_STIFFNESS = 5000.0;
+    private static final double[] DEFAULT_STIFFNESS = {2000, 2000, 2000, 200, 200, 200};
     private static final double DEFAULT_DAMPING = 0.7;
+    private static final double DEFAULT_NULL_SPACE_STIFFNESS = 100.0;
     private static final double LEAST_DAMPING = 0.1;
     private static final double LEAST_NULL_SPACE_DAMPING = 0.3;
 
-    private final double[] stiffness = {2000, 2000, 2000, 200, 200, 200};
+    private final double[] stiffness = DEFAULT_STIFFNESS.clone();
     private final double[] damping = filled(DEFAULT_DAMPING);
     private final double[] additionalControlForce = new double[DIRECTIONS];
     private double[] maxControlForce = filled(OFF);
     private double[] maxCartesianVelocity = filled(OFF);
     private double[] maxPathDeviation = filled(OFF);
     private boolean stopsAtMaxControlForce;
-    private double nullSpaceStiffness = 100.0;
-    private double nullSpaceDamping = 0.7;
+    private double nullSpaceStiffness = DEFAULT_NULL_SPACE_STIFFNESS;
+    private double nullSpaceDamping = DEFAULT_DAMPING;
     private AbstractFrame referenceSystem;
 
     public CartesianImpedanceControlMode() {
@@ -142,6 +144,24 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
 
     public CartesianImpedanceControlMode setNullSpaceStiffness(double value) {
         nullSpaceStiffness = notNegative("nullSpaceStiffness", value);
+        return this;
+    }
+
+    public CartesianImpedanceControlMode setNullSpaceStiffnessToDefaultValue() {
+        return setNullSpaceStiffness(DEFAULT_NULL_SPACE_STIFFNESS);
+    }
+
+    public CartesianImpedanceControlMode setNullSpaceDampingToDefaultValue() {
+        return setNullSpaceDamping(DEFAULT_DAMPING);
+    }
+
+    public CartesianImpedanceControlMode setAdditionalControlForceToDefaultValue() {
+        Arrays.fill(additionalControlForce, 0.0);
+        return this;
+    }
+
+    public CartesianImpedanceControlMode setStiffnessToDefaultValue() {
+        System.arraycopy(DEFAULT_STIFFNESS, 0, stiffness, 0, DIRECTIONS);
         return this;
     }
 
