@@ -6,7 +6,7 @@ import heptarm.doubles.runtime.NotModelled;
 
 /** The mobile station flexFELLOW; not simulated. */
 public abstract class AbstractFlexFellow {
-    protected AbstractFlexFellow(Controller controller) {
+    protected AbstractFlexFellow(Controller controller, String name) {
         throw new NotModelled("the flexFELLOW; leave its object out");
     }
 }

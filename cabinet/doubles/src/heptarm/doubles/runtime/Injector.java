@@ -89,8 +89,8 @@ final class Injector {
     }
 
     private Object find(Class<?> type, Named named, String where) throws ReflectiveOperationException {
-        if (named != null && type.isAssignableFrom(station.robot.getClass()) && Device.class.isAssignableFrom(type)) {
-            return device(named.value(), where);
+        if (Device.class.isAssignableFrom(type) && (named != null || !type.isInstance(station.robot))) {
+            return device(type, named, where);
         }
         try {
             if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
@@ -114,12 +114,12 @@ final class Injector {
         return made == null ? make(type, where) : made;
     }
 
-    /** The robot, by its name in the station setup. */
-    private Object device(String name, String where) {
+    /** The robot, by its name in the station setup if one is given. */
+    private Object device(Class<?> type, Named named, String where) {
         String present = station.robot.getName();
-        if (!present.equals(name)) {
+        if (named != null && !present.equals(named.value()) || !type.isInstance(station.robot)) {
             throw new IllegalArgumentException("nothing to inject into " + where + ": the virtual cabinet's robot is " + present
-                    + ", not " + name + "; choose another robot with --model");
+                    + ", not " + (named == null ? "a " + type.getName() : named.value()) + "; choose another robot with --model");
         }
         return station.robot;
     }

@@ -38,6 +38,7 @@ public final class Station {
     public final SharedState sharedState;
     public final TimerQueue timers;
     public final Map<String, Object> processData = new ConcurrentHashMap<>();
+    public final Map<String, String> unusable = new ConcurrentHashMap<>();
     public final Map<String, ObjectTemplate> templates = new ConcurrentHashMap<>();
     public final ExecutorService dispatch;
     public final Controller controller;
@@ -147,6 +148,11 @@ public final class Station {
     /** The safety state has changed; called on the realtime thread of the plant. */
     public void safetyChanged(long flags, long mode) {
         safetyEvents.changed(sharedState.computed(), flags, mode);
+    }
+
+    /** Process data whose value cannot be read: an application that asks for them is told why. */
+    public void setUnusable(String name, String why) {
+        unusable.put(name, why);
     }
 
     public void setProcessData(String name, Object value) {

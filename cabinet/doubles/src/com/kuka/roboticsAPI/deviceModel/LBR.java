@@ -197,8 +197,8 @@ public abstract class LBR extends Robot {
     }
 
     /** Pose of the flange at given joint positions, in the root frame of the robot. */
-    public Frame getForwardKinematic(JointPosition joints) {
-        return cartesian(joints, flange);
+    public Transformation getForwardKinematic(JointPosition joints) {
+        return kinematics.flange(joints.get());
     }
 
     /** Where a frame on the robot is now. */

@@ -167,8 +167,11 @@ public abstract class AbstractFrame {
         return redundancy.get(device);
     }
 
-    public Map<Device, IRedundancyCollection> getRedundancyInformation() {
-        return new HashMap<>(redundancy);
+    /** By the names of the devices. */
+    public Map<String, IRedundancyCollection> getRedundancyInformation() {
+        Map<String, IRedundancyCollection> found = new HashMap<>();
+        redundancy.forEach((device, one) -> found.put(device.getName(), one));
+        return found;
     }
 
     public void setRedundancyInformation(Device device, IRedundancyCollection value) {

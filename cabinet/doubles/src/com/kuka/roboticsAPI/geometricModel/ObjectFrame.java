@@ -30,6 +30,12 @@ public class ObjectFrame extends AbstractFrame {
         this.fromParent = fromParent;
     }
 
+    /** A frame of the application's own; it is no child of its parent, and keeps the place that the provider gives now. */
+    public ObjectFrame(String name, ObjectFrame parent, SceneGraphObject owner, ITransformationProvider place) {
+        this(name, owner, () -> parent, null);
+        placed = Transformation.of(place.getTransformation());
+    }
+
     @Override
     public String getName() {
         return name;

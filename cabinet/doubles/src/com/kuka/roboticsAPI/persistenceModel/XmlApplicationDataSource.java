@@ -9,6 +9,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
 import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.persistenceModel.templateModel.TemplateElement;
 
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.NotModelled;
@@ -68,7 +69,7 @@ public class XmlApplicationDataSource {
     }
 
     /** Not simulated. */
-    public <T> Collection<T> loadAllTemplates() {
+    public Collection<TemplateElement> loadAllTemplates() {
         throw new NotModelled("loadAllTemplates; create tools with createFromTemplate");
     }
 

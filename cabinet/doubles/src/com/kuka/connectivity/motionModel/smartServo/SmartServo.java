@@ -24,14 +24,18 @@ public class SmartServo extends ServoMotionJP<SmartServo> {
         return running(waitForActivation);
     }
 
-    /** Of each axis; NaN where not set. */
-    public double[] getJointVelocityRel() {
-        return jointDynamics().velocity.clone();
+    /** The first axis's; 1 if it is not set. */
+    public double getJointVelocityRel() {
+        return setOr1(jointDynamics().velocity[0]);
     }
 
     /** See {@link #getJointVelocityRel}. */
-    public double[] getJointAccelerationRel() {
-        return jointDynamics().acceleration.clone();
+    public double getJointAccelerationRel() {
+        return setOr1(jointDynamics().acceleration[0]);
+    }
+
+    private static double setOr1(double value) {
+        return Double.isNaN(value) ? 1.0 : value;
     }
 
     public JointPosition getStart() {
