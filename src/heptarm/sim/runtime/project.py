@@ -232,7 +232,9 @@ def _parameters(parent: ElementTree.Element) -> Iterator[tuple[str, str, Value]]
         for info in one.iterfind("additionalInformation/info"):
             key, text = info.get("key"), info.get("value")
             if key is not None and text is not None:
-                with suppress(ValueError):  # of a type that no application reads, as the time of its last change
+                with suppress(
+                    ValueError
+                ):  # of a type that no application reads, as the time of its last change
                     yield name, key, _convert(info.get("type", "java.lang.String"), text)
 
 

@@ -39,7 +39,7 @@ public class OldServer extends RoboticsAPIApplication {
         BufferedReader in = new BufferedReader(new InputStreamReader(client.getInputStream(), "US-ASCII"));
         PrintWriter out = new PrintWriter(client.getOutputStream(), true);
         DirectServo motion = new DirectServo(lbr.getCurrentJointPosition());
-        motion.setMinimumTrajectoryExecutionTime(20e-3);
+        motion.setMinimumTrajectoryExecutionTime(20e-3).setTimeoutAfterGoalReach(3600.0);
         lbr.moveAsync(motion);
         IDirectServoRuntime runtime = motion.getRuntime();
         for (String line = in.readLine(); line != null; line = in.readLine()) {
