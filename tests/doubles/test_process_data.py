@@ -70,7 +70,8 @@ def test_a_file_that_is_no_project_file_is_refused(tmp_path: Path) -> None:
 def test_additional_parameters_of_frames_are_read(tmp_path: Path) -> None:
     file = tmp_path / "data.xml"
     infos = (
-        "<info key='PICK' type='java.lang.Integer' value='1'/><info key='Comment' type='java.lang.String' value='left'/>"
+        "<info key='PICK' type='java.lang.Integer' value='1'/>"
+        "<info key='Comment' type='java.lang.String' value='left'/>"
         "<info key='LastModificationTime' type='java.lang.Long' value='1590078548421'/><info type='Teach'/>"
     )
     frame = f"<frame name='P1'><additionalInformation>{infos}</additionalInformation></frame>"

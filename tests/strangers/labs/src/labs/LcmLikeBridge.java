@@ -28,7 +28,7 @@ public class LcmLikeBridge extends RoboticsAPIApplication {
         lbr.move(ptp(0, 0.4, 0, -1.3, 0, 1.0, 0).setJointVelocityRel(0.8));
         socket = new DatagramSocket(0, InetAddress.getByName("127.0.0.1"));
         SmartServo motion = new SmartServo(lbr.getCurrentJointPosition());
-        motion.setMinimumTrajectoryExecutionTime(20e-3).setTimeoutAfterGoalReach(3600.0);
+        motion.setJointVelocityRel(0.5).setJointAccelerationRel(0.5).setMinimumTrajectoryExecutionTime(5e-3).setTimeoutAfterGoalReach(3600.0);
         lbr.getFlange().moveAsync(motion);
         ISmartServoRuntime runtime = motion.getRuntime();
         Report.line(getApplicationData(), "LcmLikeBridge port " + socket.getLocalPort() + " " + motion.getJointVelocityRel());
