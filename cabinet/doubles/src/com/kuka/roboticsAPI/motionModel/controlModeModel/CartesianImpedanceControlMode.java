@@ -11,6 +11,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.ControlModeTranslator;
 import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.runtime.NotModelled;
 import heptarm.doubles.seam.CartesianImpedance;
 import heptarm.doubles.seam.ImpedanceMode;
 
@@ -214,7 +215,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
 
     /** Not simulated: the unit and the effect are not documented. */
     public CartesianImpedanceControlMode setMaxJointSpeed(double... speeds) {
-        throw new UnsupportedOperationException("the virtual cabinet has no largest joint speed of Cartesian impedance");
+        throw new NotModelled("a largest joint speed of Cartesian impedance");
     }
 
     public CartesianImpedanceControlMode setDampingToDefaultValue() {
