@@ -184,7 +184,7 @@ def test_applications_of_other_labs_run_and_are_driven_to_a_milliradian(tmp_path
             one.split()[1:] for one in reversed(lines) if one.startswith(f"{name} ") and len(one.split()) == 8
         )
         assert near(tuple(map(float, found)), target), name
-    assert len(heard) > 10
+    assert len(heard) > 1
     assert near(heard[-1], ENDS["Bridge"])
 
 

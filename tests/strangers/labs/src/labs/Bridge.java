@@ -22,7 +22,10 @@ public class Bridge extends RoboticsAPIApplication {
         getTaskManager().getTask(StateSender.class).startInstance();
         lbr.move(ptp(ends.getA()).setJointVelocityRel(0.8));
         lbr.move(ptp(ends.getB()).setJointVelocityRel(0.8));
-        Thread.sleep(50);
+        int enough = StateSender.sent + 2; // the first of them may have been under way
+        while (StateSender.sent < enough) {
+            Thread.sleep(1);
+        }
         getTaskManager().getTask(StateSender.class).stopAllInstances();
         Vector lever = Vector.of(3, 4, 12);
         Report.line(getApplicationData(), "Bridge " + (lever.length() == 13.0 && lever.get(1) == 4.0));

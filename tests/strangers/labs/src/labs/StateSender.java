@@ -13,6 +13,7 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 
 /** Sends the state in lines of text; a bridge on the PC turns them into messages. */
 public class StateSender extends RoboticsAPICyclicBackgroundTask {
+    static volatile int sent;
     @Inject
     private LBR lbr;
     private DatagramSocket socket;
@@ -38,6 +39,7 @@ public class StateSender extends RoboticsAPICyclicBackgroundTask {
         byte[] data = text.toString().getBytes();
         try {
             socket.send(new DatagramPacket(data, data.length, InetAddress.getByName("127.0.0.1"), port));
+            sent++;
         } catch (java.io.IOException e) {
             getLogger().warn("not sent");
         }
