@@ -24,7 +24,7 @@ are doubles, written for the simulation after the calls in public applications; 
 and signatures are those that applications use. The doubles act on the virtual arm, in simulated time. What is not
 simulated throws an exception that begins with `heptarm: not modelled`.
 
-*Known by* tells how sure the members are: *overrides* where applications implement or extend a class, so that its
+*Known by* states how sure the members are: *overrides* where applications implement or extend a class, so that its
 signatures are whole; *calls* where they only call it, so that a type may be narrower than Sunrise's; *names* where they
 only name it; *guess*.
 

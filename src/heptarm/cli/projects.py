@@ -20,7 +20,7 @@ from heptarm.sim.runtime.application import Application, Survey, find_projects, 
 from heptarm.values.simulator_options import SimulatorOptions
 
 
-class Outcome(Enum):
+class _Outcome(Enum):
     """What became of a class."""
 
     COMPILES = "compiles"
@@ -29,13 +29,18 @@ class Outcome(Enum):
     RUNS = "runs"
 
 
-_STYLES = {Outcome.COMPILES: "green", Outcome.ENDED: "green", Outcome.RUNS: "yellow", Outcome.FAILS: "red"}
+_STYLES = {
+    _Outcome.COMPILES: "green",
+    _Outcome.ENDED: "green",
+    _Outcome.RUNS: "yellow",
+    _Outcome.FAILS: "red",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class _Row:
     name: str
-    outcome: Outcome
+    outcome: _Outcome
     text: str = ""
 
 
@@ -66,7 +71,7 @@ def run(folder: Path, *, jars: tuple[Path, ...], seconds: float, as_json: bool) 
         whole += not found.failed
         compiled += len(found.compiled)
         total += len(found.compiled) + len(found.failed)
-        failed += sum(row.outcome is Outcome.FAILS for row in rows)
+        failed += sum(row.outcome is _Outcome.FAILS for row in rows)
         for row in rows:
             if as_json:
                 emit({"project": name, "class": row.name, "outcome": row.outcome.value, "text": row.text})
@@ -94,8 +99,8 @@ def run(folder: Path, *, jars: tuple[Path, ...], seconds: float, as_json: bool) 
 
 
 def _rows(found: Survey, seconds: float) -> list[_Row]:
-    rows = {name: _Row(name, Outcome.COMPILES) for name in found.compiled}
-    rows |= {name: _Row(name, Outcome.FAILS, text) for name, text in found.failed}
+    rows = {name: _Row(name, _Outcome.COMPILES) for name in found.compiled}
+    rows |= {name: _Row(name, _Outcome.FAILS, text) for name, text in found.failed}
     if seconds > 0.0:
         rows |= {one.main: _tried(one, seconds) for one in found.applications}
     return [rows[name] for name in sorted(rows)]
@@ -124,8 +129,8 @@ def _tried(application: Application, seconds: float) -> _Row:
             failure = str(error)
         cabinet.wait()
     if ran_out.is_set():
-        return _Row(application.main, Outcome.RUNS, f"after {seconds:g} s")
-    return _Row(application.main, Outcome.FAILS if failure else Outcome.ENDED, failure)
+        return _Row(application.main, _Outcome.RUNS, f"after {seconds:g} s")
+    return _Row(application.main, _Outcome.FAILS if failure else _Outcome.ENDED, failure)
 
 
 def _end(cabinet: subprocess.Popen[str], ran_out: threading.Event) -> None:

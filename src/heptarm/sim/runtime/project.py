@@ -79,19 +79,19 @@ def like(old: Value | None, text: str) -> Value:
 
 
 @dataclass(frozen=True, slots=True)
-class ProcessData:
+class StoredProcessData:
     """Process data of a project.
 
     Attributes:
         values: by their ids.
-        unusable: by their ids why others have no value; an application that uses one of them is told.
+        unusable: by their ids why others have no value; an application that asks for one gets this as error.
     """
 
     values: dict[str, Value]
     unusable: dict[str, str]
 
 
-def read_process_data(file: Path) -> ProcessData:
+def read_process_data(file: Path) -> StoredProcessData:
     """Read the process data of a project file; without a value the default counts.
 
     Raises:
@@ -109,7 +109,7 @@ def read_process_data(file: Path) -> ProcessData:
             found[name] = _convert(kind, text)
         except ValueError as error:
             unusable[name] = f"{file.name}: {error}"
-    return ProcessData(found, unusable)
+    return StoredProcessData(found, unusable)
 
 
 #: x y z [mm], a b c [rad], as in the file.

@@ -50,17 +50,17 @@ public class DataEditor extends RoboticsAPIApplication {
         } catch (PersistenceException e) {
             isGone = appData.loadAllFrames().size() == before && "RoboticsAPI.data.xml".equals(appData.getName());
         }
-        boolean isTold = false;
+        boolean isRefused = false;
         try {
             getApplicationData().getProcessData("neverRead").getValue();
         } catch (PersistenceException e) {
-            isTold = e.getMessage().contains("an Integer must be a whole number, got '3,5'");
+            isRefused = e.getMessage().contains("an Integer must be a whole number, got '3,5'");
         }
-        isTold &= getApplicationData().tryGetProcessData("unknown") == null;
+        isRefused &= getApplicationData().tryGetProcessData("unknown") == null;
         SceneGraphObject owner = lbr;
         ObjectFrame own = new ObjectFrame("own", table, owner, new StaticTransformationProvider(Transformation.ofTranslation(1, 2, 3)));
         boolean isOwn = Math.abs(table.transformationTo(own).getY() - 2) < 1e-9;
-        Report.line(getApplicationData(), "DataEditor " + isNamed + " " + isThere + " " + isGone + " " + isTold + " " + isOwn);
+        Report.line(getApplicationData(), "DataEditor " + isNamed + " " + isThere + " " + isGone + " " + isRefused + " " + isOwn);
         Report.joints(getApplicationData(), "DataEditor", lbr);
     }
 }

@@ -45,10 +45,10 @@ public class Motions extends RoboticsAPIApplication {
         Frame side = start.copyWithRedundancy(lbr.getRootFrame());
         side.setY(side.getY() + 80);
         lbr.move(new Spline(spl(side), spl(start)).setCartVelocity(250));
-        CartesianImpedanceControlMode soft = new CartesianImpedanceControlMode();
-        soft.parametrize(CartDOF.TRANSL).setStiffness(800);
-        soft.setNullSpaceStiffnessToDefaultValue().setNullSpaceDampingToDefaultValue().setAdditionalControlForceToDefaultValue();
-        lbr.move(positionHold(soft, 200, TimeUnit.MILLISECONDS));
+        CartesianImpedanceControlMode compliant = new CartesianImpedanceControlMode();
+        compliant.parametrize(CartDOF.TRANSL).setStiffness(800);
+        compliant.setNullSpaceStiffnessToDefaultValue().setNullSpaceDampingToDefaultValue().setAdditionalControlForceToDefaultValue();
+        lbr.move(positionHold(compliant, 200, TimeUnit.MILLISECONDS));
         lbr.move(positionHold(new JointImpedanceControlMode(1000, 1000, 1000, 1000, 500, 500, 500), 100, TimeUnit.MILLISECONDS));
         lbr.move(toStart);
         Report.line(getApplicationData(), "Motions " + (isTurned && getContext() == kuka_Sunrise_Cabinet_1.getContext()));

@@ -14,7 +14,7 @@ import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-/** Goes along taught frames; what to do there is in their additional parameters. */
+/** Moves to taught frames; what to do there is in their additional parameters. */
 public class TaughtLine extends RoboticsAPIApplication {
     @Inject
     private LBR lbr;

@@ -150,7 +150,7 @@ public final class Station {
         safetyEvents.changed(sharedState.computed(), flags, mode);
     }
 
-    /** Process data whose value cannot be read: an application that asks for them is told why. */
+    /** Process data whose value cannot be read: an application that asks for them gets this as error. */
     public void setUnusable(String name, String why) {
         unusable.put(name, why);
     }
