@@ -33,9 +33,10 @@ public class DataEditor extends RoboticsAPIApplication {
         ObjectFrame recipe = appData.addFrame(table);
         boolean isNamed = recipe.getName().equals("P3");
         appData.renameFrame(recipe, "Recipe");
-        Transformation flange = lbr.getForwardKinematic(joints);
+        Frame flange = new Frame(World.Current.getRootFrame());
+        flange.setTransformationFromParent(lbr.getForwardKinematic(joints));
         appData.changeFrameTransformation(getApplicationData().getFrame("/Table/Recipe"),
-                table.transformationTo(new Frame(flange)));
+                table.transformationTo(flange));
         appData.moveFrame(recipe, World.Current.getRootFrame());
         appData.save();
         appData.saveFile();

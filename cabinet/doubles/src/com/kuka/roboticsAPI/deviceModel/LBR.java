@@ -197,8 +197,8 @@ public abstract class LBR extends Robot {
     }
 
     /** Pose of the flange at given joint positions, in the root frame of the robot. */
-    public Transformation getForwardKinematic(JointPosition joints) {
-        return kinematics.flange(joints.get());
+    public Frame getForwardKinematic(JointPosition joints) {
+        return cartesian(joints, flange);
     }
 
     /** Where a frame on the robot is now. */

@@ -77,6 +77,11 @@ public class Frame extends AbstractFrame {
         return this;
     }
 
+    /** As older applications call it, with the result of the forward kinematics: places it as another frame in its parent. */
+    public Frame setTransformationFromParent(Frame other) {
+        return setTransformationFromParent(other.fromParent());
+    }
+
     public Frame setTransformationFromParent(ITransformation transformation) {
         fromParent = transformation(transformation);
         return this;
