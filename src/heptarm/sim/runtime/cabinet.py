@@ -108,10 +108,10 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
     Raises:
         ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
-    data = project.read_process_data(cabinet_sources() / "project" / PROJECT)
+    data = project.read_process_data(cabinet_sources() / "project" / PROJECT).values
     if options.project is not None:
         addresses = AddressMap.of(options.map)
-        for name, value in project.read_process_data(options.project).items():
+        for name, value in project.read_process_data(options.project).values.items():
             data[name] = addresses.apply(value) if isinstance(value, str) else value
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
     if options.observed:
@@ -193,6 +193,9 @@ class VirtualCabinet:
             self._station.setProcessData(name, java_plant.boxed(value))
         if options.project is not None:
             java_plant.add_project(self._station, project.read_project(options.project))
+            for name, why in project.read_process_data(options.project).unusable.items():
+                if name not in data:
+                    self._station.setUnusable(name, why)
         if options.payload:
             self.plant.set_payload(parse_payload(options.payload))
         for button in options.answer:
