@@ -53,8 +53,8 @@ NEAR = 0.1
 POINT_RADIUS = 0.01
 #: Bodies on a path may be nearer than a margin of 0 between two checks, by half of this [m].
 _LEAST_MARGIN = 1e-3
-#: Farther bodies are not looked for on a path: that takes longer than shorter steps [m].
-_FAR = 0.05
+#: Exact distances of farther bodies are not computed on a path: that takes longer than shorter steps [m].
+_FAR = 0.1
 #: Most spheres of a cloud.
 _MOST_SPHERES = 5000
 #: First parts of names in compiled models, which no arm may have.
