@@ -8,6 +8,8 @@ timed by the planner of the controller.
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
+from heptarm._library import library
 from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
@@ -145,6 +148,20 @@ def find_path(
     )
 
 
+@functools.cache
+def _functions() -> ctypes.CDLL:
+    """The functions of native/nearest.c.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing.
+    """
+    made, (word, pointer) = library(holds_gil=True), (ctypes.c_int64, ctypes.c_void_p)
+    made.hn_nearest.restype = made.hn_within.restype = word
+    made.hn_nearest.argtypes = (word, pointer, pointer)
+    made.hn_within.argtypes = (word, pointer, pointer, word, pointer)
+    return made
+
+
 class _Budget:
     """What a search may take, and has taken.
 
@@ -229,17 +246,16 @@ class _Tree:
 
     def nearest(self, q: Array) -> int:
         """Index of the nearest joint positions."""
-        return int(((self._q[: len(self._parents)] - q) ** 2).sum(axis=1).argmin())
+        found: int = _functions().hn_nearest(len(self._parents), self._q.ctypes.data, q.ctypes.data)
+        return found
 
     def target(self, random: np.random.Generator, low: Array, high: Array) -> Array | None:
         """Random joint positions between limits; None: each is beyond the reach of its nearest ones."""
-        drawn = random.uniform(low, high, (_DRAWN, 7))
-        q = self._q[: len(self._parents)]
-        squares = (q**2).sum(axis=1) - 2.0 * drawn @ q.T
-        nearest = squares.argmin(axis=1)
-        squares = squares[np.arange(_DRAWN), nearest] + (drawn**2).sum(axis=1)
-        within = np.flatnonzero(squares <= self._reach[nearest] ** 2)
-        return drawn[within[0]] if len(within) else None
+        drawn, (q, reach) = random.uniform(low, high, (_DRAWN, 7)), (self._q, self._reach)
+        first: int = _functions().hn_within(
+            *(len(self._parents), q.ctypes.data, reach.ctypes.data, _DRAWN, drawn.ctypes.data)
+        )
+        return None if first < 0 else drawn[first]
 
     def limit(self, target: Array, reach: float) -> None:
         """Let the nearest joint positions reach only so far [rad], since bodies were in the way to a target."""
@@ -672,4 +688,4 @@ def _curve(robot: RobotModel, points: Array) -> Array:
     from heptarm.planning.spline import through
 
     lengths = np.maximum(np.abs(np.diff(points, axis=0) / robot.dq_max).max(axis=1), 1e-9)
-    return through(points, lengths).samples(_SAMPLES)
+    return through(points, lengths).even(_SAMPLES)
