@@ -10,7 +10,7 @@ static int64_t nearest(int64_t count, const double *q, const double *place, doub
     *square = INFINITY;
     for (int64_t n = 0; n < count; n++) {
         double sum = 0.0;
-        for (int i = 0; i < N; i++) sum += (q[N * n + i] - place[i]) * (q[N * n + i] - place[i]);
+        for (int i = 0; i < N && sum < *square; i++) sum += (q[N * n + i] - place[i]) * (q[N * n + i] - place[i]);
         if (sum < *square) *square = sum, found = n;
     }
     return found;

@@ -2,7 +2,7 @@
 
 Two trees of joint positions grow towards each other (RRT-Connect, Kuffner and LaValle 2000), under a constraint by
 steps that are projected onto it (CBiRRT, Berenson et al. 2009). Where bodies are in the way, only near targets count
-(dynamic domain, Yershova et al. 2005). What they find is shortened, laid on a joint spline that is checked again, and
+(dynamic domain, Yershova et al. 2005), and few places are near, they are drawn around the trees. What they find is shortened, laid on a joint spline that is checked again, and
 timed by the planner of the controller.
 """
 
@@ -13,7 +13,7 @@ import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +37,7 @@ _SLIGHT = 0.005
 #: Longest step of a tree [rad], of all joints together; under constraints they are shorter.
 _STEP = 1.2
 #: Steps that joint positions reach at which bodies are in the way; targets that are drawn at a time.
-_REACH, _DRAWN = 1.7, 32
+_REACH, _DRAWN = 1.7, 8
 #: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
 _ELBOWS, _POSES = 36, 24
 #: Most joint positions that stand for the goals.
@@ -228,9 +228,8 @@ class _Tree:
     """
 
     def __init__(self, roots: Array) -> None:
-        self._q = np.empty((max(256, 2 * len(roots)), 7))
-        self._reach = np.full(len(self._q), inf)
         self._parents: list[int] = []
+        self._keep(np.empty((max(256, 2 * len(roots)), 7)), np.full(max(256, 2 * len(roots)), inf))
         for root in roots:
             self.add(root, -1)
 
@@ -238,24 +237,33 @@ class _Tree:
         """Add joint positions; returns their index."""
         index = len(self._parents)
         if index == len(self._q):
-            self._q = np.concatenate([self._q, np.empty_like(self._q)])
-            self._reach = np.concatenate([self._reach, np.full_like(self._reach, inf)])
+            more = np.empty_like(self._q), np.full_like(self._reach, inf)
+            self._keep(np.concatenate([self._q, more[0]]), np.concatenate([self._reach, more[1]]))
         self._q[index] = q
         self._parents.append(parent)
         return index
 
+    def _keep(self, q: Array, reach: Array) -> None:
+        self._q, self._reach = q, reach
+        self._addresses = q.ctypes.data, reach.ctypes.data
+
     def nearest(self, q: Array) -> int:
         """Index of the nearest joint positions."""
-        found: int = _functions().hn_nearest(len(self._parents), self._q.ctypes.data, q.ctypes.data)
+        found: int = _functions().hn_nearest(len(self._parents), self._addresses[0], q.ctypes.data)
         return found
 
-    def target(self, random: np.random.Generator, low: Array, high: Array) -> Array | None:
-        """Random joint positions between limits; None: each is beyond the reach of its nearest ones."""
-        drawn, (q, reach) = random.uniform(low, high, (_DRAWN, 7)), (self._q, self._reach)
-        first: int = _functions().hn_within(
-            *(len(self._parents), q.ctypes.data, reach.ctypes.data, _DRAWN, drawn.ctypes.data)
-        )
-        return None if first < 0 else drawn[first]
+    def target(self, random: np.random.Generator, low: Array, high: Array, *, near: float) -> Array:
+        """Random joint positions between limits, within the reach of the nearest ones of the tree.
+
+        Where few are, they are in a ball around random ones of the tree: its radius is their reach, at most `near` [rad].
+        """
+        count, drawn = len(self._parents), low + (high - low) * random.random((_DRAWN, 7))
+        first: int = _functions().hn_within(count, *self._addresses, _DRAWN, drawn.ctypes.data)
+        if first >= 0:
+            return drawn[first]
+        middle = random.integers(count)
+        found: Array = self._q[middle] + min(self._reach[middle], near) * _in_ball(random)
+        return np.clip(found, low, high)
 
     def limit(self, target: Array, reach: float) -> None:
         """Let the nearest joint positions reach only so far [rad], since bodies were in the way to a target."""
@@ -411,18 +419,17 @@ class _Search:
         one, other, is_swapped, nearest = _Tree(self._start[None]), _Tree(goals), False, inf
         low = np.minimum(np.minimum(self._robot.q_min + _INSIDE, self._start), goals.min(axis=0))
         high = np.maximum(np.maximum(self._robot.q_max - _INSIDE, self._start), goals.max(axis=0))
+        reach = _REACH * self._step
         while True:
             self._budget.check(nearest)
             target = (
-                one.target(self._random, low, high)
+                one.target(self._random, low, high, near=reach)
                 if longest == inf
                 else np.clip(self._near(goals, longest), low, high)
             )
-            if target is None:
-                continue
             new = self._extend(one, target, steps=1)
             if new is None:
-                one.limit(target, _REACH * self._step)
+                one.limit(target, reach)
             else:
                 near = other.nearest(one.at(new))
                 reached = self._extend(other, one.at(new), steps=1000)
@@ -445,8 +452,7 @@ class _Search:
         lengths = np.linalg.norm(gaps, axis=1)
         near = np.flatnonzero(lengths < longest)
         chosen = int(self._random.choice(near)) if len(near) else int(lengths.argmin())
-        ball = self._random.normal(size=7)
-        ball *= self._random.uniform() ** (1.0 / 7.0) / np.linalg.norm(ball)
+        ball = _in_ball(self._random)
         along = gaps[chosen] / max(float(lengths[chosen]), 1e-9)
         across = np.sqrt(max(longest**2 - lengths[chosen] ** 2, 0.0))
         part = ball @ along
@@ -471,7 +477,7 @@ class _Search:
         for _ in range(steps):
             here = tree.at(index)
             gap = target - here
-            length = float(np.linalg.norm(gap))
+            length = sqrt(gap @ gap)
             if length < 1e-9:
                 return index
             there = target if length <= self._step else here + self._step / length * gap
@@ -537,13 +543,16 @@ class _Search:
         for place, index in ((low, first), (high, min(last, len(steps) - 1))):
             part = (place - marks[index]) / steps[index]
             ends.append(points[index] + part * (points[index + 1] - points[index]))
+        longest = 0.98 * (high - low)
+        if np.linalg.norm(ends[1] - ends[0]) > longest:
+            return points
         if self._keep is not None and not all(map(self._keep.is_kept, ends)):
             return points
         line = self._line(ends[0], ends[1])
         if line is None:
             return points
         length = float(np.linalg.norm(np.diff([ends[0], *line], axis=0), axis=1).sum())
-        if length > 0.98 * (high - low):
+        if length > longest:
             return points
         return [*points[: first + 1], ends[0], *line, *points[min(last, len(steps) - 1) + 1 :]]
 
@@ -629,6 +638,12 @@ class _Search:
         found = self._world.clearances(worst, below=_REPORTED) if np.isfinite(distances).any() else ()
         allowed = [one for one in found if one.distance >= distances.min() - 1e-9]
         return allowed[0] if allowed else None
+
+
+def _in_ball(random: np.random.Generator) -> Array:
+    """A random place in the ball of radius 1 around the origin, shape (7,)."""
+    found: Array = random.normal(size=7)
+    return found * (random.uniform() ** (1.0 / 7.0) / np.linalg.norm(found))
 
 
 def _sampled(region: Region, random: np.random.Generator) -> list[Pose]:
