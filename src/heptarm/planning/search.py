@@ -2,8 +2,8 @@
 
 Two trees of joint positions grow towards each other (RRT-Connect, Kuffner and LaValle 2000), under a constraint by
 steps that are projected onto it (CBiRRT, Berenson et al. 2009). Where bodies are in the way, only near targets count
-(dynamic domain, Yershova et al. 2005), and few places are near, they are drawn around the trees. What they find is shortened, laid on a joint spline that is checked again, and
-timed by the planner of the controller.
+(dynamic domain, Yershova et al. 2005); where few places are near, they are drawn around the trees. What they find is
+shortened, laid on a joint spline that is checked again, and timed by the planner of the controller.
 """
 
 from __future__ import annotations
@@ -255,7 +255,8 @@ class _Tree:
     def target(self, random: np.random.Generator, low: Array, high: Array, *, near: float) -> Array:
         """Random joint positions between limits, within the reach of the nearest ones of the tree.
 
-        Where few are, they are in a ball around random ones of the tree: its radius is their reach, at most `near` [rad].
+        Where few are, they are in a ball around random ones of the tree, of the radius of their reach, at most `near`
+        [rad].
         """
         count, drawn = len(self._parents), low + (high - low) * random.random((_DRAWN, 7))
         first: int = _functions().hn_within(count, *self._addresses, _DRAWN, drawn.ctypes.data)

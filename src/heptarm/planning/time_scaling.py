@@ -55,7 +55,7 @@ _CHECKS = 60
 _APART = 1e-9
 _AXES = 7
 #: At least this fraction of what is free for acceleration accelerates, where the curvature leaves less.
-_SPARE = 0.05
+SPARE = 0.05
 #: A motion slower than this fraction of its full speed stops at once.
 _BARELY = 1e-3
 #: A motion that brakes already gets this much more jerk than it needs to end that.
@@ -363,7 +363,7 @@ class _Search:
         limited = np.isfinite(path.acceleration).any(axis=0)
         self._free = np.ascontiguousarray((path.acceleration / first)[:, limited])
         self._taken = np.ascontiguousarray((np.abs(path.second) / first)[:, limited])
-        self._excess = _Excess(path)
+        self._excess = Excess(path)
 
     def profile(self) -> TabulatedProfile:
         """The best profile found."""
@@ -372,7 +372,7 @@ class _Search:
         best: tuple[float, float, Array] | None = None
         for _ in range(_ROUNDS):
             reach = fastest * window / 2 + self._behind
-            step, speed = self._integrate(_least_around(path.s, fastest, reach), grip)
+            step, speed = self._integrate(least_around(path.s, fastest, reach), grip)
             speeds, accelerations, jerks = self._excess.of(step, speed)
             # as a whole it may be too fast by this
             k = max(1.0, float(speeds.max()), sqrt(float(accelerations.max())), float(np.cbrt(jerks.max())))
@@ -382,9 +382,9 @@ class _Search:
             if k <= _TOLERANCE or duration / k >= best[0]:
                 break
             around = fastest * window
-            hard = -_least_around(path.s, -accelerations, around)
-            slower = np.maximum(-_least_around(path.s, -speeds, around), np.sqrt(hard))
-            slower = np.maximum(slower, np.cbrt(-_least_around(path.s, -jerks, around)))
+            hard = -least_around(path.s, -accelerations, around)
+            slower = np.maximum(-least_around(path.s, -speeds, around), np.sqrt(hard))
+            slower = np.maximum(slower, np.cbrt(-least_around(path.s, -jerks, around)))
             fastest = fastest / np.sqrt(np.maximum(1.0, slower))
             grip = grip / np.sqrt(np.maximum(1.0, hard))
         assert best is not None
@@ -396,12 +396,7 @@ class _Search:
         s, window = self._path.s, self._window
         square = fastest**2
         square[0] = square[-1] = 0.0
-        free = self._free * grip[:, None]
-        _functions().hp_reachable(
-            *(*free.shape, s.ctypes.data, free.ctypes.data, self._taken.ctypes.data, _SPARE),
-            square.ctypes.data,
-        )
-        speed = np.sqrt(square)
+        speed = np.sqrt(reachable(s, self._free * grip[:, None], self._taken, square))
         times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (speed[1:] + speed[:-1]))])
         step = max(_STEP, float(times[-1]) / _MOST_SAMPLES)
         count = min(max(1, round(window / step)), _MOST_AVERAGED)
@@ -411,17 +406,35 @@ class _Search:
         return step, (total[count:] - total[:-count]) / count
 
 
-class _Excess:
+def reachable(s: Array, free: Array, taken: Array, square: Array) -> Array:
+    """Squares of speed that accelerations allow, forwards and backwards (Bobrow 1985), shape (n,).
+
+    Args:
+        s: path parameter at samples, ascending, shape (n,).
+        free: largest acceleration of s by each coordinate at speed 0, shape (n, m).
+        taken: by how much that falls with the square of speed, shape (n, m).
+        square: largest squares of speed, shape (n,).
+    """
+    given, result = [np.ascontiguousarray(one) for one in (s, free, taken)], square.copy()
+    addresses = [one.ctypes.data for one in given]
+    _functions().hp_reachable(*free.shape, *addresses, SPARE, result.ctypes.data)
+    return result
+
+
+class Excess:
     """Factors by which motions along a path exceed its limits."""
 
     def __init__(self, path: PathConstraints) -> None:
         limited = np.isfinite([path.velocity, path.acceleration, path.jerk]).any(axis=(0, 1))
         columns = (path.steepest, path.first, path.second, path.third)
         limits = (path.velocity, path.acceleration, path.jerk)
-        self._s, self._arrays = path.s, [
-            *(np.ascontiguousarray(path.s), *(one[:, limited].copy() for one in columns)),
-            *(np.ascontiguousarray(path.fastest), *(one[:, limited].copy() for one in limits)),
-        ]
+        self._s, self._arrays = (
+            path.s,
+            [
+                *(np.ascontiguousarray(path.s), *(one[:, limited].copy() for one in columns)),
+                *(np.ascontiguousarray(path.fastest), *(one[:, limited].copy() for one in limits)),
+            ],
+        )
         addresses = [one.ctypes.data for one in self._arrays]
         self._memory = _Limits(*addresses, len(path.s), int(limited.sum()))
 
@@ -441,7 +454,7 @@ class _Excess:
         return result
 
 
-def _least_around(s: Array, values: Array, reaches: Array) -> Array:
+def least_around(s: Array, values: Array, reaches: Array) -> Array:
     """The least of values within a reach to both sides of each sample of s; all of shape (n,)."""
     given, result = [np.ascontiguousarray(one) for one in (s, values, reaches)], np.empty_like(values)
     addresses = [one.ctypes.data for one in (*given, result)]
