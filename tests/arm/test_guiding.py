@@ -341,7 +341,7 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     assert replay.result.duration == pytest.approx(covered.duration / 0.3, abs=0.3), "in the taught time"
     assert np.abs(arm.wait_for_rest().q - covered.q[-1]).max() < 2e-3
     replay = retry(lambda: arm.replay(covered, speed_scaling=0.5), starved)
-    assert replay.result.arrived and replay.deviation < 0.3
+    assert replay.result.arrived and replay.deviation < 0.02
     assert np.abs(arm.wait_for_rest().q - covered.q[-1]).max() < 0.01
 
 

@@ -180,7 +180,8 @@ class _Run:
         ) as servo:
             while servo.tick():
                 t = servo.t * per_second
-                servo.set(*trajectory.at(t + ahead * per_second))  # where it will be when the arm gets there
+                q, dq = trajectory.at(t + ahead * per_second)  # where it will be when the arm gets there
+                servo.set(q, self.speed_scaling * dq)
                 try:
                     state = self.arm.state
                 except StaleState:

@@ -52,12 +52,15 @@ class OnlineTrajectory:
         self._input = InputParameter(axes)
         self._synchronization, self._halting = synchronization, halting
         self._plan: Trajectory | None = None
+        self._velocity = np.full(axes, np.inf)
+        # the plan is relative to a point that is here at time 0 and has this velocity; None: to the origin
+        self._frame: tuple[Array, Array] | None = None
         self.time = 0.0
 
     def limit(self, acceleration: Array, jerk: Array, *, velocity: Array | None = None) -> None:
         """Set the limits of each coordinate for the next trajectories; without a velocity that limit stays."""
         if velocity is not None:
-            self._input.max_velocity = velocity.tolist()
+            self._velocity = velocity
         self._input.max_acceleration, self._input.max_jerk = acceleration.tolist(), jerk.tolist()
 
     @property
@@ -83,13 +86,19 @@ class OnlineTrajectory:
     def at(self, time: float) -> OtgState:
         """State of the trajectory at a time [s]."""
         assert self._plan is not None
-        q, dq, ddq = self._plan.at_time(time)
-        return np.array(q), np.array(dq), np.array(ddq)
+        q, dq, ddq = (np.array(values) for values in self._plan.at_time(time))
+        if self._frame is not None:
+            origin, speed = self._frame
+            q, dq = q + origin + speed * time, dq + speed
+        return q, dq, ddq
 
     def position(self, time: float) -> list[float]:
         """Coordinates at a time [s]."""
         assert self._plan is not None
         place: list[float] = self._plan.at_time(time)[0]
+        if self._frame is not None:
+            origin, speed = self._frame
+            place = (origin + speed * time + place).tolist()
         return place
 
     def aim(
@@ -113,14 +122,50 @@ class OnlineTrajectory:
         Returns:
             False if that cannot be planned: the last trajectory continues.
         """
-        parameters = self._input
-        parameters.control_interface, parameters.synchronization = (
-            ControlInterface.Position,
-            self._synchronization,
-        )
-        parameters.target_position, parameters.target_velocity = target.tolist(), speed.tolist()
-        parameters.minimum_duration = minimum
-        return self._start(state, within)
+        plan = self._to(state, target, speed=speed, minimum=minimum)
+        if plan is None or not (within is None or _stays(plan, state[0], within)):
+            return False
+        self._plan, self._frame, self.time = plan, None, 0.0
+        return True
+
+    def meet(
+        self,
+        state: OtgState,
+        target: Array,
+        *,
+        speed: Array,
+        minimum: float,
+        latest: float,
+        within: tuple[Array, Array],
+    ) -> bool:
+        """Plan from a state to a target that goes on moving, and go on with it.
+
+        An axis that cannot be at the target at that time meets it farther on. To be at the target itself, in motion, it
+        would have to turn back and take a run-up, or be behind the next targets as well.
+
+        Args:
+            state: its start.
+            target: where the target is after the least duration.
+            speed: of the target.
+            minimum: least duration [s].
+            latest: until which they meet [s].
+            within: lowest and highest coordinates.
+
+        Returns:
+            False if they cannot meet in time, or not within: the last trajectory continues.
+        """
+        q, dq, ddq = state
+        origin = target - minimum * speed
+        here, rest = q - origin, np.zeros_like(q)
+        plan = self._to((here, dq - speed, ddq), rest, speed=rest, frame=speed, minimum=minimum)
+        if plan is None or plan.duration > latest:
+            return False
+        way = speed * plan.duration
+        low, high = within[0] - origin - np.minimum(way, 0.0), within[1] - origin - np.maximum(way, 0.0)
+        if not _stays(plan, here, (low, high)):
+            return False
+        self._plan, self._frame, self.time = plan, (origin, speed), 0.0
+        return True
 
     def halt(self, state: OtgState) -> bool:
         """Plan from a state to rest, wherever that is; returns as `aim` does."""
@@ -128,9 +173,28 @@ class OnlineTrajectory:
         parameters.control_interface, parameters.synchronization = ControlInterface.Velocity, self._halting
         parameters.target_velocity = [0.0] * self._axes
         parameters.minimum_duration = None
-        return self._start(state)
+        plan = self._planned(state)
+        if plan is None:
+            return False
+        self._plan, self._frame, self.time = plan, None, 0.0
+        return True
 
-    def _start(self, state: OtgState, within: tuple[Array, Array] | None = None) -> bool:
+    def _to(
+        self, state: OtgState, target: Array, *, speed: Array, minimum: float, frame: Array | float = 0.0
+    ) -> Trajectory | None:
+        """A trajectory to a target, in a frame that moves [rad/s, m/s]; None: there is none."""
+        parameters = self._input
+        parameters.control_interface, parameters.synchronization = (
+            ControlInterface.Position,
+            self._synchronization,
+        )
+        parameters.max_velocity = (self._velocity - frame).tolist()
+        parameters.min_velocity = (-self._velocity - frame).tolist()
+        parameters.target_position, parameters.target_velocity = target.tolist(), speed.tolist()
+        parameters.minimum_duration = minimum
+        return self._planned(state)
+
+    def _planned(self, state: OtgState) -> Trajectory | None:
         parameters = self._input
         parameters.current_position, parameters.current_velocity, parameters.current_acceleration = (
             values.tolist() for values in state
@@ -139,16 +203,16 @@ class OnlineTrajectory:
         try:
             result = self._planner.calculate(parameters, plan)
         except (RuckigError, ValueError):  # the latter: a result that its Python has no name for
-            return False
-        if result not in (Result.Working, Result.Finished):
-            return False
-        if within is not None:
-            low, high = np.minimum(within[0], state[0]) - _TINY, np.maximum(within[1], state[0]) + _TINY
-            extrema = plan.position_extrema
-            if any(one.min < a or one.max > b for one, a, b in zip(extrema, low, high, strict=True)):
-                return False
-        self._plan, self.time = plan, 0.0
-        return True
+            return None
+        return plan if result in (Result.Working, Result.Finished) else None
+
+
+def _stays(plan: Trajectory, start: Array, within: tuple[Array, Array]) -> bool:
+    """Whether a trajectory stays within coordinates, or does not leave them further than at its start."""
+    low, high = np.minimum(within[0], start) - _TINY, np.maximum(within[1], start) + _TINY
+    return not any(
+        one.min < a or one.max > b for one, a, b in zip(plan.position_extrema, low, high, strict=True)
+    )
 
 
 #: Time step for the angular acceleration, by differences of the angular velocity [s].
@@ -530,6 +594,8 @@ def _along(
 APPROACH = 0.01
 #: Largest velocity at a target relative to the axis' limit: Ruckig needs a margin to reach it.
 MARGIN = 0.999
+#: An axis that has passed its target brakes at the latest after this time [s].
+_BRAKES_LATER = 4.0 * TICK
 
 
 @dataclass(frozen=True, slots=True)
@@ -565,12 +631,30 @@ class ServoLimits:
             dq: wanted velocities, shape (7,) [rad/s].
             later: time after which it brakes [s].
         """
-        # from v at no acceleration it takes at most v² / 2 a + v a / 2 j
-        late = self.acceleration * later + self.acceleration**2 / (2.0 * self.jerk)
-        room = np.maximum(np.where(dq > 0.0, self.highest - q, q - self.lowest), 0.0)
+        late, room = self._late(later), self._room(q, dq)
         most = np.minimum(MARGIN * self.velocity, np.sqrt(late**2 + 2.0 * self.acceleration * room) - late)
         bounded: Array = np.clip(dq, -most, most)
         return bounded
+
+    def time_to_brake(self, q: Array, dq: Array, later: float) -> float:
+        """How long axes may go on before they have to brake for the limits of their positions [s].
+
+        Args:
+            q: positions, shape (7,) [rad].
+            dq: velocities, shape (7,) [rad/s].
+            later: time after which they brake [s].
+        """
+        late, speed = self._late(later), np.abs(dq)
+        left = self._room(q, dq) - ((speed + late) ** 2 - late**2) / (2.0 * self.acceleration)
+        return float((left[speed > 0.0] / speed[speed > 0.0]).min(initial=np.inf))
+
+    def _late(self, later: float) -> Array:
+        # from v at no acceleration it takes at most v² / 2 a + v a / 2 j to come to rest
+        late: Array = self.acceleration * later + self.acceleration**2 / (2.0 * self.jerk)
+        return late
+
+    def _room(self, q: Array, dq: Array) -> Array:
+        return np.maximum(np.where(dq > 0.0, self.highest - q, q - self.lowest), 0.0)
 
     @staticmethod
     def of(
@@ -633,6 +717,7 @@ class SmartFollower:
         self._waits = False  # no trajectory leads to the target yet
         self._waited = 0.0  # since that was tried [s]
         self._passes = False
+        self._until = 0.0  # time of the trajectory until which the velocity at the target is kept [s]
         self._stopping = False
         self._hard: _HardBrake | None = None
         self.resting = 0.0
@@ -655,8 +740,27 @@ class SmartFollower:
             return
         q = self._limits.within(q)
         self._goal, self._waited = (q, dq), 0.0
-        pass_at = np.zeros(7) if dq is None else self._limits.bounded(q, dq, 4.0 * TICK)
-        self._waits = not (self._leads_to(q, pass_at) or (pass_at.any() and self._leads_to(q, np.zeros(7))))
+        pass_at = np.zeros(7) if dq is None else self._limits.bounded(q, dq, _BRAKES_LATER)
+        self._waits = not (
+            (pass_at.any() and (self._meets(q, pass_at) or self._leads_to(q, pass_at)))
+            or self._leads_to(q, np.zeros(7))
+        )
+
+    def _meets(self, q: Array, speed: Array) -> bool:
+        """Follow a trajectory to a target that goes on until its velocity is no longer valid; False: there is none."""
+        limits, least = self._limits, self._limits.timing.min_trajectory_time
+        going_on = min(limits.timing.speed_timeout, limits.time_to_brake(q, speed, _BRAKES_LATER))
+        if not self._otg.meet(
+            self._state(),
+            q,
+            speed=speed,
+            minimum=least,
+            latest=least + going_on,
+            within=(limits.lowest, limits.highest),
+        ):
+            return False
+        self._passes, self._until, self.resting = True, least + limits.timing.speed_timeout, 0.0
+        return True
 
     def _leads_to(self, q: Array, speed: Array) -> bool:
         """Follow a trajectory to a target; False: none does from here, or an axis would leave its range on it."""
@@ -670,6 +774,7 @@ class SmartFollower:
         ):
             return False
         self._passes, self.resting = bool(speed.any()), 0.0
+        self._until = self._otg.duration + limits.timing.speed_timeout
         return True
 
     def ahead(self, dt: float) -> Array:
@@ -684,7 +789,7 @@ class SmartFollower:
         self._otg.time += dt
         over = self._otg.over
         if over >= 0.0:
-            if self._passes and (over > self._limits.timing.speed_timeout or self._nears_limit()):
+            if self._passes and (self._otg.time > self._until or self._nears_limit()):
                 self._halt(self._state())
             elif not self._passes:
                 self.resting = over
