@@ -434,9 +434,9 @@ def test_a_target_that_is_passed_before_a_limit_leaves_room_to_brake(
 
 
 @pytest.mark.parametrize(
-    ("every", "lead", "hold_up"), [(10, 0.015, 0), (5, 0.01, 1), (10, 0.015, 3), (20, 0.06, 3)]
+    ("every", "ahead", "hold_up"), [(10, 0.015, 0), (5, 0.01, 1), (10, 0.015, 3), (20, 0.06, 3)]
 )
-def test_a_stream_with_velocities_is_followed_without_a_lag(every: int, lead: float, hold_up: int) -> None:
+def test_a_stream_with_velocities_is_followed_without_a_lag(every: int, ahead: float, hold_up: int) -> None:
     """Once the axes could not be at a target at its time, they took a run-up of 0.3 s, and were late for the rest."""
     swing = 0.25 * np.array([1.0, 0.5, -0.5, 0.7, 0.3, 1.0, -1.0])
 
@@ -444,11 +444,11 @@ def test_a_stream_with_velocities_is_followed_without_a_lag(every: int, lead: fl
         turn = np.pi * min(time, 1.2) / 1.2
         return HERE + swing * (1.0 - np.cos(turn)) / 2.0, swing * np.sin(turn) * np.pi / 2.4
 
-    plant, _ = serving("servo", ServoTiming(min_trajectory_time=lead))
+    plant, _ = serving("servo", ServoTiming(min_trajectory_time=ahead))
     random, due, behind = np.random.default_rng(0), 0, []
     for tick in range(1400):
         if tick >= due:
-            plant.shared.post(7, *at(tick * 1e-3 + lead))
+            plant.shared.post(7, *at(tick * 1e-3 + ahead))
             due = tick + every + int(random.integers(-1, 2)) * hold_up
         plant.tick()
         behind.append(np.abs(plant.snapshot.q_cmd - at(tick * 1e-3)[0]).max())

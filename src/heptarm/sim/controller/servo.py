@@ -160,8 +160,8 @@ class OnlineTrajectory:
         plan = self._to((here, dq - speed, ddq), rest, speed=rest, frame=speed, minimum=minimum)
         if plan is None or plan.duration > latest:
             return False
-        way = speed * plan.duration
-        low, high = within[0] - origin - np.minimum(way, 0.0), within[1] - origin - np.maximum(way, 0.0)
+        moved = speed * plan.duration
+        low, high = within[0] - origin - np.minimum(moved, 0.0), within[1] - origin - np.maximum(moved, 0.0)
         if not _stays(plan, here, (low, high)):
             return False
         self._plan, self._frame, self.time = plan, (origin, speed), 0.0
