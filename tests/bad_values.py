@@ -108,6 +108,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "record_client": {"path": "no folder of mine/run.mcap"},
     "Recording.__getitem__": {"name": "q"},
     "Recording.chart": {"signals": "q"},
+    "Arm.camera": {"source": _nothing, "pose": None, "matrix": None, "frame": "flange"},
     "Arm.record": {"path": "no folder of mine/run.mcap"},
     "Camera": {"place": (1.5, 0.0, 1.0), "target": (0.2, 0.0, 0.5), "size": (64, 48), "frame": "base"},
     "Limits": {"q_max": np.full(7, 1.0)},
@@ -253,6 +254,7 @@ REPORTS = (
     *(
         "Arm",
         "Arms",
+        "CameraStream",
         "Circle",
         "Clearance",
         "Collision",
@@ -274,6 +276,7 @@ REPORTS = (
         "MotionHandle",
         "MotionOfArms",
         "Outcome",
+        "Picture",
         "Pictures",
         "PoseServo",
         "ProgramPreview",

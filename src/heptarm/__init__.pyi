@@ -8,6 +8,9 @@ from .arm.arm import (
 from .arm.connect import (
     connect as connect,
 )
+from .arm.devices.camera import (
+    CameraStream as CameraStream,
+)
 from .arm.fri.session import (
     Fri as Fri,
 )
@@ -223,6 +226,9 @@ from .twin.replay import (
 )
 from .values.camera import (
     Camera as Camera,
+)
+from .values.camera import (
+    Picture as Picture,
 )
 from .values.clearance import (
     Clearance as Clearance,

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, require
-from heptarm.record.camera import Picture
+from heptarm.errors import require
+from heptarm.record.camera import DrawnPicture
 from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
 from heptarm.record.layout import (
     CAMERA_CALIBRATION,
@@ -45,6 +45,7 @@ from heptarm.record.layout import (
 from heptarm.record.recorded import RecordedData
 from heptarm.record.samples import RestWatch, StateSample, state_rows
 from heptarm.values.camera import Camera
+from heptarm.values.files import unwritable
 from heptarm.values.robot import known_robot
 from heptarm.wire import messages as wire
 
@@ -102,7 +103,7 @@ class RecordingFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("wb")
         except OSError as error:
-            raise _unwritable(path, error) from error
+            raise unwritable(path, error) from error
         self._epoch = epoch
         self._out: Any = writer.Writer(self._file, chunk_size=chunk)
         try:
@@ -110,7 +111,7 @@ class RecordingFile:
             self._begin(facts, arm)
         except OSError as error:
             self.abandon()
-            raise _unwritable(path, error) from error
+            raise unwritable(path, error) from error
 
     def beside(self, facts: Mapping[str, str], arm: str) -> RecordingFile:
         """A writer of another arm's part of the same file; `flush`, `finish` and `abandon` are left to this one."""
@@ -214,7 +215,7 @@ class RecordingFile:
             at = received + self._epoch
             self._out.add_message(self._cycles, at, data[index * size : (index + 1) * size], at)
 
-    def picture(self, camera: Camera, picture: Picture) -> None:
+    def picture(self, camera: Camera, picture: DrawnPicture) -> None:
         """Write a picture, how the camera projects, and the camera's frame: z ahead, x to the right, y down."""
         if self._camera is None:
             image = self._add("/camera/image", *COMPRESSED_IMAGE)
@@ -343,12 +344,3 @@ def merge(path: Path, recordings: Mapping[str, RecordedData]) -> Path:
         out.abandon()
         raise
     return path
-
-
-def _unwritable(path: Path, error: OSError) -> CommandRejected:
-    return CommandRejected(
-        f"{path} cannot be written: {error.strerror}",
-        parameter="path",
-        value=str(path),
-        hint="choose a folder in which this user may write, on a disk that has space",
-    )
