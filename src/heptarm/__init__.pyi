@@ -170,6 +170,9 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .export.files import (
+    export_model as export_model,
+)
 from .fri.loop.compiled import (
     law as law,
 )
@@ -208,6 +211,18 @@ from .skills.insertion import (
 )
 from .skills.replay import (
     Replay as Replay,
+)
+from .twin.comparison import (
+    Deviation as Deviation,
+)
+from .twin.comparison import (
+    RepeatedMotion as RepeatedMotion,
+)
+from .twin.comparison import (
+    Twin as Twin,
+)
+from .twin.replay import (
+    replay_in_sim as replay_in_sim,
 )
 from .values.camera import (
     Camera as Camera,

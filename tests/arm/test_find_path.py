@@ -81,7 +81,7 @@ def test_a_path_is_searched_with_what_is_attached(arm: ha.Arm, wall: ha.Collisio
 def test_a_path_is_checked_again_when_the_world_has_changed(arm: ha.Arm, wall: ha.CollisionModel) -> None:
     path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
     middle = path.curve[len(path.curve) // 2]
-    wall.add("crate", shapes.sphere(0.1), at=Pose.of(model.forward(IIWA, middle)[:3, 3]))
+    wall.add("crate", shapes.sphere(0.05), at=Pose.of(model.forward(IIWA, middle)[:3, 3]))
     with pytest.raises(ha.CollisionForeseen, match=r"crate.* of the path") as error:
         arm.move(path)
     assert error.value.touch.clearance.second == "crate"

@@ -17,7 +17,7 @@ from typing import Annotated, NoReturn
 from cyclopts import App, CycloptsError, Parameter, UnknownOptionError, UnusedCliTokensError
 
 from heptarm import __version__
-from heptarm.errors import HeptarmError, missing_extra
+from heptarm.errors import HeptarmError, missing_extra, shortage
 
 #: Exit code after misuse of a command, as of other tools.
 _USAGE = 2
@@ -39,6 +39,8 @@ COMMANDS = {
     "record": "record:record",
     "plot": "plot:plot",
     "convert": "record:convert",
+    "twin": "twin:twin",
+    "export": "export:export",
     "doctor": "doctor:doctor",
     "bench": "bench:bench",
     "check": "check:check",
@@ -52,6 +54,7 @@ TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remo
 CALIBRATIONS = {
     "tcp": "calibrate:tcp",
     "load": "calibrate:load",
+    "arm": "calibrate:arm",
     "eye": "calibrate_eye:eye",
     "board": "calibrate_eye:board",
 }
@@ -108,7 +111,8 @@ _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
 _plans = App(name="plan", help="Look ahead of a motion: duration, limits, collisions; nothing moves.")
 _calibrate = App(
-    name="calibrate", help="Measure the tip of a tool, the load on the flange, and where a camera is."
+    name="calibrate",
+    help="Measure the tip of a tool, the load on the flange, where a camera is, and what the arm itself is like.",
 )
 _keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
 _targets = App(name="targets", help="List, save and remove robots that have a name.")
@@ -161,6 +165,11 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone, as in `heptarm state --watch | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        remedy = shortage(error)
+        if not remedy or os.environ.get("HEPTARM_DEBUG"):
+            raise
+        _fail(f"{(error.strerror or '').lower()} ({remedy})")
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.batch import forward_batch
 from heptarm.planning.motion import PlanError
-from heptarm.planning.path import JointPath
+from heptarm.planning.path import JointPath, Sequential
 from heptarm.planning.time_scaling import PathConstraints
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
@@ -75,7 +75,7 @@ class Segment:
     samples: int = 61
 
 
-class CompositePath:
+class CompositePath(Sequential):
     """Path over s in [0, 1] made of segments.
 
     Args:
@@ -84,12 +84,7 @@ class CompositePath:
 
     Attributes:
         marks: s at which each segment begins, and 1.
-        line: see `JointPath`; it is not asked for one.
-        keeps_a3: see `JointPath`; its segments are asked.
     """
-
-    line = None
-    keeps_a3 = False
 
     def __init__(self, segments: list[Segment]) -> None:
         self.segments = segments
@@ -146,6 +141,10 @@ class SubPath:
         """Joint positions next to `near`, shape (7,) [rad]."""
         return self._path.at(self._first + s * self._span, near)
 
+    def samples(self, s: Array) -> Array | None:
+        """See `JointPath`."""
+        return self._path.samples(self._first + s * self._span)
+
 
 @dataclass(frozen=True, slots=True)
 class PathSamples:
@@ -155,11 +154,13 @@ class PathSamples:
         q: of each segment, shapes (n, 7) [rad].
         positions: of the tool frame, shapes (n, 3) [m].
         rotations: of the flange, matrices, shapes (n, 3, 3).
+        followed: whether they had to be computed one after the other.
     """
 
     q: list[Array]
     positions: list[Array]
     rotations: list[Array]
+    followed: list[bool]
 
 
 def check_limits(robot: RobotModel, q: Array, where: str = "") -> None:
@@ -183,7 +184,7 @@ def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> P
     Raises:
         PlanError: it leaves the workspace or the joint limits, or passes a singularity: what comes first on the way.
     """
-    result, near = PathSamples([], [], []), start
+    result, near = PathSamples([], [], [], []), start
     # an axis that is outside, after its drive has tripped, may come back
     lowest, highest = np.minimum(robot.q_min, start) - 1e-9, np.maximum(robot.q_max, start) + 1e-9
 
@@ -194,10 +195,9 @@ def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> P
 
     for segment, span in zip(path.segments, pairwise(path.marks), strict=True):
         fractions = np.linspace(0.0, 1.0, segment.samples)
-        line = segment.path.line
-        if line is not None:
-            joints = line[0] + fractions[:, None] * line[1]
-        else:
+        joints = segment.path.samples(fractions)
+        result.followed.append(joints is None)
+        if joints is None:
             joints = _followed(segment.path, near, fractions, span, check)
         check(joints)
         near = joints[-1]

@@ -34,6 +34,9 @@ class JointPath(Protocol):
             Unreachable: the path leaves the workspace.
         """
 
+    def samples(self, s: Array) -> Array | None:
+        """Joint positions at n values of s, shape (n, 7) [rad]; None: each depends on the one before."""
+
 
 class JointLine:
     """Straight line in joint space."""
@@ -51,6 +54,12 @@ class JointLine:
         start, span = self.line
         return start + s * span
 
+    def samples(self, s: Array) -> Array:
+        """See `JointPath`."""
+        start, span = self.line
+        found: Array = start + s[:, None] * span
+        return found
+
 
 class Sequential:
     """A path whose joint positions have to be computed one after the other."""
@@ -63,6 +72,10 @@ class Sequential:
     def keeps_a3(self) -> bool:
         """See `JointPath`."""
         return False
+
+    def samples(self, s: Array) -> Array | None:
+        """See `JointPath`."""
+        return None
 
 
 class CartesianPath(Sequential):

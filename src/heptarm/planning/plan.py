@@ -179,15 +179,15 @@ def _excess(
 ) -> _Excess | None:
     """Where set-points on a path near a singularity are too fast for an axis; None: nowhere.
 
-    There joints turn fast within a short part of the path, and where A3 cannot stay each joint position depends on the
-    one before: samples may miss both, so the set-points themselves are looked at.
+    There the inverse kinematics turns joints fast within a short part of the path, and where A3 cannot stay each joint
+    position depends on the one before: samples may miss both, so the set-points themselves are looked at. Paths in
+    joint space have no such places.
 
     Raises:
         PlanError: a set-point has no joint position next to the one before.
     """
-    followed = [
-        (one.path, q) for one, q in zip(path.segments, samples.q, strict=True) if one.path.line is None
-    ]
+    each = zip(path.segments, samples.q, samples.followed, strict=True)
+    followed = [(one.path, q) for one, q, is_followed in each if is_followed]
     does_a3_move = any(one.keeps_a3 and np.ptp(q[:, 2]) > _STAYS for one, q in followed)
     if not (does_a3_move or any(_is_near_singular(robot, q) for _, q in followed)):
         return None

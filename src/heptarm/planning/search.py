@@ -2,20 +2,23 @@
 
 Two trees of joint positions grow towards each other (RRT-Connect, Kuffner and LaValle 2000), under a constraint by
 steps that are projected onto it (CBiRRT, Berenson et al. 2009). Where bodies are in the way, only near targets count
-(dynamic domain, Yershova et al. 2005). What they find is shortened, laid on a joint spline that is checked again, and
-timed by the planner of the controller.
+(dynamic domain, Yershova et al. 2005); where few places are near, they are drawn around the trees. What they find is
+shortened, laid on a joint spline that is checked again, and timed by the planner of the controller.
 """
 
 from __future__ import annotations
 
+import ctypes
+import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
+from heptarm._library import library
 from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
@@ -34,7 +37,7 @@ _SLIGHT = 0.005
 #: Longest step of a tree [rad], of all joints together; under constraints they are shorter.
 _STEP = 1.2
 #: Steps that joint positions reach at which bodies are in the way; targets that are drawn at a time.
-_REACH, _DRAWN = 1.7, 32
+_REACH, _DRAWN = 1.7, 8
 #: Angles of A3 at which a pose is solved, in each Status; poses that stand for a region.
 _ELBOWS, _POSES = 36, 24
 #: Most joint positions that stand for the goals.
@@ -145,6 +148,20 @@ def find_path(
     )
 
 
+@functools.cache
+def _functions() -> ctypes.CDLL:
+    """The functions of native/nearest.c.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing.
+    """
+    made, (word, pointer) = library(holds_gil=True), (ctypes.c_int64, ctypes.c_void_p)
+    made.hn_nearest.restype = made.hn_within.restype = word
+    made.hn_nearest.argtypes = (word, pointer, pointer)
+    made.hn_within.argtypes = (word, pointer, pointer, word, pointer)
+    return made
+
+
 class _Budget:
     """What a search may take, and has taken.
 
@@ -211,9 +228,8 @@ class _Tree:
     """
 
     def __init__(self, roots: Array) -> None:
-        self._q = np.empty((max(256, 2 * len(roots)), 7))
-        self._reach = np.full(len(self._q), inf)
         self._parents: list[int] = []
+        self._keep(np.empty((max(256, 2 * len(roots)), 7)), np.full(max(256, 2 * len(roots)), inf))
         for root in roots:
             self.add(root, -1)
 
@@ -221,25 +237,34 @@ class _Tree:
         """Add joint positions; returns their index."""
         index = len(self._parents)
         if index == len(self._q):
-            self._q = np.concatenate([self._q, np.empty_like(self._q)])
-            self._reach = np.concatenate([self._reach, np.full_like(self._reach, inf)])
+            more = np.empty_like(self._q), np.full_like(self._reach, inf)
+            self._keep(np.concatenate([self._q, more[0]]), np.concatenate([self._reach, more[1]]))
         self._q[index] = q
         self._parents.append(parent)
         return index
 
+    def _keep(self, q: Array, reach: Array) -> None:
+        self._q, self._reach = q, reach
+        self._addresses = q.ctypes.data, reach.ctypes.data
+
     def nearest(self, q: Array) -> int:
         """Index of the nearest joint positions."""
-        return int(((self._q[: len(self._parents)] - q) ** 2).sum(axis=1).argmin())
+        found: int = _functions().hn_nearest(len(self._parents), self._addresses[0], q.ctypes.data)
+        return found
 
-    def target(self, random: np.random.Generator, low: Array, high: Array) -> Array | None:
-        """Random joint positions between limits; None: each is beyond the reach of its nearest ones."""
-        drawn = random.uniform(low, high, (_DRAWN, 7))
-        q = self._q[: len(self._parents)]
-        squares = (q**2).sum(axis=1) - 2.0 * drawn @ q.T
-        nearest = squares.argmin(axis=1)
-        squares = squares[np.arange(_DRAWN), nearest] + (drawn**2).sum(axis=1)
-        within = np.flatnonzero(squares <= self._reach[nearest] ** 2)
-        return drawn[within[0]] if len(within) else None
+    def target(self, random: np.random.Generator, low: Array, high: Array, *, near: float) -> Array:
+        """Random joint positions between limits, within the reach of the nearest ones of the tree.
+
+        Where few are, they are in a ball around random ones of the tree, of the radius of their reach, at most `near`
+        [rad].
+        """
+        count, drawn = len(self._parents), low + (high - low) * random.random((_DRAWN, 7))
+        first: int = _functions().hn_within(count, *self._addresses, _DRAWN, drawn.ctypes.data)
+        if first >= 0:
+            return drawn[first]
+        middle = random.integers(count)
+        found: Array = self._q[middle] + min(self._reach[middle], near) * _in_ball(random)
+        return np.clip(found, low, high)
 
     def limit(self, target: Array, reach: float) -> None:
         """Let the nearest joint positions reach only so far [rad], since bodies were in the way to a target."""
@@ -395,18 +420,17 @@ class _Search:
         one, other, is_swapped, nearest = _Tree(self._start[None]), _Tree(goals), False, inf
         low = np.minimum(np.minimum(self._robot.q_min + _INSIDE, self._start), goals.min(axis=0))
         high = np.maximum(np.maximum(self._robot.q_max - _INSIDE, self._start), goals.max(axis=0))
+        reach = _REACH * self._step
         while True:
             self._budget.check(nearest)
             target = (
-                one.target(self._random, low, high)
+                one.target(self._random, low, high, near=reach)
                 if longest == inf
                 else np.clip(self._near(goals, longest), low, high)
             )
-            if target is None:
-                continue
             new = self._extend(one, target, steps=1)
             if new is None:
-                one.limit(target, _REACH * self._step)
+                one.limit(target, reach)
             else:
                 near = other.nearest(one.at(new))
                 reached = self._extend(other, one.at(new), steps=1000)
@@ -429,8 +453,7 @@ class _Search:
         lengths = np.linalg.norm(gaps, axis=1)
         near = np.flatnonzero(lengths < longest)
         chosen = int(self._random.choice(near)) if len(near) else int(lengths.argmin())
-        ball = self._random.normal(size=7)
-        ball *= self._random.uniform() ** (1.0 / 7.0) / np.linalg.norm(ball)
+        ball = _in_ball(self._random)
         along = gaps[chosen] / max(float(lengths[chosen]), 1e-9)
         across = np.sqrt(max(longest**2 - lengths[chosen] ** 2, 0.0))
         part = ball @ along
@@ -455,7 +478,7 @@ class _Search:
         for _ in range(steps):
             here = tree.at(index)
             gap = target - here
-            length = float(np.linalg.norm(gap))
+            length = sqrt(gap @ gap)
             if length < 1e-9:
                 return index
             there = target if length <= self._step else here + self._step / length * gap
@@ -521,13 +544,16 @@ class _Search:
         for place, index in ((low, first), (high, min(last, len(steps) - 1))):
             part = (place - marks[index]) / steps[index]
             ends.append(points[index] + part * (points[index + 1] - points[index]))
+        longest = 0.98 * (high - low)
+        if np.linalg.norm(ends[1] - ends[0]) > longest:
+            return points
         if self._keep is not None and not all(map(self._keep.is_kept, ends)):
             return points
         line = self._line(ends[0], ends[1])
         if line is None:
             return points
         length = float(np.linalg.norm(np.diff([ends[0], *line], axis=0), axis=1).sum())
-        if length > 0.98 * (high - low):
+        if length > longest:
             return points
         return [*points[: first + 1], ends[0], *line, *points[min(last, len(steps) - 1) + 1 :]]
 
@@ -615,6 +641,12 @@ class _Search:
         return allowed[0] if allowed else None
 
 
+def _in_ball(random: np.random.Generator) -> Array:
+    """A random place in the ball of radius 1 around the origin, shape (7,)."""
+    found: Array = random.normal(size=7)
+    return found * (random.uniform() ** (1.0 / 7.0) / np.linalg.norm(found))
+
+
 def _sampled(region: Region, random: np.random.Generator) -> list[Pose]:
     """Poses of a region: its middle, and others at random."""
     found = [region.pose]
@@ -672,4 +704,4 @@ def _curve(robot: RobotModel, points: Array) -> Array:
     from heptarm.planning.spline import through
 
     lengths = np.maximum(np.abs(np.diff(points, axis=0) / robot.dq_max).max(axis=1), 1e-9)
-    return through(points, lengths).samples(_SAMPLES)
+    return through(points, lengths).even(_SAMPLES)

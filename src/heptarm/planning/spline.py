@@ -25,7 +25,7 @@ from heptarm.planning.motion import (
     or_default,
     orientation_of,
 )
-from heptarm.planning.path import CartesianPath, Sequential
+from heptarm.planning.path import CartesianPath
 from heptarm.planning.plan import Plan, timed
 from heptarm.planning.targets import (
     JointMotion,
@@ -47,9 +47,12 @@ class Quintic:
         length: growth of the curve's parameter along it.
         start: position, slope and curvature at its start, each shape (m,).
         end: likewise.
+
+    Attributes:
+        coefficients: of each coordinate, the highest power first.
     """
 
-    __slots__ = ("_coefficients",)
+    __slots__ = ("coefficients",)
 
     def __init__(
         self, length: float, start: tuple[Array, Array, Array], end: tuple[Array, Array, Array]
@@ -64,18 +67,13 @@ class Quintic:
             v,
             p,
         )
-        self._coefficients: list[tuple[float, ...]] = [tuple(column) for column in np.array(rows).T.tolist()]
+        self.coefficients: list[tuple[float, ...]] = [tuple(column) for column in np.array(rows).T.tolist()]
 
     def at(self, t: float) -> tuple[float, ...]:
         """Position at a fraction t of the piece."""
         return tuple(
-            ((((a * t + b) * t + c) * t + d) * t + e) * t + f for a, b, c, d, e, f in self._coefficients
+            ((((a * t + b) * t + c) * t + d) * t + e) * t + f for a, b, c, d, e, f in self.coefficients
         )
-
-    def samples(self, t: Array) -> Array:
-        """Positions at n fractions of the piece, shape (n, m)."""
-        found: Array = np.vander(t, 6) @ np.array(self._coefficients).T
-        return found
 
 
 def slopes(points: Array, lengths: Array, first: Array | None, last: Array | None) -> tuple[Array, Array]:
@@ -115,6 +113,7 @@ class Piecewise:
     def __init__(self, lengths: Array, pieces: list[Quintic]) -> None:
         ends = np.cumsum(lengths)
         self._pieces = pieces
+        self._coefficients = np.array([piece.coefficients for piece in pieces])
         self._marks: list[float] = [0.0, *(ends / ends[-1]).tolist()]
 
     def at(self, s: float) -> tuple[float, ...]:
@@ -123,10 +122,19 @@ class Piecewise:
         low, high = self._marks[index], self._marks[index + 1]
         return self._pieces[index].at((s - low) / (high - low))
 
-    def samples(self, count: int) -> Array:
+    def samples(self, s: Array) -> Array:
+        """Positions at n fractions of the whole, shape (n, m)."""
+        marks = np.array(self._marks)
+        index = np.clip(np.searchsorted(marks, s, side="right") - 1, 0, len(self._pieces) - 1)
+        t = (s - marks[index]) / (marks[index + 1] - marks[index])
+        found: Array = np.einsum("nk,nmk->nm", np.vander(t, 6), self._coefficients[index])
+        return found
+
+    def even(self, count: int) -> Array:
         """Positions at so many places of each piece, and at the end."""
-        places = np.linspace(0.0, 1.0, count, endpoint=False)
-        return np.vstack([*(piece.samples(places) for piece in self._pieces), self.at(1.0)])
+        places = np.vander(np.linspace(0.0, 1.0, count, endpoint=False), 6)
+        inner = np.einsum("nk,pmk->pnm", places, self._coefficients)
+        return np.vstack([inner.reshape(-1, inner.shape[2]), self.at(1.0)])
 
 
 def through(points: Array, lengths: Array) -> Piecewise:
@@ -138,10 +146,13 @@ def through(points: Array, lengths: Array) -> Piecewise:
     )
 
 
-class JointCurve(Sequential):
+class JointCurve:
     """Smooth curve through joint positions."""
 
     __slots__ = ("_curve",)
+
+    line = None
+    keeps_a3 = False
 
     def __init__(self, points: Array, lengths: Array) -> None:
         self._curve = through(points, lengths)
@@ -149,6 +160,10 @@ class JointCurve(Sequential):
     def at(self, s: float, near: Array) -> Array:
         """Joint positions, shape (7,) [rad]; `near` is not used."""
         return np.array(self._curve.at(s))
+
+    def samples(self, s: Array) -> Array:
+        """See `JointPath`."""
+        return self._curve.samples(s)
 
 
 class Orientations:

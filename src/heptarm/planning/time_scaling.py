@@ -7,6 +7,8 @@ velocity curve is integrated forwards and backwards (Bobrow 1985), then smoothed
 
 from __future__ import annotations
 
+import ctypes
+import functools
 from bisect import bisect_right
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -14,6 +16,7 @@ from math import sqrt
 
 import numpy as np
 
+from heptarm._library import library
 from heptarm.errors import CommandRejected
 from heptarm.planning.jerk_profile import (
     JerkProfile,
@@ -51,10 +54,38 @@ _CHECKS = 60
 #: Shortest time between two of them, as a fraction of the duration.
 _APART = 1e-9
 _AXES = 7
+#: At least this fraction of what is free for acceleration accelerates, where the curvature leaves less.
+SPARE = 0.05
 #: A motion slower than this fraction of its full speed stops at once.
 _BARELY = 1e-3
 #: A motion that brakes already gets this much more jerk than it needs to end that.
 _SOONER = 1.05
+_POINTER, _WORD, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+
+
+class _Limits(ctypes.Structure):
+    """`struct limits` of native/path_timing.c."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("s", "steepest", "first", "second", "third", "fastest")),
+        *((name, _POINTER) for name in ("velocity", "acceleration", "jerk")),
+        *(("count", _WORD), ("axes", _WORD)),
+    )
+
+
+@functools.cache
+def _functions() -> ctypes.CDLL:
+    """The functions of native/path_timing.c.
+
+    Raises:
+        Unavailable: the compiled part of heptarm is missing.
+    """
+    made = library()
+    made.hp_least_around.restype = made.hp_reachable.restype = made.hp_excess.restype = None
+    made.hp_least_around.argtypes = (_WORD, *[_POINTER] * 4)
+    made.hp_reachable.argtypes = (_WORD, _WORD, *[_POINTER] * 3, _REAL, _POINTER)
+    made.hp_excess.argtypes = (_POINTER, _WORD, *[_POINTER] * 5)
+    return made
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,8 +361,9 @@ class _Search:
         # what the average falls behind by
         self._behind = (path.acceleration / first).min(axis=1) * self._window**2 / 24
         limited = np.isfinite(path.acceleration).any(axis=0)
-        self._free = (path.acceleration / first)[:, limited]
-        self._taken = (np.abs(path.second) / first)[:, limited]
+        self._free = np.ascontiguousarray((path.acceleration / first)[:, limited])
+        self._taken = np.ascontiguousarray((np.abs(path.second) / first)[:, limited])
+        self._excess = Excess(path)
 
     def profile(self) -> TabulatedProfile:
         """The best profile found."""
@@ -340,8 +372,8 @@ class _Search:
         best: tuple[float, float, Array] | None = None
         for _ in range(_ROUNDS):
             reach = fastest * window / 2 + self._behind
-            step, speed = self._integrate(_widened(path.s, fastest, reach), grip)
-            speeds, accelerations, jerks = _excess(path, step, speed)
+            step, speed = self._integrate(least_around(path.s, fastest, reach), grip)
+            speeds, accelerations, jerks = self._excess.of(step, speed)
             # as a whole it may be too fast by this
             k = max(1.0, float(speeds.max()), sqrt(float(accelerations.max())), float(np.cbrt(jerks.max())))
             duration = k * step * (len(speed) - 1)
@@ -349,9 +381,10 @@ class _Search:
                 best = duration, k, speed
             if k <= _TOLERANCE or duration / k >= best[0]:
                 break
-            hard = _spread(path.s, accelerations, fastest * window)
-            slower = np.maximum(_spread(path.s, speeds, fastest * window), np.sqrt(hard))
-            slower = np.maximum(slower, np.cbrt(_spread(path.s, jerks, fastest * window)))
+            around = fastest * window
+            hard = -least_around(path.s, -accelerations, around)
+            slower = np.maximum(-least_around(path.s, -speeds, around), np.sqrt(hard))
+            slower = np.maximum(slower, np.cbrt(-least_around(path.s, -jerks, around)))
             fastest = fastest / np.sqrt(np.maximum(1.0, slower))
             grip = grip / np.sqrt(np.maximum(1.0, hard))
         assert best is not None
@@ -363,23 +396,7 @@ class _Search:
         s, window = self._path.s, self._window
         square = fastest**2
         square[0] = square[-1] = 0.0
-        gaps = (2.0 * np.diff(s)).tolist()
-        free = self._free * grip[:, None]
-        least = (0.05 * free.min(axis=1)).tolist()
-        lines = _binding(free, self._taken, square)
-        x = square.tolist()
-        count = len(x)
-        for k in range(count - 1):
-            now = x[k]
-            if now < x[k + 1]:
-                more = min([a - b * now for a, b in lines[k] + lines[k + 1]])
-                x[k + 1] = min(x[k + 1], now + gaps[k] * max(least[k], more))
-        for k in range(count - 1, 0, -1):
-            now = x[k]
-            if now < x[k - 1]:
-                more = min([a - b * now for a, b in lines[k] + lines[k - 1]])
-                x[k - 1] = min(x[k - 1], now + gaps[k - 1] * max(least[k], more))
-        speed = np.sqrt(np.array(x))
+        speed = np.sqrt(reachable(s, self._free * grip[:, None], self._taken, square))
         times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (speed[1:] + speed[:-1]))])
         step = max(_STEP, float(times[-1]) / _MOST_SAMPLES)
         count = min(max(1, round(window / step)), _MOST_AVERAGED)
@@ -389,53 +406,57 @@ class _Search:
         return step, (total[count:] - total[:-count]) / count
 
 
-def _binding(free: Array, taken: Array, square: Array) -> list[list[tuple[float, float]]]:
-    """At each sample the bounds free - taken * x that can be the least for some x that is asked for."""
-    most = square.max()
-    # a bound whose value at both ends of [0, most] lies above another's can never be the least
-    at_zero, at_most = free, free - taken * most
-    above = (at_zero[:, :, None] >= at_zero[:, None, :]) & (at_most[:, :, None] >= at_most[:, None, :])
-    strictly = above & ~above.transpose(0, 2, 1)
-    keep = ~strictly.any(axis=2)
-    rows = zip(free.tolist(), taken.tolist(), keep.tolist(), strict=True)
-    return [[(a, b) for a, b, kept in zip(*row, strict=True) if kept] for row in rows]
+def reachable(s: Array, free: Array, taken: Array, square: Array) -> Array:
+    """Squares of speed that accelerations allow, forwards and backwards (Bobrow 1985), shape (n,).
 
-
-def _widened(s: Array, fastest: Array, reaches: Array) -> Array:
-    """Every speed also holds within its reach to both sides."""
-    result = fastest.copy()
-    lows = np.searchsorted(s, s - reaches).tolist()
-    highs = np.searchsorted(s, s + reaches).tolist()
-    for index in np.argsort(-fastest).tolist():  # the slowest place has the last word
-        part = result[lows[index] : highs[index]]
-        np.minimum(part, fastest[index], out=part)
+    Args:
+        s: path parameter at samples, ascending, shape (n,).
+        free: largest acceleration of s by each coordinate at speed 0, shape (n, m).
+        taken: by how much that falls with the square of speed, shape (n, m).
+        square: largest squares of speed, shape (n,).
+    """
+    given, result = [np.ascontiguousarray(one) for one in (s, free, taken)], square.copy()
+    addresses = [one.ctypes.data for one in given]
+    _functions().hp_reachable(*free.shape, *addresses, SPARE, result.ctypes.data)
     return result
 
 
-def _spread(s: Array, excess: Array, reach: Array) -> Array:
-    """The largest excess within a reach to both sides."""
-    result = excess.copy()
-    for index in np.flatnonzero(excess > 1.0).tolist():
-        low, high = np.searchsorted(s, (s[index] - reach[index], s[index] + reach[index]))
-        result[low:high] = np.maximum(result[low:high], excess[index])
+class Excess:
+    """Factors by which motions along a path exceed its limits."""
+
+    def __init__(self, path: PathConstraints) -> None:
+        limited = np.isfinite([path.velocity, path.acceleration, path.jerk]).any(axis=(0, 1))
+        columns = (path.steepest, path.first, path.second, path.third)
+        limits = (path.velocity, path.acceleration, path.jerk)
+        self._s, self._arrays = (
+            path.s,
+            [
+                *(np.ascontiguousarray(path.s), *(one[:, limited].copy() for one in columns)),
+                *(np.ascontiguousarray(path.fastest), *(one[:, limited].copy() for one in limits)),
+            ],
+        )
+        addresses = [one.ctypes.data for one in self._arrays]
+        self._memory = _Limits(*addresses, len(path.s), int(limited.sum()))
+
+    def of(self, step: float, speed: Array) -> Array:
+        """Of velocity, acceleration and jerk at the samples of the path, shape (3, n).
+
+        Args:
+            step: time between two samples of the speed [s].
+            speed: ds/dt over time.
+        """
+        place = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
+        place = self._s[0] + place * ((self._s[-1] - self._s[0]) / place[-1])
+        acceleration = np.gradient(speed, step)
+        jerk, result = np.gradient(acceleration, step), np.zeros((3, len(self._s)))
+        given = [one.ctypes.data for one in (place, speed, acceleration, jerk, result)]
+        _functions().hp_excess(ctypes.byref(self._memory), len(place), *given)
+        return result
+
+
+def least_around(s: Array, values: Array, reaches: Array) -> Array:
+    """The least of values within a reach to both sides of each sample of s; all of shape (n,)."""
+    given, result = [np.ascontiguousarray(one) for one in (s, values, reaches)], np.empty_like(values)
+    addresses = [one.ctypes.data for one in (*given, result)]
+    _functions().hp_least_around(len(s), *addresses)
     return result
-
-
-def _excess(path: PathConstraints, step: float, speed: Array) -> tuple[Array, Array, Array]:
-    """Factors by which velocity, acceleration and jerk exceed their limits, at the samples of the path."""
-    place = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
-    place = path.s[0] + place * ((path.s[-1] - path.s[0]) / place[-1])
-    v, acceleration = speed[:, None], np.gradient(speed, step)
-    a, j = acceleration[:, None], np.gradient(acceleration, step)[:, None]
-    steepest, first, second, third = (
-        np.column_stack([np.interp(place, path.s, column) for column in x.T])
-        for x in (path.steepest, path.first, path.second, path.third)
-    )
-    at = np.clip(np.searchsorted(path.s, place), 0, len(path.s) - 1)
-    fast = np.maximum((steepest * v / path.velocity[at]).max(axis=1), speed / path.fastest[at])
-    hard = np.abs(first * a + second * v**2) / path.acceleration[at]
-    sudden = np.abs(first * j + 3 * second * v * a + third * v**3) / path.jerk[at]
-    result = np.zeros((3, len(path.s)))
-    for row, seen in zip(result, (fast, hard.max(axis=1), sudden.max(axis=1)), strict=True):
-        np.maximum.at(row, at, seen)
-    return result[0], result[1], result[2]

@@ -21,7 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from heptarm.errors import CommandRejected, HeptarmError, require
+from heptarm.errors import CommandRejected, HeptarmError, require, system_errors
 from heptarm.io.keys import environment
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
@@ -109,7 +109,9 @@ class CameraFeed:
             CommandRejected: there is no such scene, or this machine cannot draw.
         """
         require("PIL.Image", extra="record")
-        if find_spec("mujoco") is None:  # imported in the process alone
+        with system_errors("the package 'mujoco' cannot be looked for"):
+            is_missing = find_spec("mujoco") is None  # imported in the process alone
+        if is_missing:
             require("mujoco", extra="sim")
         failures: list[str] = []
         for driver in _drivers():
@@ -163,14 +165,15 @@ class CameraFeed:
             "layers": self._layers,
         }
         # a session of its own: Ctrl-C in the terminal ends the recording, which then ends this process
-        return subprocess.Popen(
-            [sys.executable, "-m", "heptarm.sim.camera", json.dumps(settings)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,  # why it cannot begin
-            start_new_session=True,
-            env={_THREADS: "1"} | environment(None) | ({_DRIVER: driver} if driver else {}),
-        )
+        with system_errors("the process of the camera cannot be started"):
+            return subprocess.Popen(
+                [sys.executable, "-m", "heptarm.sim.camera", json.dumps(settings)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,  # why it cannot begin
+                start_new_session=True,
+                env={_THREADS: "1"} | environment(None) | ({_DRIVER: driver} if driver else {}),
+            )
 
     @property
     def pid(self) -> int:

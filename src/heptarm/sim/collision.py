@@ -53,8 +53,8 @@ NEAR = 0.1
 POINT_RADIUS = 0.01
 #: Bodies on a path may be nearer than a margin of 0 between two checks, by half of this [m].
 _LEAST_MARGIN = 1e-3
-#: Farther bodies are not looked for on a path: that takes longer than shorter steps [m].
-_FAR = 0.05
+#: Exact distances of farther bodies are not computed on a path: that takes longer than shorter steps [m].
+_FAR = 0.1
 #: Most spheres of a cloud.
 _MOST_SPHERES = 5000
 #: First parts of names in compiled models, which no arm may have.
@@ -130,6 +130,8 @@ class CollisionModel(Sealed):
         self._robot = known(robot)
         self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
         self._allowed = pairs
+        least = max(self._margin, _LEAST_MARGIN)
+        self._steps = {"margin": self._margin, "least": least, "far": max(_FAR, self._margin)}
         self._lock = threading.Condition(threading.RLock())
         self._revision = 0
         self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
@@ -622,7 +624,7 @@ class CollisionModel(Sealed):
                 for name, row in rows.items():
                     self._distances.set_arm(name, row[k] + at * (row[last] - row[k]))
                 here = path[k] + at * (path[last] - path[k])
-                found = self._distances.nearest_of_arms(here, max(_FAR, self._margin))
+                found = self._distances.nearest_of_arms(here, self._steps["far"])
                 if found is not None and found[1] < self._margin:
                     return ForeseenCollision(
                         Clearance(*found[0], found[1]),
@@ -630,8 +632,8 @@ class CollisionModel(Sealed):
                         0,
                         frozen(here),
                     )
-                free = max(self._margin, _LEAST_MARGIN)
-                free += max(_FAR, self._margin) if found is None else found[1]
+                free = self._steps["least"]
+                free += self._steps["far"] if found is None else found[1]
             free -= (1.0 - at) * moved
         return None
 
@@ -740,15 +742,6 @@ class CollisionModel(Sealed):
         # a pair that touches at the beginning may be left
         return self.first_on(line) is None if free is None else free
 
-    @property
-    def _steps(self) -> dict[str, float]:
-        """Margin and steps on a path, see `Distances.first`."""
-        return {
-            "margin": self._margin,
-            "least": max(self._margin, _LEAST_MARGIN),
-            "far": max(_FAR, self._margin),
-        }
-
     def _leave(
         self, first: Array, last: Array, known: dict[tuple[str, str], float]
     ) -> tuple[float, Clearance | None]:
@@ -763,7 +756,7 @@ class CollisionModel(Sealed):
             The fraction at which it ends, and the pair that may not touch there; None: there is none.
         """
         change, at = last - first, 0.0
-        moved, least = self._distances.moved(change), max(self._margin, _LEAST_MARGIN)
+        moved, least = self._distances.moved(change), self._steps["least"]
         while known and at < 1.0:
             at = min(1.0, at + (self._margin + least) / max(moved, least))
             found = self._new(first + at * change, known)

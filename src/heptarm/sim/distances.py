@@ -44,11 +44,10 @@ class _Checks(ctypes.Structure):
             (name, _POINTER)
             for name in ["model", "data", "kinematics", "distance", "positions", "places", "turns"]
         ],
-        *[(name, _POINTER) for name in ["flange_place", "flange_turn", "hulls", "entries"]],
-        *[("count", _WORD), ("all", _WORD)],
+        *[(name, _POINTER) for name in ["flange_place", "flange_turn", "hulls", "centres"]],
+        *[("shells", _WORD), ("entries", _POINTER), ("count", _WORD), ("all", _WORD)],
         *[("levers", _POINTER), ("moves", _POINTER)],
-        ("levels", _WORD),
-        ("grips", _POINTER),
+        *[("levels", _WORD), ("rooms", _POINTER), ("grips", _POINTER)],
         ("held", _WORD),
     ]
 
@@ -226,6 +225,9 @@ class Distances:
         memory.turns = data.geom_xmat.ctypes.data
         memory.flange_place, memory.flange_turn = place.ctypes.data, turn.ctypes.data
         memory.hulls, memory.entries = self._hulls.ctypes.data, self._entries.ctypes.data
+        self._centres, self._rooms = np.empty((len(self._hulls), 3)), np.empty(len(self._entries))
+        memory.centres, memory.rooms = self._centres.ctypes.data, self._rooms.ctypes.data
+        memory.shells = len(self._hulls)
         memory.count, memory.all = self._count, len(self._entries)
         levers = np.array([self._relative(*met) for met in self._met]).reshape(-1, _JOINTS)
         self._pair_levers, self._moves = levers, np.empty(len(levers))
@@ -281,8 +283,8 @@ class Distances:
         Args:
             path: joint positions, straight from one to the next, shape (n, 7) [rad].
             margin: nearer bodies touch [m].
-            least: what two bodies may move beyond their distance in a step [m].
-            far: bodies are looked for so far [m].
+            least: what two bodies may move beyond their distance before they are looked at again [m].
+            far: exact distances are computed below this only [m].
 
         Returns:
             The piece between two of its points, the fraction of that, and the joint positions there; None: there is
@@ -419,7 +421,7 @@ def _hulls(model: mujoco.MjModel) -> npt.NDArray[np.void]:
     kinds = mujoco.mjtGeom
     result = np.zeros(model.ngeom, _HULL)
     result["half"], result["middle"] = model.geom_aabb[:, 3:], model.geom_aabb[:, :3]
-    result["reach"], result["frame"] = model.geom_rbound, np.arange(model.ngeom)
+    result["frame"] = np.arange(model.ngeom)
     for geom, kind in enumerate(model.geom_type.tolist()):
         radius, length = model.geom_size[geom, :2].tolist()
         if kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
@@ -437,6 +439,9 @@ def _hulls(model: mujoco.MjModel) -> npt.NDArray[np.void]:
                 f"a scene must have no height field and no signed distance field to compute distances, got geom {name};"
                 " add heptarm.shapes.height_map instead, or boxes and meshes"
             )
+    corners = np.linalg.norm(result["half"], axis=1) + result["radius"]
+    bounds = model.geom_rbound + np.linalg.norm(result["middle"], axis=1)  # MuJoCo's are around the origin
+    result["reach"] = np.minimum(corners, bounds)
     return result
 
 
@@ -533,6 +538,6 @@ class _Boxes:
         low, high = (centres - extents).min(axis=0), (centres + extents).max(axis=0)
         made = np.zeros(1, _HULL)
         made["half"], made["middle"] = 0.5 * (high - low), 0.5 * (low + high)
-        made["reach"], made["frame"] = np.linalg.norm(np.maximum(np.abs(low), np.abs(high))), frame
+        made["reach"], made["frame"] = np.linalg.norm(made["half"]), frame
         self._around.append(made)
         return len(self._own) + len(self._around) - 1

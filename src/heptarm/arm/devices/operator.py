@@ -34,7 +34,7 @@ class Operator(Sealed):
         self._cabinet = cabinet
 
     def do(self, words: str) -> str:
-        """Carry out a command such as "push 0 0 -20 1.5".
+        """Carry out a command such as "push 0 0 -20 1.5", or at a time of the simulator's clock: "emergency_stop@12.5".
 
         Returns:
             What it shows; "" if it shows nothing.

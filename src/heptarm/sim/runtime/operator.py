@@ -247,14 +247,18 @@ class SimulatedOperator:
                 log.warning("%s: %s", words, error)
 
     def do(self, words: str) -> str:
-        """Execute an action now.
+        """Execute an action now, or at a plant time: "NAME@SECONDS".
 
         Returns:
-            What it shows; "" if it shows nothing.
+            What it shows; "" if it shows nothing, or nothing yet.
 
         Raises:
             ValueError: there is no such action, or its values are illegal; nothing has changed.
         """
+        if _TIMED.fullmatch(words):
+            self.schedule(words)
+            self.on_action()
+            return ""
         name, values = understood(words)
         shown = self._verbs[name](*values) or ""
         self._acted_at = self._ticks
