@@ -264,4 +264,4 @@ def test_the_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         ({"camera": "sim", "out": tmp_path / "tags.pdf"}, "exists"),
     ):
         with pytest.raises(CommandRejected, match=words):
-            eye(**given)  # type: ignore[arg-type]
+            eye(**given)
