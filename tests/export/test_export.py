@@ -179,11 +179,11 @@ def test_usd_core_and_yourdfpy_read_it(tmp_path: Path) -> None:
     usd = ha.export_model(tmp_path / "cell.usda", robot=MODEL, tool=TOOL, scene="two-arms")
     urdf = ha.export_model(tmp_path / "cell.urdf", robot=MODEL, tool=TOOL, scene="two-arms")
     venv.create(tmp_path / "venv", with_pip=True)
-    python = tmp_path / "venv/bin/python"
+    python = str(tmp_path / "venv/bin/python")
     subprocess.run([python, "-m", "pip", "install", "-q", "usd-core", "yourdfpy"], check=True)
     q = postures()[1]
     reader = Path(__file__).with_name("read_back.py")
-    command = [python, reader, usd, urdf, ",".join(map(repr, q.tolist()))]
+    command = [python, str(reader), str(usd), str(urdf), ",".join(map(repr, q.tolist()))]
     read = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     for name, pose in expected(q).items():
         assert np.abs(np.array(read["urdf"][name]) - pose).max() < NEAR, name

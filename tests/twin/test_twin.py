@@ -17,6 +17,7 @@ from heptarm.modes import JointImpedance
 from heptarm.record.recording import Recording
 from heptarm.twin.commands import commands_of
 from heptarm.twin.comparison import deviations_of
+from heptarm.values.checks import Array
 from heptarm.when import path
 from heptarm.wire import messages as wire
 from tests.conftest import RunningCabinet
@@ -172,8 +173,8 @@ def test_set_points_stand_for_what_is_not_in_the_file(recorded: Recording) -> No
 
 
 def test_a_deviation_has_a_band() -> None:
-    """Its largest value, where, and since when for 20 ms at least; a spike is none, nor what was not recorded."""
-    t = np.arange(100) * 0.004
+    t: Array = np.arange(100, dtype=np.float64) * 0.004
+    q: Array = HOME + 0.1 * np.sin(t)[:, None]
     q = HOME + 0.1 * np.sin(t)[:, None]
     run = Recording(Path("run.mcap"), {"robot": "iiwa14"}, {"t": t, "q": q}, (), (), complete=True)
     bands = {"q": 0.005, **dict.fromkeys(("q_cmd", "dq", "xyz", "tau", "tau_ext", "force", "torque"), 1.0)}

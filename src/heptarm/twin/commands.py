@@ -149,7 +149,9 @@ def commands_of(run: RecordedData) -> Commands:
         ) from error
     if not sections:
         raise _unusable(run, "the arm executes no motion in it", "record while the arm moves")
-    mode = next((event.content["mode"] for event in run.events if "mode" in event.content), {})
+    mode: dict[str, Any] = next(
+        (event.content["mode"] for event in run.events if "mode" in event.content), {}
+    )
     override = run["override"] if "override" in run else np.ones(1)
     known = override[np.isfinite(override)]
     return Commands(

@@ -30,7 +30,7 @@ from heptarm.twin.comparison import (
 )
 from heptarm.values.checks import instance, within
 from heptarm.values.frames import FLANGE
-from heptarm.values.mode.mode import MODES, Mode, check_mode
+from heptarm.values.mode.mode import HandGuiding, Mode, check_mode
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.robot import known_robot
 from heptarm.values.tool import Tool
@@ -423,4 +423,4 @@ def _with_mode(one: wire.Item, mode: wire.Mode | None) -> wire.Item:
 def _mode_of(message: wire.Mode) -> Mode | None:
     """The value of a recorded control mode; None: position."""
     mode = read_mode(message)
-    return mode if isinstance(mode, MODES) else None
+    return None if isinstance(mode, HandGuiding) else mode
