@@ -141,8 +141,8 @@ class Operator(Sealed):
         """
         self.do(f"answer {integer(button, 'button', 0, 11)}")
 
-    def push(self, force: npt.ArrayLike, *, duration: float) -> None:
-        """Push the flange.
+    def start_push(self, force: npt.ArrayLike, *, duration: float) -> None:
+        """Push the flange from now on; returns at once, and replaces the push before it.
 
         Args:
             force: in the base axes, shape (3,) [N].
