@@ -41,7 +41,9 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "record": (WORDS + "a rosbag records the topics; `heptarm record` runs beside the node",),
         "state_rate": ("parameter `state_rate`",),
         "breaking_on": ("~/collision_guard", "fields `until` of goals"),
-        "camera": ("a node of its own: ROS has drivers of cameras, and simulated pictures are of the client",),
+        "camera": (
+            "a node of its own: ROS has drivers of cameras, and simulated pictures are of the client",
+        ),
         "cabinet": ("~/info", "/diagnostics"),
         "capabilities": ("~/capabilities",),
         "close": (LIFE,),
@@ -218,7 +220,9 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "connect_all": ("a node for each arm, in a namespace of its own",),
         "deg": ("ROS uses radians",),
         "ellipse": ("as SPLINE, with points computed by the client", "~/run_program"),
-        "export_model": (WORDS + "`heptarm export` writes the files, and the packages `heptarm_description` have ours",),
+        "export_model": (
+            WORDS + "`heptarm export` writes the files, and the packages `heptarm_description` have ours",
+        ),
         "hand_guide": ("~/guide", "~/teach", "~/run_program"),
         "hold": ("~/run_program",),
         "replay_in_sim": (WORDS + "it repeats recordings of the client",),
