@@ -2,8 +2,8 @@
 
     MUJOCO_GL=egl .venv/bin/python scripts/paths_pictures.py
 
-Both paths have the same start and goal; along the right one the tool, which carries a glass, stays upright. No cabinet is
-needed. It needs a display, or EGL or OSMesa for MUJOCO_GL.
+Both paths have the same start and goal; along the right one the tool, which carries a glass, stays upright. It needs no
+cabinet, but a display, or EGL or OSMesa for MUJOCO_GL.
 """
 
 from __future__ import annotations

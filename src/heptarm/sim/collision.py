@@ -448,6 +448,30 @@ class CollisionModel(Sealed):
         view._distances = view._compiled(self._distances)
         return view
 
+    @_changes
+    def become(self, other: CollisionModel) -> None:
+        """Have the bodies and the other arms of another model, as they are now.
+
+        So several changes, made to a copy, are one change for those who watch this model. What this arm carries stays.
+
+        Args:
+            other: of the same robot, such as a copy: `world.carrying(None)`.
+
+        Raises:
+            ShapeError: no model.
+            CommandRejected: it is of another robot.
+        """
+        instance(other, CollisionModel, "other")
+        if other.robot.name != self._robot.name:
+            raise CommandRejected(
+                f"other must be a model of this robot, the {self._robot.name}, got one of the {other.robot.name}",
+                parameter="other",
+                value=other.robot.name,
+            )
+        view = other.carrying(None)
+        self._models, self._added, self._held, self._arms = view._models, view._added, view._held, view._arms
+        self._distances = self._compiled(view._distances)
+
     def _copy(self) -> CollisionModel:
         """A model whose later changes do not reach this one."""
         view = copy(self)

@@ -266,6 +266,7 @@ TOPICS = (
     Topic("~/fri/joint", _JOINTS, fri_joint),
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
     Topic("~/fri/pose", _POSE, fri_pose),
+    Topic("~/points", "sensor_msgs/PointCloud2", scene.points, aside=True),
     Topic("planning_scene", _SCENE, scene.planning_scene, depth=100, aside=True),
     Topic("collision_object", "moveit_msgs/CollisionObject", scene.collision_object, depth=100, aside=True),
     Topic(
