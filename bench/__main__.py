@@ -16,7 +16,8 @@ import json
 import os
 import sys
 
-from bench.contact import force  # noqa: F401  every import registers its benchmarks
+from bench.calibration import cameras, identification  # noqa: F401  every import registers its benchmarks
+from bench.contact import force  # noqa: F401
 from bench.fri import faults, guard, hold, loop  # noqa: F401
 from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark

@@ -15,9 +15,9 @@ def person(arm: ha.Arm) -> None:
     arm.wait_until(lambda state: state.motion is not None and state.motion.active)
     start = arm.state.q
     arm.operator.guide()
-    arm.operator.push([0, 8, 5], duration=60.0)
+    arm.operator.start_push([0, 8, 5], duration=60.0)
     arm.wait_until(lambda state: np.abs(state.q - start).max() > np.radians(10))
-    arm.operator.push([0, 0, 0], duration=0.0)
+    arm.operator.start_push([0, 0, 0], duration=0.0)
     arm.operator.let_go()
 
 

@@ -152,6 +152,12 @@ static int check_plausible(struct fri_loop *l, struct message *m, word now) {
     double sum = 0.0;
     for (int i = 0; i < AXES; i++) sum += m->known & BIT_OF(S_Q) ? m->joints[PLACE_OF(S_Q)][i] : 0.0;
     if (!isfinite(sum)) return implausible(m, "FRI message: joint positions must be finite; the datagram is damaged");
+    for (int i = 0; i < AXES && m->known & BIT_OF(S_Q); i++) { /* it may be beyond a limit, but never so far: velocities follow from it */
+        double q = m->joints[PLACE_OF(S_Q)][i];
+        if (fabs(q) > 2.0 * M_PI)
+            return implausible(m, "FRI message: the measured position of A%d must be in [-2π, 2π] rad, got %.4g rad: the datagram is damaged",
+                               i + 1, q);
+    }
     if (m->has_link && !check_periods(l, m, now)) return 0;
     if (!check_range(l, m, S_Q_IPO, "interpolated") || !check_range(l, m, S_Q_CMD, "commanded")) return 0;
     if (!check_reach(l, m, now)) return 0;

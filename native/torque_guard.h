@@ -43,6 +43,26 @@ struct torque_guard {
 /* An unknown acceleration that holds an axis back may end at any moment: so much of the largest speed may come of it. */
 #define RELEASED 0.08
 
+/* A measured position [rad] or a velocity [rad/s] beyond it is none: a number of a damaged message, which would become an infinite torque. */
+#define POSSIBLE_POSITION (2.0 * M_PI)
+#define POSSIBLE_SPEED 1e5
+
+/* Part of the acceleration that a wrench can cause by which it plans to brake, and least planned deceleration: of that of the axis. */
+#define AUTHORITY 0.4
+#define LEAST_DECELERATION 0.02
+/* Weight of a range of accelerations that is exceeded: the square of an acceleration, over the speed of its axis, that is hardly
+   worth a wrench [1/s2]; largest number of sweeps, and change at which they end. */
+#define WRENCH_SLACK 1e-2
+#define WRENCH_SWEEPS 60
+/* Power that a wrench may still give the arm where an axis reaches its bound, none from a part of that beyond it [W]: in a singular
+   posture what brakes one axis would drive another one. */
+#define WRENCH_POWER 20.0
+#define WRENCH_OVER 0.1
+/* Singular value of the Jacobian below which a wrench moves the arm more slowly, and least fraction of its speed there. */
+#define NEAR_SINGULAR 0.1
+#define LEAST_FRACTION 0.3
+#define WRENCH_EXACT 1e-7
+
 /* While the arm brakes: time constant with which a motion decays [s], and fraction of the largest speed with which a spring that the
    torques have wound may unwind: without them it would throw the arm. */
 #define UNWINDING_TIME 0.1
@@ -102,166 +122,229 @@ struct reserve {
 };
 static const struct reserve of_torques = {GUARDED_SPEED, GUARDED_DISTANCE, 1.0}, of_wrench = {0.5, 0.03, 0.4};
 
+/* What a guard knows of a cycle.
+
+   posture, mass, factor: of the measured position; `factor` is that of `mass`.
+   least, most: torques that are left [Nm].
+   v: velocities when the answer acts [rad/s]; there: positions [rad].
+   a: accelerations that the law asks for, low, high: and their ranges [rad/s2]. */
+struct cycle {
+    struct posture posture;
+    double mass[N][N], factor[N * N], least[N], most[N], v[N], there[N], a[N], low[N], high[N];
+};
+
+/* Look at the posture of a cycle; 0: there is none, and without a position there is no safe torque. */
+static inline int look(struct torque_guard *g, const double *q, const double *dq, struct cycle *c) {
+    int is_known = 1;
+    for (int i = 0; i < N; i++) is_known &= fabs(q[i]) <= POSSIBLE_POSITION && fabs(dq[i]) <= POSSIBLE_SPEED; /* not if NaN */
+    if (is_known) {
+        find_posture(&g->robot, q, &c->posture);
+        moved_mass(&g->robot, &c->posture, c->mass);
+        memcpy(c->factor, c->mass, sizeof c->factor);
+        is_known = factorise(c->factor, N); /* no posture has another matrix */
+    }
+    if (!is_known) start_torque_guard(g);
+    return is_known;
+}
+
+/* Find the ranges of the accelerations of a cycle, and what the law asks for; while the arm brakes that is the motion's decay.
+
+   authority: largest accelerations that the law can cause [rad/s2]; NULL: whatever the motors can.
+   tau: torques of the law [Nm]. The result is that of `guard_torques`. */
+static inline int find_ranges(struct torque_guard *g, const struct reserve *kept, const double *authority, const double *q, const double *dq,
+                              double dt, int is_braking, const double *tau, struct cycle *c) {
+    double deceleration[N], time = fmax(GUARD_TIME, 4.0 * dt);
+    int found = 0;
+    torques_left(g, &c->posture, dq, c->mass, c->least, c->most, deceleration);
+    for (int i = 0; i < N; i++) {
+        deceleration[i] *= kept->deceleration;
+        if (authority) deceleration[i] = fmax(fmin(deceleration[i], AUTHORITY * authority[i]), LEAST_DECELERATION * g->ddq_max[i]);
+        if (g->is_started != 0.0) {
+            double unexplained = (dq[i] - g->before[i]) / dt - 0.5 * (g->earlier[i] + g->oldest[i]);
+            g->unknown[i] += dt / (UNKNOWN_TIME + dt) * (unexplained - g->unknown[i]);
+        }
+        g->before[i] = dq[i];
+        c->a[i] = tau[i];
+    }
+    solve(c->factor, N, c->a);
+    for (int i = 0; i < N; i++) {
+        int is_high_by_position, is_low_by_position;
+        double full = kept->speed * g->dq_max[i], release = RELEASED * g->dq_max[i] / (UNKNOWN_TIME + dt);
+        double above = fmax(g->unknown[i], -release), below = fmin(g->unknown[i], release);
+        /* when the answer acts */
+        double now = dq[i] + 0.5 * dt * (g->earlier[i] + g->unknown[i]);
+        double v = c->v[i] = now + dt * (g->sent[i] + g->unknown[i]), there = c->there[i] = q[i] + 0.5 * dt * (now + v);
+        g->cap[i] = is_braking ? fmax(UNWINDING_SPEED * g->dq_max[i], fmin(g->cap[i], fabs(v)) - deceleration[i] * dt) : full;
+        if (is_braking) c->a[i] = -v / UNWINDING_TIME;
+        double top = fmin(full, g->cap[i]), gap = kept->distance + dt * fabs(v);
+        c->high[i] = highest_acceleration(g->high[i] - gap - there, v, top, deceleration[i], time, &is_high_by_position) - above;
+        c->low[i] = -highest_acceleration(there - gap - g->low[i], -v, top, deceleration[i], time, &is_low_by_position) - below;
+        if (c->low[i] > c->high[i]) c->low[i] = c->high[i] = 0.5 * (c->low[i] + c->high[i]);
+        int is_high = c->a[i] > c->high[i];
+        if (is_braking || !(is_high || c->a[i] < c->low[i])) continue;
+        int is_position = is_high ? is_high_by_position : is_low_by_position;
+        found |= 1 << (i + (is_position ? GUARD_POSITION_BIT : GUARD_SPEED_BIT));
+        double speed = v + time * c->a[i];
+        g->asked[i] = is_position ? there + 0.5 * speed * fabs(speed) / deceleration[i] : speed;
+        g->allowed[i] = is_position ? (is_high ? g->high[i] : g->low[i]) : (is_high ? full : -full);
+    }
+    return found;
+}
+
+/* Remember the accelerations that the answer causes. */
+static inline void remember(struct torque_guard *g, const double *sent) {
+    for (int i = 0; i < N; i++) {
+        g->oldest[i] = g->earlier[i];
+        g->earlier[i] = g->sent[i];
+        g->sent[i] = sent[i];
+    }
+    g->is_started = 1.0;
+}
+
 /* Limit torques.
 
    q, dq: measured positions and their difference to the previous message by the period.
    dt: command period. is_braking: bring the arm to rest where its spring is not wound, whatever the torques are.
    tau: target torques [Nm], finite; replaced by those to send.
    Returns the bits of what was limited; g->asked and g->allowed have the values of these axes. */
-static inline int guard_motion(struct torque_guard *g, const struct reserve *kept, const double *q, const double *dq, double dt, int is_braking,
-                               double *tau) {
-    struct posture posture;
-    double mass[N][N], factor[N * N], deceleration[N], a[N], low[N], high[N], change[N], rest[N], v[N], there[N], least[N], most[N];
-    int found = 0, by_position, is_high_by_position[N], is_low_by_position[N];
-    double time = fmax(GUARD_TIME, 4.0 * dt), sum = 0.0;
-    for (int i = 0; i < N; i++) sum += q[i] + dq[i];
-    if (!isfinite(sum)) { /* without a position there is no safe torque */
-        for (int i = 0; i < N; i++) tau[i] = 0.0;
-        start_torque_guard(g);
-        return 0;
-    }
-    find_posture(&g->robot, q, &posture);
-    moved_mass(&g->robot, &posture, mass);
-    memcpy(factor, mass, sizeof factor);
-    if (!factorise(factor, N)) { /* no posture has such a matrix */
+static inline int guard_torques(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, double *tau) {
+    struct cycle c;
+    double change[N], rest[N], braking[N], sent[N], fraction = 1.0, strength = 1.0;
+    if (!look(g, q, dq, &c)) {
         for (int i = 0; i < N; i++) tau[i] = 0.0;
         return 0;
     }
-    torques_left(g, &posture, dq, mass, least, most, deceleration);
-    for (int i = 0; i < N; i++) deceleration[i] *= kept->deceleration;
+    int found = find_ranges(g, &of_torques, NULL, q, dq, dt, is_braking, tau, &c);
     for (int i = 0; i < N; i++) {
-        if (g->is_started != 0.0) {
-            double unexplained = (dq[i] - g->before[i]) / dt - 0.5 * (g->earlier[i] + g->oldest[i]);
-            g->unknown[i] += dt / (UNKNOWN_TIME + dt) * (unexplained - g->unknown[i]);
-        }
-        g->before[i] = dq[i];
-        a[i] = tau[i];
+        change[i] = guard_clamp(c.a[i], c.low[i], c.high[i]) - c.a[i];
+        rest[i] = guard_clamp(0.0, c.low[i], c.high[i]);
     }
-    solve(factor, N, a);
+    for (int i = 0; i < N && is_braking; i++) tau[i] = dot(c.mass[i], c.a, N);
     for (int i = 0; i < N; i++) {
-        double full = kept->speed * g->dq_max[i], release = RELEASED * g->dq_max[i] / (UNKNOWN_TIME + dt);
-        double above = fmax(g->unknown[i], -release), below = fmin(g->unknown[i], release);
-        /* when the answer acts */
-        double now = dq[i] + 0.5 * dt * (g->earlier[i] + g->unknown[i]);
-        v[i] = now + dt * (g->sent[i] + g->unknown[i]);
-        there[i] = q[i] + 0.5 * dt * (now + v[i]);
-        g->cap[i] = is_braking ? fmax(UNWINDING_SPEED * g->dq_max[i], fmin(g->cap[i], fabs(v[i])) - deceleration[i] * dt) : full;
-        if (is_braking) a[i] = -v[i] / UNWINDING_TIME;
-        double top = fmin(full, g->cap[i]), gap = kept->distance + dt * fabs(v[i]);
-        high[i] = highest_acceleration(g->high[i] - gap - there[i], v[i], top, deceleration[i], time, &by_position) - above;
-        is_high_by_position[i] = by_position;
-        low[i] = -highest_acceleration(there[i] - gap - g->low[i], -v[i], top, deceleration[i], time, &by_position) - below;
-        is_low_by_position[i] = by_position;
-        if (low[i] > high[i]) low[i] = high[i] = 0.5 * (low[i] + high[i]);
-        change[i] = guard_clamp(a[i], low[i], high[i]) - a[i];
-        rest[i] = guard_clamp(0.0, low[i], high[i]);
-        if (change[i] != 0.0 && !is_braking) {
-            int is_high = change[i] < 0.0, is_position = is_high ? is_high_by_position[i] : is_low_by_position[i];
-            found |= 1 << (i + (is_position ? GUARD_POSITION_BIT : GUARD_SPEED_BIT));
-            double speed = v[i] + time * a[i];
-            g->asked[i] = is_position ? there[i] + 0.5 * speed * fabs(speed) / deceleration[i] : speed;
-            g->allowed[i] = is_position ? (is_high ? g->high[i] : g->low[i]) : (is_high ? full : -full);
-        }
-    }
-    for (int i = 0; i < N && is_braking; i++) tau[i] = dot(mass[i], a, N);
-    double braking[N], fraction = 1.0, strength = 1.0;
-    for (int i = 0; i < N; i++) {
-        braking[i] = dot(mass[i], rest, N);
-        double bounded = guard_clamp(braking[i], least[i], most[i]);
+        braking[i] = dot(c.mass[i], rest, N);
+        double bounded = guard_clamp(braking[i], c.least[i], c.most[i]);
         if (bounded != braking[i]) strength = fmin(strength, bounded / braking[i]);
     }
     for (int i = 0; i < N; i++) {
         braking[i] *= strength; /* weaker, and towards the range of every axis */
-        tau[i] += dot(mass[i], change, N);
-        double bounded = guard_clamp(tau[i], least[i], most[i]);
+        tau[i] += dot(c.mass[i], change, N);
+        double bounded = guard_clamp(tau[i], c.least[i], c.most[i]);
         if (bounded == tau[i]) continue;
         fraction = fmin(fraction, (bounded - braking[i]) / (tau[i] - braking[i]));
         found |= 1 << (i + GUARD_TORQUE_BIT);
         if (!(found >> i & 0x101)) g->asked[i] = tau[i], g->allowed[i] = bounded;
     }
-    for (int i = 0; i < N; i++) a[i] = tau[i] = braking[i] + fraction * (tau[i] - braking[i]);
-    solve(factor, N, a);
-    for (int i = 0; i < N; i++) {
-        g->oldest[i] = g->earlier[i];
-        g->earlier[i] = g->sent[i];
-        g->sent[i] = a[i];
-    }
-    g->is_started = 1.0;
+    for (int i = 0; i < N; i++) sent[i] = tau[i] = braking[i] + fraction * (tau[i] - braking[i]);
+    solve(c.factor, N, sent);
+    remember(g, sent);
     return found;
 }
 
-static inline int guard_torques(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, double *tau) {
-    return guard_motion(g, &of_torques, q, dq, dt, is_braking, tau);
+/* Find the wrench that is nearest to another one and keeps every axis within its range of accelerations.
+
+   A quadratic program with slack, by dual coordinate ascent (Hildreth, "A quadratic programming procedure", 1957). A wrench has one
+   direction less than the arm has joints, and its size is bounded: where no wrench keeps all ranges, it is the one that
+   exceeds them least, relative to the speed of each axis.
+   effect: accelerations by the largest components of the wrench, over each axis' speed [1/s], then the power that they give the arm,
+      over WRENCH_POWER; low, high: ranges, likewise.
+   wrench: fractions of the largest components; replaced. */
+static inline void nearest_wrench(double effect[N + 1][6], const double *low, const double *high, double *wrench) {
+    double size[N + 1], pull[N + 1], push[6];
+    for (int i = 0; i <= N; i++) size[i] = dot(effect[i], effect[i], 6) + WRENCH_SLACK, pull[i] = 0.0;
+    for (int r = 0; r < 6; r++) push[r] = 0.0;
+    for (int sweep = 0; sweep < WRENCH_SWEEPS; sweep++) {
+        double largest = 0.0;
+        for (int i = 0; i <= N; i++) {
+            double now = dot(effect[i], wrench, 6) + WRENCH_SLACK * pull[i], up = (now - high[i]) / size[i], down = (now - low[i]) / size[i];
+            /* one of the two multipliers is zero: positive ones are of the lower bound */
+            double next = pull[i] - up < 0.0 ? pull[i] - up : pull[i] - down > 0.0 ? pull[i] - down : 0.0;
+            double by = next - pull[i];
+            pull[i] = next;
+            for (int r = 0; r < 6; r++) wrench[r] += by * effect[i][r];
+            largest = fmax(largest, fabs(by) * size[i]);
+        }
+        for (int r = 0; r < 6; r++) {
+            double free = wrench[r] - push[r], inside = guard_clamp(free, -1.0, 1.0);
+            push[r] = inside - free;
+            largest = fmax(largest, fabs(inside - wrench[r]));
+            wrench[r] = inside;
+        }
+        if (largest < WRENCH_EXACT) return;
+    }
 }
 
-/* Weight of a small correction against an exact one, relative to the mean effect of a wrench. */
-#define WRENCH_DAMPING 2e-4
-/* Weight of the axes that the guard leaves as they are, relative to those that it has to change. */
-#define WRENCH_OTHERS 0.5
+/* Fraction of its bounds of the speeds that a wrench may use in a posture: near a singularity a small motion of the flange
+   becomes a large one of two axes against each other, which no wrench can brake.
 
-/* Fraction of the largest speed above its bound over which a damper takes over, and that damper [N s/m], [N m s/rad]. */
-#define DAMPED_SPEED 0.1
-#define DAMPER_ALONG 150.0
-#define DAMPER_ABOUT 5.0
+   By the smallest singular value of the Jacobian, from inverse iteration on its square. */
+static inline double fraction_near_singularity(double j[6][N]) {
+    double square[36], x[6], size = 1.0;
+    for (int r = 0; r < 6; r++) {
+        x[r] = 1.0;
+        for (int k = 0; k < 6; k++) square[6 * r + k] = dot(j[r], j[k], N);
+    }
+    if (!factorise(square, 6)) return LEAST_FRACTION;
+    for (int round = 0; round < 3; round++) {
+        for (int r = 0; r < 6; r++) x[r] /= size;
+        solve(square, 6, x);
+        size = sqrt(dot(x, x, 6));
+    }
+    return guard_clamp(1.0 / (sqrt(size) * NEAR_SINGULAR), LEAST_FRACTION, 1.0);
+}
 
-/* Limit a wrench on the flange [N, Nm], base axes, by the motion to which its torques lead; arguments and result as above.
+/* Limit a wrench on the flange [N, Nm], base axes, by the motion to which it leads; arguments and result as above.
 
-   A wrench has one direction less than the arm has joints. What the guard changes is made by the wrench whose accelerations come
-   nearest to those allowed, relative to the speed of each axis; the cabinet's spring holds the rest.
    most: largest components of the wrench. */
 static inline int guard_wrench(struct torque_guard *g, const double *q, const double *dq, double dt, int is_braking, const double *most,
                                double *wrench) {
-    struct posture posture;
-    double mass[N][N], factor[N * N], j[6][N], asked[N], tau[N], change[N], effect[6][N], weight[N], square[36], correction[6], mean = 0.0;
-    find_posture(&g->robot, q, &posture);
-    jacobian(posture.axis, posture.origin, posture.place, j);
-    for (int i = 0; i < N; i++) {
-        asked[i] = 0.0;
-        for (int r = 0; r < 6; r++) asked[i] += j[r][i] * wrench[r];
-        tau[i] = asked[i];
-    }
-    int found = guard_motion(g, &of_wrench, q, dq, dt, is_braking, tau);
-    if (g->is_started == 0.0) { /* without a position there is no safe wrench */
+    struct cycle c;
+    double j[6][N], tau[N], caused[6][N], effect[N + 1][6], authority[N], low[N + 1], high[N + 1], target[6], sent[N], over = 0.0;
+    if (!look(g, q, dq, &c)) {
         for (int r = 0; r < 6; r++) wrench[r] = 0.0;
         return 0;
     }
-    if (memcmp(asked, tau, sizeof tau) == 0) return found;
-    moved_mass(&g->robot, &posture, mass);
-    memcpy(factor, mass, sizeof factor);
-    if (!factorise(factor, N)) return 0; /* the torques are zero then, and so is the memory of them */
-    for (int i = 0; i < N; i++) change[i] = tau[i] - asked[i];
-    solve(factor, N, change);
+    jacobian(c.posture.axis, c.posture.origin, c.posture.place, j);
+    for (int i = 0; i < N; i++) tau[i] = authority[i] = 0.0;
+    for (int r = 0; r < 6; r++) {
+        target[r] = most[r] > 0.0 ? guard_clamp(wrench[r] / most[r], -1.0, 1.0) : 0.0;
+        memcpy(caused[r], j[r], sizeof caused[r]);
+        solve(c.factor, N, caused[r]);
+        for (int i = 0; i < N; i++) {
+            caused[r][i] *= most[r];
+            effect[i][r] = caused[r][i] / g->dq_max[i];
+            authority[i] += fabs(caused[r][i]);
+            tau[i] += j[r][i] * wrench[r];
+        }
+    }
+    struct reserve kept = of_wrench;
+    kept.speed *= fraction_near_singularity(j);
+    int found = find_ranges(g, &kept, authority, q, dq, dt, is_braking, tau, &c);
+    if (is_braking) { /* the wrench that is nearest to the decay of the motion */
+        double square[36];
+        for (int r = 0; r < 6; r++) {
+            target[r] = 0.0;
+            for (int i = 0; i < N; i++) target[r] += effect[i][r] * c.a[i] / g->dq_max[i];
+            for (int k = 0; k < 6; k++) {
+                square[6 * r + k] = r == k ? WRENCH_SLACK : 0.0;
+                for (int i = 0; i < N; i++) square[6 * r + k] += effect[i][r] * effect[i][k];
+            }
+        }
+        if (factorise(square, 6)) solve(square, 6, target);
+        for (int r = 0; r < 6; r++) target[r] = guard_clamp(target[r], -1.0, 1.0);
+    }
+    if (found || is_braking) {
+        for (int i = 0; i < N; i++) low[i] = c.low[i] / g->dq_max[i], high[i] = c.high[i] / g->dq_max[i];
+        for (int i = 0; i < N; i++) over = fmax(over, (fabs(dq[i]) / g->dq_max[i] / kept.speed - 1.0) / WRENCH_OVER);
+        for (int r = 0; r < 6; r++) effect[N][r] = over > 0.0 ? dot(j[r], dq, N) * most[r] / WRENCH_POWER : 0.0;
+        low[N] = -INFINITY, high[N] = fmax(0.0, 1.0 - over);
+        nearest_wrench(effect, low, high, target);
+        for (int r = 0; r < 6; r++) wrench[r] = target[r] * most[r];
+    }
     for (int i = 0; i < N; i++) {
-        weight[i] = (fabs(change[i]) > 1e-9 ? 1.0 : WRENCH_OTHERS) / g->dq_max[i];
-        change[i] *= weight[i];
+        sent[i] = 0.0;
+        for (int r = 0; r < 6; r++) sent[i] += caused[r][i] * target[r];
     }
-    for (int r = 0; r < 6; r++) {
-        memcpy(effect[r], j[r], sizeof effect[r]);
-        solve(factor, N, effect[r]);
-        for (int i = 0; i < N; i++) effect[r][i] *= weight[i];
-        mean += dot(effect[r], effect[r], N) / 6.0;
-    }
-    for (int r = 0; r < 6; r++) {
-        for (int c = 0; c < 6; c++) square[6 * r + c] = dot(effect[r], effect[c], N) + (r == c ? WRENCH_DAMPING * mean : 0.0);
-        correction[r] = dot(effect[r], change, N);
-    }
-    if (!factorise(square, 6)) {
-        for (int r = 0; r < 6; r++) correction[r] = -wrench[r];
-    } else {
-        solve(square, 6, correction);
-    }
-    /* where that does not bound an axis, the wrench of a damper takes over: it never adds energy */
-    double excess = 0.0;
-    for (int i = 0; i < N; i++) excess = fmax(excess, (fabs(dq[i]) / g->dq_max[i] - of_wrench.speed) / DAMPED_SPEED);
-    excess = fmin(excess, 1.0);
-    for (int r = 0; r < 6; r++) {
-        double damper = -(r < 3 ? DAMPER_ALONG : DAMPER_ABOUT) * dot(j[r], dq, N);
-        wrench[r] = guard_clamp((1.0 - excess) * (wrench[r] + correction[r]) + excess * damper, -most[r], most[r]);
-    }
-    for (int i = 0; i < N; i++) {
-        g->sent[i] = 0.0;
-        for (int r = 0; r < 6; r++) g->sent[i] += effect[r][i] / weight[i] * wrench[r];
-    }
+    remember(g, sent);
     return found;
 }
 

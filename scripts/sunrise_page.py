@@ -21,8 +21,12 @@ HEAD = """# Sunrise in the virtual cabinet
 
 `heptarm sim app` offers these classes of Sunrise.OS 1.11 to 1.17: {classes} classes with {members} members. They
 are doubles, written for the simulation after the calls in public applications; they contain no code of KUKA's. Names
-and signatures are those that applications use; guesses are marked. The doubles act on the virtual arm, in simulated
-time.
+and signatures are those that applications use. The doubles act on the virtual arm, in simulated time. What is not
+simulated throws an exception that begins with `heptarm: not modelled`.
+
+*Known by* states how sure the members are: *overrides* where applications implement or extend a class, so that its
+signatures are whole; *calls* where they only call it, so that a type may be narrower than Sunrise's; *names* where they
+only name it; *guess*.
 
 A test compiles and runs sample applications that use each of these classes, and compares every member of the list
 with the doubles.
@@ -35,9 +39,15 @@ def page() -> str:
     classes = [one for part in parts for one in part.classes]
     lines = [HEAD.format(classes=len(classes), members=sum(len(one.members) for one in classes))]
     for part in parts:
-        lines += [f"## {part.title}\n", "| class | members | in the virtual cabinet |", "|---|---|---|"]
+        lines += [
+            f"## {part.title}\n",
+            "| class | members | known by | in the virtual cabinet |",
+            "|---|---|---|---|",
+        ]
         for one in part.classes:
-            lines.append(f"| `{one.name.replace('$', '.')}` | {len(one.members) or ''} | {one.does} |")
+            lines.append(
+                f"| `{one.name.replace('$', '.')}` | {len(one.members) or ''} | {one.known} | {one.does} |"
+            )
         lines.append("")
     lines += ["## What is missing\n", "| missing | reason |", "|---|---|"]
     lines += [f"| {what} | {why} |" for what, why in without]

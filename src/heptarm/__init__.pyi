@@ -8,6 +8,9 @@ from .arm.arm import (
 from .arm.connect import (
     connect as connect,
 )
+from .arm.devices.camera import (
+    CameraStream as CameraStream,
+)
 from .arm.fri.session import (
     Fri as Fri,
 )
@@ -167,6 +170,9 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .export.files import (
+    export_model as export_model,
+)
 from .fri.loop.compiled import (
     law as law,
 )
@@ -206,8 +212,23 @@ from .skills.insertion import (
 from .skills.replay import (
     Replay as Replay,
 )
+from .twin.comparison import (
+    Deviation as Deviation,
+)
+from .twin.comparison import (
+    RepeatedMotion as RepeatedMotion,
+)
+from .twin.comparison import (
+    Twin as Twin,
+)
+from .twin.replay import (
+    replay_in_sim as replay_in_sim,
+)
 from .values.camera import (
     Camera as Camera,
+)
+from .values.camera import (
+    Picture as Picture,
 )
 from .values.clearance import (
     Clearance as Clearance,

@@ -41,6 +41,7 @@ An error names what was refused, the value with its unit, the allowed range and 
 
 from __future__ import annotations
 
+import errno
 import importlib
 import importlib.util
 import re
@@ -49,6 +50,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
+
+if sys.platform != "win32":
+    from resource import RLIMIT_NOFILE, getrlimit
 
 _Error = TypeVar("_Error", bound="HeptarmError")
 
@@ -358,7 +362,46 @@ EXTRAS = {
     "record": ("mcap", "pandas", "pyarrow", "plotly"),
     "devices": ("evdev", "pyspacemouse"),
     "rerun": ("rerun",),
+    "vision": ("cv2", "scipy"),
 }
+
+
+def shortage(error: BaseException) -> str:
+    """The remedy of an error of the system that lacks a file descriptor, a process or memory; "" of any other error."""
+    match error.errno if isinstance(error, OSError) else None:
+        case errno.EMFILE:
+            most = "" if sys.platform == "win32" else f" {getrlimit(RLIMIT_NOFILE)[0]}"
+            return (
+                f"this program has all{most} files and sockets open that it may have: close what is not used any more, "
+                "such as arms, FRI sessions and recordings, or allow more (ulimit -n)"
+            )
+        case errno.ENFILE:
+            return "too many files are open on this machine: end programs, or allow more (sysctl fs.file-max)"
+        case errno.EAGAIN:
+            return "too many processes of this user run: end some, or allow more (ulimit -u)"
+        case errno.ENOMEM | errno.ENOBUFS:
+            return "this machine has no memory left: end programs"
+        case _:
+            return ""
+
+
+@contextmanager
+def system_errors(text: str, *, kind: type[HeptarmError] = HeptarmError) -> Iterator[None]:
+    """Make errors of the system in a block, which opens files or sockets or starts a process, errors of heptarm.
+
+    Args:
+        text: what could not be done; the reason is put behind it.
+        kind: class of the error.
+
+    Raises:
+        HeptarmError: of this kind; the hint is the remedy, if a resource is lacking.
+    """
+    try:
+        yield
+    except OSError as error:
+        if isinstance(error, HeptarmError):
+            raise
+        raise kind(f"{text}: {(error.strerror or str(error)).lower()}", hint=shortage(error)) from error
 
 
 def missing_extra(module: str) -> MissingExtra | None:
@@ -379,9 +422,11 @@ def require_extra(extra: str) -> None:
 
     Raises:
         MissingExtra: one is not; the hint is the command that installs it.
+        HeptarmError: they cannot be looked for.
     """
     for name in EXTRAS[extra]:
-        error = missing_extra(name) if importlib.util.find_spec(name) is None else None
+        with system_errors(f"the package {name!r} cannot be looked for"):
+            error = missing_extra(name) if importlib.util.find_spec(name) is None else None
         if error is not None:
             raise error
 
@@ -409,12 +454,12 @@ def require(module: str, *, extra: str) -> Any:
     """
     try:
         return importlib.import_module(module)
-    except ImportError as error:
+    except (ImportError, OSError) as error:
         root = module.partition(".")[0]
         missing = isinstance(error, ModuleNotFoundError) and error.name == root
         reason = "is not installed" if missing else f"cannot be imported ({error})"
         raise MissingExtra(
             f"this needs the package {root!r}, which {reason}",
             parameter=root,
-            hint=f"pip install 'heptarm[{extra}]'",
+            hint=shortage(error) or f"pip install 'heptarm[{extra}]'",
         ) from error

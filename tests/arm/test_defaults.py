@@ -15,7 +15,7 @@ from heptarm.sim.runtime.project import read_process_data
 from tests.arm.peer import Peer
 from tests.conftest import RunningCabinet
 
-SHIPPED = read_process_data(_resources.cabinet_sources() / "project" / "RoboticsAPI.data.xml")
+SHIPPED = read_process_data(_resources.cabinet_sources() / "project" / "RoboticsAPI.data.xml").values
 SPEED = 5.0
 
 

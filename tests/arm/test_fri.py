@@ -31,6 +31,7 @@ from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.conftest import RunningCabinet
+from tests.descriptors import refused_with_fewer
 from tests.retry import answers_late, retry
 
 SPEED = 1.0  # FRI answers within milliseconds of this machine's time
@@ -333,6 +334,24 @@ def test_a_law_that_fails_brakes_the_arm_and_is_reported(arm: ha.Arm) -> None:
 
 
 @patient
+def test_without_a_free_file_descriptor_neither_a_session_nor_a_recording_is_half_open(
+    arm: ha.Arm, tmp_path: Path
+) -> None:
+    def session() -> None:
+        with arm.fri("position", period_ms=5):
+            pass
+
+    def recording() -> None:
+        with arm.record(tmp_path / "one.mcap"):
+            pass
+
+    refused_with_fewer(5, session)
+    refused_with_fewer(1, recording)
+    assert not list(tmp_path.iterdir())
+    with arm.record(tmp_path / "one.mcap"), arm.fri("monitor", period_ms=5):
+        assert arm.in_control
+
+
 def test_a_stop_from_another_thread_ends_the_loop(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.MotionAborted, match="stopped") as error,

@@ -9,6 +9,8 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
 import heptarm
 from heptarm._resources import cabinet_sources
 
@@ -41,6 +43,7 @@ print("done")
 OPTIONS = ("fastRobotInterface", "HandGuidingMotion")
 
 
+@pytest.mark.slow
 def test_a_cabinet_without_the_option_does_all_the_rest(tmp_path: Path) -> None:
     package = tmp_path / "heptarm"
     shutil.copytree(Path(heptarm.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))

@@ -37,17 +37,17 @@ def arm(table: ha.Arm) -> Iterator[ha.Arm]:
     if np.abs(table.wait_for_rest().q - HOME).max() > 1e-3:
         table.move(ha.ptp(HOME), speed=0.7)
     yield table
-    table.operator.push([0, 0, 0], duration=0.0)
+    table.operator.start_push([0, 0, 0], duration=0.0)
 
 
 def push_along(arm: ha.Arm, push: list[float], covered: float) -> None:
     """Push until a joint has turned by this angle [rad]."""
     before = arm.state.q
-    arm.operator.push(push, duration=300.0)
+    arm.operator.start_push(push, duration=300.0)
     try:
         arm.wait_until(lambda state: np.abs(state.q - before).max() > covered, timeout=120.0)
     finally:
-        arm.operator.push([0, 0, 0], duration=0.0)
+        arm.operator.start_push([0, 0, 0], duration=0.0)
     arm.wait_until(lambda state: np.abs(state.wrench.force).max() < 1.0)
 
 
@@ -78,7 +78,7 @@ def test_a_condition_ends_it(arm: ha.Arm) -> None:
     handle = arm.start(ha.hand_guide(), until=force > 30)
     assert handle.wait_started(20.0)
     arm.wait_until(lambda state: np.abs(state.q_cmd - state.q).max() < 1.0)
-    arm.operator.push([0, 0, 40], duration=0.4)
+    arm.operator.start_push([0, 0, 40], duration=0.4)
     result = handle.wait(timeout=20.0)
     assert result.cause is ha.Cause.CONDITION and result.stopped_by == (force > 30)
 
@@ -137,7 +137,7 @@ def test_a_push_moves_a_guided_arm_within_bounds(arm: ha.Arm, mode: CartesianImp
     if mode is None:
         arm.operator.guide()
     before = arm.wait_until(lambda state: state.motion.active).stamp
-    arm.operator.push([0, 0, 15], duration=2.0)
+    arm.operator.start_push([0, 0, 15], duration=2.0)
     seen = [arm.wait_until(lambda state: np.abs(state.dq).max() > 0.05, timeout=30.0)]
     for state in arm.states():
         seen.append(state)
@@ -191,7 +191,7 @@ def test_nothing_to_touch(arm: ha.Arm) -> None:
 
 
 def test_a_push_that_was_there_before_is_no_contact(arm: ha.Arm) -> None:
-    arm.operator.push([0, 0, 15], duration=60.0)
+    arm.operator.start_push([0, 0, 15], duration=60.0)
     arm.wait_until(lambda state: state.wrench.force[2] > 12.0)
     with pytest.raises(ha.NoContact):
         arm.touch("z", frame="base", distance=0.02, force=10.0, speed_mps=0.1)
@@ -203,7 +203,7 @@ def test_taps(arm: ha.Arm) -> None:
 
     def tap() -> None:
         while not done.wait(0.5):
-            arm.operator.push([0, 0, 30], duration=0.1)
+            arm.operator.start_push([0, 0, 30], duration=0.1)
 
     hand = Thread(target=tap)
     hand.start()
@@ -219,7 +219,7 @@ def test_taps(arm: ha.Arm) -> None:
     arm.move(ha.lin_rel(z=0.02, frame="base", speed_mps=0.2))  # no tap
     assert tapped.empty()
     while tapped.empty():
-        arm.operator.push([0, 0, 30], duration=0.1)
+        arm.operator.start_push([0, 0, 30], duration=0.1)
         arm.wait_until(lambda state: state.wrench.force[2] > 20.0)
         arm.wait_until(lambda state: state.wrench.force[2] < 1.0)
     assert tapped.get().wrench is not None
@@ -284,10 +284,10 @@ def _pushed_in_a_session(arm: ha.Arm, margin: float) -> None:
             arm.fri("position", period_ms=10) as rt,
         ):
             assert rt.wait(0.2), "nothing touches it"
-            arm.operator.push([0.0, 40.0, 0.0], duration=60.0)
+            arm.operator.start_push([0.0, 40.0, 0.0], duration=60.0)
             assert not rt.wait(20.0) and not rt.active
     finally:
-        arm.operator.push([0.0, 0.0, 0.0], duration=0.0)
+        arm.operator.start_push([0.0, 0.0, 0.0], duration=0.0)
     found = error.value.collision
     assert found.joint == 0 and abs(found.torque) > 10.0 and error.value.history
     assert found in met and rt.client.collision is not None

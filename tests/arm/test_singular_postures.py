@@ -22,11 +22,13 @@ ROUND = {
 #: How far a joint may move [rad]; noisy sensors tell a pose no better.
 STAYS, STAYS_WITH_NOISE = ha.deg(0.01)[0], ha.deg(0.1)[0]
 
-#: An arm with noisy sensors is never at rest, which costs five times the processor time: every run has one posture.
+#: An arm with noisy sensors is never at rest, which costs five times the processor time: every run has one posture, and
+#: the rest with ideal sensors.
 WITH_NOISE = longer(list(ROUND)[:1], list(ROUND))
+either = pytest.mark.parametrize("sensors", longer(["ideal"], ["ideal", "noisy"]), indirect=True)
 
 
-@pytest.fixture(scope="module", params=["ideal", "noisy"])
+@pytest.fixture(scope="module")
 def sensors(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -62,6 +64,7 @@ def streams_its_own_pose(arm: ha.Arm, degrees: tuple[float, ...], allowed: float
     assert np.abs(arm.wait_for_rest().q_cmd - before).max() <= allowed
 
 
+@either
 def test_the_pose_of_home_needs_no_swing(arm: ha.Arm) -> None:
     start = ha.deg(10, 20, 5, -40, 0, 40, 5)
     arm.move(ha.ptp(start))
@@ -70,6 +73,7 @@ def test_the_pose_of_home_needs_no_swing(arm: ha.Arm) -> None:
     assert np.abs(arm.wait_for_rest().q_cmd - start).max() <= ha.deg(40.1)[0]
 
 
+@either
 def test_a_stream_into_the_candle_moves_the_joints_that_it_needs(arm: ha.Arm) -> None:
     start = ha.deg(0, 5, 0, -10, 0, 5, 0)
     arm.move(ha.ptp(start))
@@ -81,6 +85,7 @@ def test_a_stream_into_the_candle_moves_the_joints_that_it_needs(arm: ha.Arm) ->
             assert np.abs(arm.state.q_cmd - start).max() <= ha.deg(10.5)[0]
 
 
+@either
 def test_e1_is_the_angle_of_a3(arm: ha.Arm) -> None:
     start = ha.deg(0, 20, 0, -110, 0, -40, 90)
     arm.move(ha.ptp(start))

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 
 import pytest
 
-from tests.cli import running
-from tests.cli.forks import Forks
+from tests.cli.running import Command
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    if sys.platform != "linux":  # elsewhere a fork of a process with libraries of the system is not safe
-        yield
-        return
-    running.forks = Forks(tmp_path_factory.mktemp("forks"))
+def _forks() -> Iterator[None]:
     yield
-    running.forks.close()
-    running.forks = None
+    for forks in Command.forks.values():
+        forks.close()

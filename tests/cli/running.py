@@ -9,21 +9,34 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import IO, Any
+from typing import IO, Any, ClassVar
 
-from tests.cli.forks import Forks
+from tests.forks import Forks, Popen
 from tests.interrupts import ctrl_c_interrupts
 from tests.retry import retry, silent
 
 #: Environment variables that would change what a command does.
 _OURS = ("HEPTARM_TARGET", "HEPTARM_KEY")
-#: And those that the interpreter reads when it starts.
-_INTERPRETERS = {"PYTHONPATH", "PYTHONWARNINGS", "LD_LIBRARY_PATH"}
 HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
 
+#: What commands import.
+_PACKAGES = (
+    *("cyclopts", "cyclopts.help", "docstring_parser", "rich.markdown", "rich.syntax", "numpy", "jpype"),
+    *(
+        "heptarm",
+        "heptarm.arm.several",
+        "heptarm.planning.search",
+        "heptarm.panel.process",
+        "heptarm.testing",
+    ),
+    *("heptarm.cli.doctor", "heptarm.cli.motion", "heptarm.cli.record", "heptarm.cli.sim.cabinet"),
+)
 
-#: Where commands are started from; None: each is started by itself.
-forks: Forks | None = None
+
+class Command(Popen):
+    """A command that runs in a fork."""
+
+    forks: ClassVar[dict[str, Forks]] = {HEPTARM[2]: Forks(_PACKAGES)}
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -31,11 +44,14 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
     variables = {name: value for name, value in os.environ.items() if name not in _OURS} | environment
 
     def attempt() -> subprocess.CompletedProcess[str]:
-        if forks is not None and not environment.keys() & _INTERPRETERS:
-            return forks.run(arguments, variables, timeout=120.0)
-        return subprocess.run(
-            [*HEPTARM, *arguments], capture_output=True, text=True, timeout=120, env=variables, check=False
-        )
+        pipe = subprocess.PIPE
+        with Command([*HEPTARM, *arguments], stdout=pipe, stderr=pipe, text=True, env=variables) as process:
+            try:
+                said = process.communicate(timeout=120)
+            except BaseException:
+                process.kill()
+                raise
+        return subprocess.CompletedProcess(process.args, process.returncode, *said)
 
     return retry(attempt, silent)
 

@@ -324,7 +324,7 @@ def test_keys_are_made_listed_and_forgotten(config: Path) -> None:
 
 def test_install_cabinet_makes_a_key_unless_declined(tmp_path: Path) -> None:
     def key_in(folder: Path) -> object:
-        return read_process_data(folder / "RoboticsAPI.data.xml")["heptarm.key"]
+        return read_process_data(folder / "RoboticsAPI.data.xml").values["heptarm.key"]
 
     done = run("install-cabinet", "--out", str(tmp_path / "keyed"))
     assert done.returncode == 0, done.stderr

@@ -40,7 +40,7 @@ REAL_TIME = (
     "stopping.md",
 )
 #: What an example, or the tests of what they call, run in every test as well.
-IN_LONG_RUN = ("commissioning.md", "laws.md", "scenarios.md")
+IN_LONG_RUN = ("commissioning.md", "laws.md", "scenarios.md", "twin.md")
 RUNNER = """
 import os, sys
 os.environ.setdefault("MPLBACKEND", "Agg")

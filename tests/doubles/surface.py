@@ -23,12 +23,15 @@ class Class:
         does: what it does in the virtual cabinet.
         extends: simple names of its super types.
         members: what is called of it.
+        known: how its members are known: "overrides" where applications implement or extend it, so that the
+            signatures are complete; "calls" where they only call it; "names" where they only import it; "guess".
     """
 
     name: str
     does: str
     extends: tuple[str, ...] = ()
     members: tuple[str, ...] = ()
+    known: str = ""
 
     @property
     def simple(self) -> str:
@@ -61,6 +64,7 @@ def read() -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
                     one["does"],
                     tuple(one.get("extends", ())),
                     tuple(one.get("members", ())),
+                    one.get("known", "calls" if "members" in one else "names"),
                 )
                 for name, one in part["class"].items()
             ),

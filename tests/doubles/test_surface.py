@@ -76,6 +76,7 @@ def test_a_sample_that_a_test_runs_uses_each_class() -> None:
     samples = [
         *(file for file in (HERE / "java").glob("*.java") if file.name != "Surface.java"),
         *(ROOT / "examples" / "sunrise").rglob("*.java"),
+        *(ROOT / "tests" / "strangers" / "labs" / "src").rglob("*.java"),
     ]
     used = set(re.findall(r"\w+", " ".join(COMMENT.sub("", file.read_text("utf-8")) for file in samples)))
     assert [one.name for one in CLASSES if one.simple not in used] == []

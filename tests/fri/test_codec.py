@@ -54,6 +54,7 @@ def test_command_round_trip(wire: Version, data: st.DataObject) -> None:
     assert codec.decode_command(codec.encode_command(value, wire), wire) == value
 
 
+@pytest.mark.slow
 @every_version
 @settings(max_examples=longer(80, 200))
 @given(data=st.data(), raw=st.binary(max_size=200))

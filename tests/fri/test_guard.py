@@ -76,6 +76,7 @@ def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
     return targets
 
 
+@pytest.mark.slow
 @settings(max_examples=longer(40, 60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(targets=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
 def test_whatever_is_asked_the_limits_hold(

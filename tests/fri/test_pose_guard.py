@@ -130,6 +130,7 @@ targets = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(targets, st.sampled_from([1e-3, 5e-3]))
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_whatever_is_asked_the_limits_are_kept(asked: list[tuple[object, int]], period: float) -> None:

@@ -311,6 +311,7 @@ def test_safety_and_quality_are_reported() -> None:
     assert (session.counters.poor, session.counters.good, session.counters.excellent) == (1, 2, 1)
 
 
+@pytest.mark.slow
 @every_version
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())

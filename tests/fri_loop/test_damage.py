@@ -202,6 +202,28 @@ def test_a_position_that_no_robot_has_is_not_sent_back(state: SessionState) -> N
     assert max(abs(value) for one in bench.sent for value in one.q or ()) < math.pi
 
 
+def test_a_measured_position_that_no_robot_has_is_no_reason_for_a_torque() -> None:
+    """One flipped bit of an exponent: torques of NaN were sent."""
+    bench = Bench()
+    bench.controller.mode = CommandMode.TORQUE
+    bench.activate()
+    words = np.zeros(at.COMMAND_WORDS)
+    words[at.C_TAU : at.C_TAU + 7] = 5.0
+    bench.give(words, at.GIVEN_TAU)
+    bench.run(20)
+    answers = len(bench.sent)
+    damaged = (*bench.controller.position()[:4], -5.486124068793689e302, *bench.controller.position()[5:])
+    where = bench.controller.position
+    bench.controller.position = lambda: damaged  # type: ignore[method-assign]
+    bench.run(2)
+    assert len(bench.sent) == answers and bench.counters.malformed == 2
+    assert "measured position of A5 must be in [-2π, 2π] rad, got -5.486e+302 rad" in bench.trouble
+    bench.controller.position = where  # type: ignore[method-assign]
+    bench.run(2)
+    assert len(bench.sent) == answers + 2
+    assert all(math.isfinite(value) for one in bench.sent for value in one.tau or ())
+
+
 @pytest.mark.parametrize("name", ["", "ü" * 63, "Präzisionsgreifer" * 3])
 @pytest.mark.parametrize("wire", [Version.V2_5, Version.V2_7])
 def test_a_pose_with_a_strange_name_is_sent_back_under_its_name(name: str, wire: Version) -> None:

@@ -152,7 +152,7 @@ def test_unknown_names_are_refused(
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["bench", "--group", "frei"])
     assert command.main() == 2
-    assert "no group 'frei'; there are contact, fri, lab, motion" in capsys.readouterr().err
+    assert "no group 'frei'; there are calibration, contact, fri, lab, motion" in capsys.readouterr().err
 
 
 def test_what_failed_names_no_path_of_the_machine() -> None:

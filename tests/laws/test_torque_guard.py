@@ -18,6 +18,8 @@ from .adversaries import Trial
 ARM = robot("iiwa14")
 HOME = np.radians([0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0])
 STILL = np.zeros(7)
+#: Wrenches that tripped a drive: in motions through a singular posture, and at a limit.
+HARD = (83, 143, 226, 229, 235, 339)
 PERIOD = 1e-3
 
 
@@ -39,14 +41,14 @@ def test_no_law_brings_an_axis_beyond_its_speed_or_to_a_limit(block: int) -> Non
 
 
 @pytest.mark.timeout(longer(300, 3600))
-def test_hardly_any_law_of_a_wrench_does_either() -> None:
-    """A wrench has one direction less than the arm, so it cannot brake every axis in every posture."""
-    count = longer(24, 400)
-    found = [Trial(seed, by_wrench=True).run(0.8) for seed in range(count)]
-    errors = [one.name for one in found if one.error]
-    assert len(errors) <= 0.02 * count, errors
-    fast = [one.name for one in found if one.speed.max() > 0.95 or one.nearest < np.radians(-0.5)]
-    assert len(fast) <= 0.1 * count, fast
+def test_no_law_of_a_wrench_trips_a_drive() -> None:
+    """A wrench has one direction less than the arm, so it cannot bound every axis in every singular posture."""
+    seeds = [*range(longer(12, 400)), *HARD]
+    found = [Trial(seed, by_wrench=True).run(0.8) for seed in seeds]
+    assert not [one.name for one in found if one.error]
+    assert not [one.name for one in found if one.nearest < np.radians(-0.5)]
+    fast = [one.name for one in found if one.speed.max() > 0.95]
+    assert len(fast) <= 0.02 * len(seeds) + 1, fast
 
 
 def test_without_the_guard_laws_of_a_wrench_do_break_the_arm() -> None:
@@ -103,7 +105,7 @@ def test_at_the_end_the_torques_bring_the_arm_to_rest() -> None:
     assert not trial.error and np.abs(trial.final_speed).max() < 0.02
 
 
-@pytest.mark.parametrize("broken", [np.full(7, np.nan), np.full(7, np.inf)])
+@pytest.mark.parametrize("broken", [np.full(7, np.nan), np.full(7, np.inf), np.full(7, -5e302)])
 def test_without_positions_there_are_no_torques(broken: np.ndarray) -> None:
     made = guard()
     assert made.limit([50.0] * 7, q=broken, dq=STILL, period=PERIOD) == [0.0] * 7

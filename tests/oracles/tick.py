@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
-from heptarm.sim.control_laws.laws import MASS_DAMPING, STIFFNESS, STIFFNESS_DAMPING, MeasuredState
+from heptarm.sim.control_laws.laws import GAINS, MASS_DAMPING, STIFFNESS_DAMPING, MeasuredState
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.native import ELSEWHERE
@@ -23,14 +23,14 @@ from tests.oracles.inverse_kinematics import status_of
 from tests.oracles.kinematics import flange
 
 
-def position_torque(sensed: MeasuredState) -> Array:
+def position_torque(sensed: MeasuredState, gains: Array = GAINS) -> Array:
     """Torques of position control without a preload, shape (7,) [Nm]."""
     error = sensed.now - sensed.q
     slip = (sensed.after - sensed.before) * 500.0 - sensed.dq
     acceleration = (sensed.after - 2 * sensed.now + sensed.before) * 1e6
     acceleration += MASS_DAMPING * slip
     torque: Array = sensed.mass @ acceleration + sensed.bias - sensed.passive
-    torque += STIFFNESS * (error + STIFFNESS_DAMPING * slip)
+    torque += gains[:7] * (error + STIFFNESS_DAMPING * slip)
     return torque
 
 
@@ -47,9 +47,10 @@ class PythonTick:
         shared: SharedState,
         arm: ArmVectors,
         *,
+        gains: Array,
         ranges: Array | None,
     ) -> None:
-        self._robot, self._shared, self._arm = robot, shared, arm
+        self._robot, self._shared, self._arm, self._gains = robot, shared, arm, gains
 
     def believe(self, mass: Array, bias: Array, *, is_misjudged: bool) -> None:
         """See `NativeTick.believe`."""
@@ -71,7 +72,7 @@ class PythonTick:
         """See `NativeTick.command`."""
         arm = self._arm
         sensed = MeasuredState(arm.q, arm.dq, self._mass, self._bias, arm.passive, *points)
-        arm.torque[:] = position_torque(sensed)
+        arm.torque[:] = position_torque(sensed, self._gains)
         self.drive()
 
     def drive(self) -> None:

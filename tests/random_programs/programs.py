@@ -262,7 +262,7 @@ class Outside:
                 arm.operator.clear()
                 arm.recover(timeout=5.0)
             case "push":
-                arm.operator.push((0.0, 20.0, -30.0), duration=0.3)
+                arm.operator.start_push((0.0, 20.0, -30.0), duration=0.3)
             case "t1":
                 arm.operator.choose("t1")
                 arm.operator.hold()

@@ -16,7 +16,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.record.camera import CameraFeed, CameraSubject, Picture
+from heptarm.record.camera import CameraFeed, CameraSubject, DrawnPicture
 from heptarm.record.convert import convert
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.shared_state import PositionsFile
@@ -53,9 +53,9 @@ def changed(one: np.ndarray, other: np.ndarray) -> int:
     return int((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > CHANGED).sum())
 
 
-def taken(feed: CameraFeed) -> list[Picture]:
+def taken(feed: CameraFeed) -> list[DrawnPicture]:
     """The pictures that are finished, as soon as there are any."""
-    found: list[Picture] = []
+    found: list[DrawnPicture] = []
     until(lambda: bool(found.extend(feed.take()) or found))
     return found
 

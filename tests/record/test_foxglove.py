@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 
 import heptarm as ha
 from heptarm.model.kinematics import forward
-from heptarm.record.camera import Picture
+from heptarm.record.camera import DrawnPicture
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.values.robot import robot
 from heptarm.wire import messages as wire
@@ -36,7 +36,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Any, Any, A
     (pressed,) = samples(1)
     with_fri.states([pressed._replace(body=body(0, button=1.0))], to_ours=to_ours, signals=("A.One", "A.Two"))
     with_fri.cycles(fri_words(20))
-    with_fri.picture(CAMERA, Picture(1, pressed.received, to_ours(BEGIN), b"jpeg"))
+    with_fri.picture(CAMERA, DrawnPicture(1, pressed.received, to_ours(BEGIN), b"jpeg"))
     with_fri.finish({})
     found: list[tuple[Any, Any, Any]] = []
     for one in (path, with_fri.path):

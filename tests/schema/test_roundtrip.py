@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 from collections.abc import Callable
 from dataclasses import fields
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 import sample_bodies
 import spec as schema
 from heptarm.arm.translate.state import read_state
+from heptarm.record.journal import plain, restored
 from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.codec import DecodeError
 from heptarm.wire.messages import MESSAGES, SafetyBits, State
@@ -22,6 +24,7 @@ from tests.schema.python_side import recoded
 
 SPEC = schema.load()
 NAMES = sorted(SPEC.messages)
+REQUESTS = [name for name in NAMES if SPEC.messages[name].kind == "request"]
 
 
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 2**32), size=st.integers(0, 5))
@@ -30,6 +33,13 @@ def test_a_legal_body_comes_back(name: str, seed: int, size: int) -> None:
     message = MESSAGES[SPEC.messages[name].id].decode(body)
     assert message.encode() == body
     message.validate()
+
+
+@given(name=st.sampled_from(REQUESTS), seed=st.integers(0, 2**32), size=st.integers(0, 5))
+def test_a_request_comes_back_from_a_recording(name: str, seed: int, size: int) -> None:
+    message = MESSAGES[SPEC.messages[name].id].decode(sample_bodies.body(SPEC, name, str(seed), size))
+    again = restored(json.loads(json.dumps(plain(message), allow_nan=False)), type(message))
+    assert again.encode() == message.encode()
 
 
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 2**32), data=st.data())

@@ -13,6 +13,7 @@ from heptarm.planning.seam import OperationMode, SafetyFlags, StateWords
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.scene import Scene
 from heptarm.sim.runtime.operator import WORDS, SimulatedOperator, timed, understood
 from tests.sim.driving import Ear, ready
 from tests.sim.ideal import KINDS, begin
@@ -27,6 +28,7 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
             "push": ["1", "2", "3"],
             "set": ["Cell.Door", "true"],
             "where": ["peg"],
+            "place": ["peg", "0.5", "0", "0.3"],
             "press": ["0"],
             "answer": ["1"],
         }.get(name, [])
@@ -52,6 +54,10 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
         ("press 1 heptarm third", "no user key 1 in a bar 'heptarm third'"),
         ("press 1", "no user key 1 that only one bar has.*there are: none"),
         ("answer 0", "no open dialog"),
+        ("place peg 1 2", "4 to 8 values"),
+        ("place peg 1 2 here", "three numbers, or seven with a unit quaternion"),
+        ("place peg 1 2 3 0 0 0 2", "three numbers, or seven with a unit quaternion"),
+        ("place peg 1 2 3", "there is no scene"),
     ],
 )
 def test_what_is_not_understood_changes_nothing(words: str, expected_text: str) -> None:
@@ -182,3 +188,23 @@ def test_after_an_action_the_robots_flags_are_known() -> None:
         plant.step()
         time.sleep(0.005)  # a machine with other work
     assert flags[-1] & SafetyFlags.PAUSED
+
+
+def test_free_bodies_are_placed_and_put_back() -> None:
+    plant = Plant(scene=Scene.of("table"))
+    operator = SimulatedOperator(plant)
+    start = plant.body_pose("cube")
+    operator.do("place cube 0.6 0.05 0.3 0 0 0.70710678 0.70710678")
+    operator.do("place can 0.65 -0.2 0.236")
+    plant.step(2)
+    np.testing.assert_allclose(
+        plant.body_pose("cube"), (0.6, 0.05, 0.3, 0, 0, 0.70710678, 0.70710678), atol=1e-4
+    )
+    np.testing.assert_allclose(plant.body_pose("can")[:3], (0.65, -0.2, 0.236), atol=1e-4)
+    plant.step(300)
+    assert abs(plant.body_pose("cube")[2] - 0.22) < 1e-3, "it fell onto the table"
+    operator.do("reset")
+    plant.step(2)
+    np.testing.assert_allclose(plant.body_pose("cube"), start, atol=1e-4)
+    with pytest.raises(ValueError, match=r"table is fixed in the scene .*free are: cube, block, can"):
+        operator.do("place table 0 0 0")

@@ -18,7 +18,18 @@ def made(seed: int) -> PathConstraints:
     limits = [random.uniform(1.0, 9.0, 9) * np.ones(shape) for _ in range(3)]
     limits[0][:, 8] = limits[1][:, 8] = np.inf
     derivatives = [random.normal(size=shape).cumsum(axis=0) * 0.1 for _ in range(3)]
-    return PathConstraints(s, *derivatives, random.uniform(0.5, 2.0, len(s)), *limits, *np.ones((2, 9)))
+    return PathConstraints(
+        s=s,
+        first=derivatives[0],
+        second=derivatives[1],
+        third=derivatives[2],
+        fastest=random.uniform(0.5, 2.0, len(s)),
+        velocity=limits[0],
+        acceleration=limits[1],
+        jerk=limits[2],
+        braking=np.ones(9),
+        braking_jerk=np.ones(9),
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))

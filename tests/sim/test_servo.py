@@ -13,9 +13,11 @@ from heptarm.planning.motion import ServoMotion
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.controller.servo import ServoLimits, SmartFollower
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.robot import robot
 from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready
@@ -434,9 +436,9 @@ def test_a_target_that_is_passed_before_a_limit_leaves_room_to_brake(
 
 
 @pytest.mark.parametrize(
-    ("every", "lead", "hold_up"), [(10, 0.015, 0), (5, 0.01, 1), (10, 0.015, 3), (20, 0.06, 3)]
+    ("every", "ahead", "hold_up"), [(10, 0.015, 0), (5, 0.01, 1), (10, 0.015, 3), (20, 0.06, 3)]
 )
-def test_a_stream_with_velocities_is_followed_without_a_lag(every: int, lead: float, hold_up: int) -> None:
+def test_a_stream_with_velocities_is_followed_without_a_lag(every: int, ahead: float, hold_up: int) -> None:
     """Once the axes could not be at a target at its time, they took a run-up of 0.3 s, and were late for the rest."""
     swing = 0.25 * np.array([1.0, 0.5, -0.5, 0.7, 0.3, 1.0, -1.0])
 
@@ -444,12 +446,25 @@ def test_a_stream_with_velocities_is_followed_without_a_lag(every: int, lead: fl
         turn = np.pi * min(time, 1.2) / 1.2
         return HERE + swing * (1.0 - np.cos(turn)) / 2.0, swing * np.sin(turn) * np.pi / 2.4
 
-    plant, _ = serving("servo", ServoTiming(min_trajectory_time=lead))
+    plant, _ = serving("servo", ServoTiming(min_trajectory_time=ahead))
     random, due, behind = np.random.default_rng(0), 0, []
     for tick in range(1400):
         if tick >= due:
-            plant.shared.post(7, *at(tick * 1e-3 + lead))
+            plant.shared.post(7, *at(tick * 1e-3 + ahead))
             due = tick + every + int(random.integers(-1, 2)) * hold_up
         plant.tick()
         behind.append(np.abs(plant.snapshot.q_cmd - at(tick * 1e-3)[0]).max())
     assert max(behind) < 3e-3 and np.median(behind) < 1e-3 and behind[-1] < 1e-5
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_target_where_two_kinds_of_trajectory_meet_is_reached(sign: float) -> None:
+    # 0.1 rad at half of the acceleration: the planner once found nothing, and the arm stayed for ever
+    half = (0.5,) * 7
+    start = np.array((0.0, 0.4, 0.0, -1.3, 0.0, 1.0, 0.0))
+    follower = SmartFollower(ServoLimits.of(robot("iiwa7"), velocity=half, acceleration=half), start)
+    follower.aim(start + sign * 0.1)
+    assert follower.remaining == pytest.approx(0.4, abs=1e-3)
+    for _ in range(401):
+        there = follower.advance(1e-3)
+    assert there == pytest.approx(start + sign * 0.1, abs=1e-9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import pi
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from heptarm.planning.motion import PlanError
 from heptarm.planning.planner import plan
 from heptarm.planning.seam import PlantMotion
 from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
@@ -194,3 +196,37 @@ def test_a_line_out_of_a_singular_posture_is_within_the_limits_or_refused(degree
         assert (np.abs(steps) * 1e3 / arm.dq_max).max() <= 1.0
         assert (np.abs(np.diff(steps[1:], axis=0)) * 1e6 / arm.ddq_max).max() <= 1.0
     assert refused > 1
+
+
+#: A line that is slowed down near a singular posture, with A4 near its limit there [deg].
+SLOWED = (-122.7, 50.6, 121.2, 98.5, 36.9, -19.4, -119.7), (-161.5, 94.9, 106.9, 114.0, 47.3, -9.1, -137.2)
+STOPS: dict[str, Callable[[Plant], None]] = {
+    "stop": Plant.stop,
+    "fast": Plant.stop_fast,
+    "pause": Plant.pause,
+    "emergency stop": lambda plant: plant.safety.request_stop(StopRequest.EMERGENCY_STOP),
+    "protective stop": lambda plant: plant.safety.request_stop(StopRequest.PROTECTIVE_STOP),
+}
+
+
+@pytest.mark.parametrize("kind", STOPS)
+@pytest.mark.parametrize("when", longer([0.65], [0.2, 0.4, 0.6, 0.65, 0.7, 0.8, 1.0]))
+def test_a_stop_amid_a_slowed_part_keeps_all_limits(kind: str, when: float) -> None:
+    """A fast stop brought A4 0.27 degrees beyond its limit: all axes braked as long as the fastest of them."""
+    start, end = (deg(*degrees) for degrees in SLOWED)
+    plant = ready(q=start)
+    arm, q = plant.robot, [start] * 3
+    plant.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # the posture is in the floor
+    plant.submit(MotionCommand(1, motions.lin(numbers(Pose.from_matrix(forward(arm, end))))))
+    for tick in range(round(when * 1e3) + 800):
+        if tick == round(when * 1e3):
+            assert np.abs(q[-1] - q[-2]).max() > 1e-4, "it moves"
+            STOPS[kind](plant)
+        plant.tick()
+        q.append(plant.snapshot.q_cmd)
+    path = np.array(q)
+    assert (path >= arm.q_min - 1e-9).all() and (path <= arm.q_max + 1e-9).all()
+    steps = np.diff(path, axis=0)
+    assert (np.abs(steps) * 1e3 / arm.dq_max).max() <= 1.0 + 1e-6
+    assert (np.abs(np.diff(steps, axis=0)) * 1e6 / arm.ddq_max).max() <= 1.0 + 1e-6
+    assert np.abs(steps[-1]).max() < 1e-9, "it rests"

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
-from heptarm.values.pose import Pose
+from heptarm.values.pose import Pose, deg
 from tests.long import longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
@@ -359,3 +360,23 @@ def test_stretched_upwards_with_a3_turned_wild_targets_end_nothing() -> None:
     for goal in [*goals, start @ Pose.xyz_abc(a=np.pi), start]:
         followed(plant, lambda goal=goal: goal, 30)  # type: ignore[misc]
     assert ear.causes == ["started"]
+
+
+def test_a_posture_in_the_floor_is_no_fault_of_a_straight_servo() -> None:
+    """0,119,0,-60,0,30,0 has the flange 0.35 m below the base: only the floor tripped A4 there."""
+    q = deg(0, 119, 0, -60, 0, 30, 0)
+    plant, ear = Plant("iiwa14", q=tuple(q.tolist())), Ear()
+    assert plant.data.ncon > 0 and plant.data.xpos[-1][2] < -0.3
+    plant.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+    plant.submit(MotionCommand(7, motions.straight(), listener=ear))
+    plant.step(2)
+    here, path = Pose.from_matrix(forward(plant.robot, q)), [q] * 3
+    plant.shared.post(7, np.array(numbers(Pose.of(here.xyz + [-0.1, 0.0, 0.05], here.quat))))
+    for _ in range(1500):
+        plant.tick()
+        path.append(plant.snapshot.q_cmd)
+    steps = np.diff(np.array(path), axis=0)
+    assert ear.causes == ["started"]
+    assert np.abs(Pose.from_matrix(forward(plant.robot, path[-1])).xyz - here.xyz).max() > 0.05
+    assert (np.abs(steps) * 1e3 <= plant.robot.dq_max * (1.0 + 1e-6)).all()
+    assert (np.abs(np.diff(steps, axis=0)) * 1e6 <= plant.robot.ddq_max * (1.0 + 1e-6)).all()

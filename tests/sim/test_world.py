@@ -239,3 +239,25 @@ def test_positions_in_a_file_are_those_of_the_last_update(tmp_path: Path) -> Non
     for number in (1.0, 2.0):
         written.write(np.full(9, number))
         assert read.read() is not None and read.read() == pytest.approx(np.full(9, number))
+
+
+def test_a_tool_and_what_is_around_the_arm_may_share_a_mesh(tmp_path: Path) -> None:
+    (tmp_path / "wedge.obj").write_text(
+        "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    file = tmp_path / "scene.xml"
+    file.write_text("""<mujoco>
+      <asset>
+        <texture name="wood" type="2d" builtin="checker" width="8" height="8"/>
+        <material name="wood" texture="wood"/>
+        <mesh file="wedge.obj"/>
+      </asset>
+      <worldbody>
+        <body name="tool"><geom name="tip" type="mesh" mesh="wedge" material="wood"/></body>
+        <body name="wedge" pos="1 0 0"><geom name="wedge" type="mesh" mesh="wedge" material="wood"/></body>
+      </worldbody>
+    </mujoco>""")
+    found = compiled("iiwa14", scene=Scene.of(str(file)))
+    both = [found.geom(f"scene/{name}") for name in ("tip", "wedge")]
+    textures = [found.mat_texid[int(one.matid[0]), mujoco.mjtTextureRole.mjTEXROLE_RGB] for one in both]
+    assert all(int(one.dataid[0]) >= 0 for one in both) and min(textures) >= 0

@@ -79,6 +79,8 @@ EXPECTED: dict[str, type[Exception]] = {
     "CollisionModel.seen_by": heptarm.CommandRejected,
     "CollisionModel.set_arm": heptarm.CommandRejected,
     "law_from": heptarm.CommandRejected,
+    "export_model": heptarm.CommandRejected,
+    "replay_in_sim": heptarm.CommandRejected,
 }
 
 

@@ -28,19 +28,19 @@ def seen(camera: ha.Camera, point: tuple[float, float, float]) -> np.ndarray:
 )
 def test_the_target_is_in_the_middle_and_the_picture_is_upright(place: Any, target: Any) -> None:
     camera = ha.Camera(place, target, size=(320, 200))
-    np.testing.assert_allclose(seen(camera, target)[:2], (160, 100), atol=1e-9)
+    np.testing.assert_allclose(seen(camera, target)[:2], (159.5, 99.5), atol=1e-9)
     assert seen(camera, target)[2] == pytest.approx(np.linalg.norm(np.subtract(target, place)))
     upright = (0, 0, 0.05) if place[:2] != target[:2] else (0.05, 0, 0)
     u, v, _ = seen(camera, tuple(np.add(target, upright)))
-    assert u == pytest.approx(160) and v < 100
+    assert u == pytest.approx(159.5) and v < 99.5
     np.testing.assert_allclose(camera.pose.rotation @ camera.pose.rotation.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(camera.pose.rotation) == pytest.approx(1.0)
 
 
 def test_the_field_of_view_is_from_edge_to_edge() -> None:
     camera = ha.Camera((2.0, 0.0, 0.0), (0.0, 0.0, 0.0), fov=2 * np.arctan(0.5), size=(100, 50))
-    np.testing.assert_allclose(seen(camera, (0.0, 0.0, 1.0)), (50, 0, 2.0), atol=1e-9)
-    np.testing.assert_allclose(seen(camera, (0.0, 2.0, -1.0)), (100, 50, 2.0), atol=1e-9)
+    np.testing.assert_allclose(seen(camera, (0.0, 0.0, 1.0)), (49.5, -0.5, 2.0), atol=1e-9)
+    np.testing.assert_allclose(seen(camera, (0.0, 2.0, -1.0)), (99.5, 49.5, 2.0), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -54,6 +54,10 @@ def test_the_field_of_view_is_from_edge_to_edge() -> None:
         ({"rate": 0.0}, LimitError, r"rate must be in \(0, 60\] Hz"),
         ({"frame": "tool"}, ShapeError, "frame must be"),
         ({"scene": 3}, ShapeError, "scene"),
+        ({"principal": (3.0, 480.0)}, LimitError, r"principal\[1\] must be in \[0, 479\] pixels, got 480"),
+        ({"noise": -1.0}, LimitError, r"noise must be in \[0, 100\]"),
+        ({"blur": 30.0}, LimitError, r"blur must be in \[0, 20\] pixels"),
+        ({"shadows": 1}, ShapeError, "shadows must be True or False"),
     ],
 )
 def test_what_is_no_camera_is_refused(given: dict[str, Any], error: type[Exception], words: str) -> None:

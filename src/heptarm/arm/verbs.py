@@ -21,6 +21,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.arm.devices.camera import (
+    OLDEST,
+    CalledSource,
+    CameraStream,
+    DrawnSource,
+    Mounting,
+    PictureSource,
+    check_states,
+)
 from heptarm.arm.devices.io import Io
 from heptarm.arm.devices.operator import Operator
 from heptarm.arm.devices.smartpad import Pad
@@ -55,7 +64,7 @@ from heptarm.planning.search import STATES, TIMEOUT, Goal, Keep
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
-from heptarm.values.checks import array, callback, instance, integer, shown, within, word
+from heptarm.values.checks import array, callback, flag, instance, integer, shown, within, word
 from heptarm.values.clearance import CarriesTools, ChangingWorld, CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
@@ -429,6 +438,60 @@ class ArmVerbs(Sealed):
         return Recorder(
             {"": self._connection}, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite
         )
+
+    def camera(
+        self,
+        source: Camera | PictureSource,
+        *,
+        depth: bool = False,
+        labels: bool = False,
+        latency: float = 0.0,
+        pose: Pose | None = None,
+        frame: str = "flange",
+        matrix: npt.ArrayLike | None = None,
+    ) -> CameraStream:
+        """Live pictures, each with the arm at the moment when it was taken.
+
+        A simulated camera draws the arm at its pushed states, in a process of its own. Your own camera is any function
+        that waits for the next picture and returns it: `cv2.VideoCapture(0).read`, or one that reads a ROS topic.
+
+        Args:
+            source: a simulated camera; or a function that returns a picture, bytes of shape (height, width, 3) or
+                (height, width), or True and the picture.
+            depth: have distances, too; of a simulated camera.
+            labels: have the bodies that each pixel shows, too; of a simulated camera.
+            latency: age of a picture when the program gets it [s]: a simulated camera holds its pictures back for so
+                long, and a picture of your function belongs to the state so long before it returned.
+            pose: pose of your own camera in `frame`, as `heptarm.calibration.hand_eye` measures it; None: not known.
+            frame: frame of your own camera: "flange", which moves it with the arm, or "base".
+            matrix: intrinsic matrix of your own camera, shape (3, 3) [pixels]; None: not known.
+
+        Returns:
+            The pictures: `read()` waits for the next one; close it, or use it as a `with` block.
+
+        Raises:
+            ShapeError: neither a camera nor a function.
+            CommandRejected: an argument of the other kind of camera; there is no such scene, or this machine cannot
+                draw.
+            StaleState: the subscribed groups lack "joints".
+            MissingExtra: MuJoCo or Pillow is not installed.
+        """
+        check_states(self.state_rate, self.groups)
+        late = within(latency, "latency", 0.0, OLDEST, unit="s")
+        layers = ["pixels"]
+        layers += ["depth"] if flag(depth, "depth") else []
+        layers += ["labels"] if flag(labels, "labels") else []
+        own = Mounting.of(self.robot, frame=frame, pose=pose, matrix=matrix)
+        link = self._connection
+        link.check_open()
+        if isinstance(source, Camera):
+            own.refuse_for_simulated()
+            feed = camera_feed(self, source, layers=layers)
+            drawn = DrawnSource(feed, layers, late, link.real_time_factor)
+            place = Mounting(self.robot, source.frame, source.pose, source.matrix)
+            return CameraStream(link, drawn, place)
+        called = CalledSource(source, layers, link.clock, late)
+        return CameraStream(link, called, own)
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -1259,8 +1322,8 @@ class ArmVerbs(Sealed):
         return self._tooling.wrench(seen, frame, axes)
 
 
-def camera_feed(arm: ArmVerbs, camera: Camera) -> CameraFeed:
-    """What draws pictures of an arm for a recording; a private simulator's scene is in them.
+def camera_feed(arm: ArmVerbs, camera: Camera, *, layers: Sequence[str] = ("jpeg",)) -> CameraFeed:
+    """What draws pictures of an arm; a private simulator's scene is in them.
 
     Raises:
         ShapeError: it is no camera.
@@ -1272,4 +1335,4 @@ def camera_feed(arm: ArmVerbs, camera: Camera) -> CameraFeed:
         scene="" if cabinet is None else cabinet.scene,
         positions=None if cabinet is None else cabinet.positions,
     )
-    return CameraFeed(instance(camera, Camera, "camera"), subject)
+    return CameraFeed(instance(camera, Camera, "camera"), subject, layers=layers)

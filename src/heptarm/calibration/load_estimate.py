@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.io.targets import save_tool
-from heptarm.model.dynamics import GRAVITY, inverse_dynamics
+from heptarm.model.dynamics import GRAVITY, inverse_dynamics_rows
 from heptarm.model.kinematics import forward
-from heptarm.values.checks import Array, Value, finite_entries, frozen, instance, numbers
+from heptarm.values.checks import Array, Value, array, finite_entries, frozen, instance, numbers
 from heptarm.values.robot import Body, RobotModel, robot, symmetric
 from heptarm.values.text import lines
 from heptarm.values.tool import KnownTool, Tool, as_tool
@@ -90,9 +90,17 @@ def load_regressor(
     Returns:
         Shape (7, 10): by mass, first moments x y z [kg m], inertia about the flange xx yy zz xy xz yz [kg m²].
     """
-    bare = inverse_dynamics(model, q, dq, ddq, acceleration=acceleration)
-    each = [inverse_dynamics(model, q, dq, ddq, load=one, acceleration=acceleration) - bare for one in _BASIS]
-    return np.asarray((_TO_PARAMETERS @ np.array(each)).T)
+    rows = (array(one, _AXES, name)[None] for one, name in ((q, "q"), (dq, "dq"), (ddq, "ddq")))
+    return np.asarray(load_regressors(model, *rows, acceleration=acceleration)[0])
+
+
+def load_regressors(
+    model: RobotModel, q: Array, dq: Array, ddq: Array, *, acceleration: npt.ArrayLike
+) -> Array:
+    """`load_regressor` of many moments, unchecked: arrays of shape (n, 7) to shape (n, 7, 10)."""
+    bare = inverse_dynamics_rows(model, q, dq, ddq, acceleration=acceleration)
+    each = [inverse_dynamics_rows(model, q, dq, ddq, load=one, acceleration=acceleration) for one in _BASIS]
+    return np.asarray(np.einsum("pb,bnj->njp", _TO_PARAMETERS, np.array(each) - bare))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -304,8 +312,8 @@ def _prior(torque: Array) -> Array:
 
 def _load_design(model: RobotModel, samples: LoadSamples, acceleration: npt.ArrayLike) -> Array:
     """Torques by the parameters of the load, shape (7 n, 10)."""
-    rows = zip(samples.q, samples.dq, samples.ddq, strict=True)
-    return np.concatenate([load_regressor(model, *row, acceleration=acceleration) for row in rows])
+    found = load_regressors(model, samples.q, samples.dq, samples.ddq, acceleration=acceleration)
+    return found.reshape(-1, len(_BASIS))
 
 
 def _sensor_design(held: Array) -> Array:
@@ -334,9 +342,9 @@ def predicted_sigma(
     """
     still = np.zeros_like(postures)
     samples = LoadSamples(postures, still, still, still)
-    held = [inverse_dynamics(model, q, still[0], still[0], acceleration=acceleration) for q in postures]
+    held = inverse_dynamics_rows(model, postures, still, still, acceleration=acceleration)
     design = np.concatenate(
-        [_load_design(model, samples, acceleration), _sensor_design(np.concatenate(held))], axis=1
+        [_load_design(model, samples, acceleration), _sensor_design(held.ravel())], axis=1
     )
     scaled = design / np.tile(noise * model.tau_max, len(postures))[:, None]
     return _inverse(scaled.T @ scaled + np.diag(_prior(model.tau_max) ** -2.0))[:10, :10]

@@ -186,11 +186,11 @@ def tcp(
             hint=f"measure pose {worst + 1} again, or leave it out",
         )
     covariance = spread**2 * np.linalg.inv(matrix.T @ matrix)
-    sigma = np.sqrt(np.diagonal(covariance)) * _student(3 * len(given) - 6)
+    sigma = np.sqrt(np.diagonal(covariance)) * student(3 * len(given) - 6)
     tip, point = found[:3], found[3:]
     quat, sigma_angle = np.array([0.0, 0.0, 0.0, 1.0]), math.nan
     if along is not None:
-        pointing = math.hypot(spread * _student(3 * len(given) - 6), *sigma)
+        pointing = math.hypot(spread * student(3 * len(given) - 6), *sigma)
         quat, sigma_angle = _along(along, tip, point, pointing)
     elif len(aligned):
         quat, sigma_angle = _aligned(_checked(aligned, "aligned"), world)
@@ -263,7 +263,7 @@ def _worst(matrix: Array, missed: Array) -> tuple[int, float]:
     return worst, math.sqrt(max(left, 0.0) / freedom) if count > FEWEST else math.nan
 
 
-def _student(freedom: int) -> float:
+def student(freedom: int) -> float:
     """By how much two standard deviations grow for so few degrees of freedom; series in Abramowitz, Stegun 26.7.5."""
     z = 2.0
     first, second = (z**3 + z) / 4.0, (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
@@ -325,7 +325,7 @@ def _aligned(aligned: Sequence[Pose], world: Pose) -> tuple[Array, float]:
     if len(each) == 1:
         return mean.quat, math.nan
     freedom = 3 * (len(each) - 1)
-    return mean.quat, _student(freedom) * math.sqrt(3.0 * float((off**2).sum()) / freedom / len(each))
+    return mean.quat, student(freedom) * math.sqrt(3.0 * float((off**2).sum()) / freedom / len(each))
 
 
 def record_poses(

@@ -1,4 +1,4 @@
-"""`heptarm calibrate`: measure the tip of a tool, and the load on the flange."""
+"""`heptarm calibrate`: measure the tip of a tool, the load on the flange, and the arm itself."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from cyclopts import Parameter
 from heptarm import calibration
 from heptarm.arm.arm import Arm
 from heptarm.arm.link.target import target_from_env
+from heptarm.calibration.excitation import REACH
+from heptarm.calibration.excitation import SECONDS as EXCITED
+from heptarm.calibration.excitation import SPEED as FASTEST
 from heptarm.calibration.load_motion import SECONDS, SPEED
 from heptarm.calibration.tip import TOLERANCE
 from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, Model
@@ -22,7 +25,8 @@ from heptarm.errors import CommandRejected, NotReady
 from heptarm.io.targets import saved_target
 from heptarm.model.kinematics import forward
 from heptarm.panel.points import PointList
-from heptarm.values.files import read_text
+from heptarm.sim.collision import CollisionModel
+from heptarm.values.files import read_text, refuse_existing
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.motion.motion import hold
@@ -176,6 +180,89 @@ def load(
     else:
         print(found)
         print(_outcome(save, place))
+    return 0
+
+
+def arm(
+    run: Annotated[
+        Path | None,
+        Parameter(
+            help="Recording of the arm, computed without one. Default: the arm moves, and is recorded to --record."
+        ),
+    ] = None,
+    *,
+    validate: Annotated[
+        Path | None,
+        Parameter(help="Another recording, of other motions, that the result has to predict."),
+    ] = None,
+    record: Annotated[Path, Parameter(help="File of the recording.")] = Path("excitation.mcap"),
+    seconds: Annotated[float, Parameter(help="Least duration of the motions [s].")] = EXCITED,
+    speed: Annotated[float, Parameter(help="Fraction of the full speed, (0, 1].")] = FASTEST,
+    reach: Annotated[float, Parameter(help="The most by which an axis moves from here [rad].")] = REACH,
+    model: Annotated[str, Parameter(help="Robot of RUN. Default: that of the recording.")] = "",
+    commissioning: Annotated[
+        Path | None, Parameter(help="JSON report of heptarm check --commission: what differs is kept.")
+    ] = None,
+    save: Annotated[
+        Path | None,
+        Parameter(
+            name="--save",
+            help="File for the result, for sim://MODEL?fitted=FILE. Default: it is only printed.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, Parameter(negative="", help="Replace files that exist.")] = False,
+    dry_run: Annotated[
+        bool, Parameter(name="--dry-run", negative="", help="Show what would move; move nothing.")
+    ] = False,
+    access: Access = _ACCESS,
+) -> int:
+    """Identify the arm: friction, stiffness, rotors, delay, offset, gain and noise of its sensors.
+
+    All axes move around the present posture, and back; what moves is shown first. Bodies that would touch are looked
+    for among the arm and the floor only.
+
+    For example:
+
+        heptarm calibrate arm --target lab1 --save my-arm.toml
+
+        heptarm calibrate arm run.mcap --validate other.mcap --save my-arm.toml
+    """
+    if save is not None:
+        refuse_existing(save, overwrite=overwrite, name="save")
+    if run is None:
+        with access.target.connect(control=not dry_run, state_rate=_RATE) as one:
+            world = CollisionModel(one.robot.name)
+            plan = calibration.excitation(
+                one, seconds=seconds, speed=speed, reach=reach, collision_check=world
+            )
+            print(plan, file=sys.stderr if access.as_json else sys.stdout, flush=True)
+            if dry_run:
+                return 0
+            if not (
+                one.is_virtual or access.yes or ask_person(f"Move the real {one.robot.title} like this?")
+            ):
+                raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+            run = calibration.record_excitation(one, record, plan=plan, overwrite=overwrite)
+            declared = one.load
+    else:
+        declared = None
+    found = calibration.simulator(
+        run, robot=model or None, validation=validate, declared=declared, commissioning=commissioning
+    )
+    if save is not None:
+        found.save(save, overwrite=overwrite)
+    if access.as_json:
+        emit(
+            {
+                one.name: {"value": one.value.tolist(), "sigma": one.sigma.tolist()}
+                for one in found.arm.numbers
+            }
+            | {"ratio": found.validation.ratio.tolist(), "contradictions": list(found.arm.contradictions)}
+            | {"remarks": list(found.remarks), "saved": "" if save is None else str(save)}
+        )
+    else:
+        print(found)
+        print("nothing is saved; --save FILE does" if save is None else f"saved as {save}")
     return 0
 
 

@@ -62,6 +62,21 @@ def check(
             help="With --commission: write this file with .md and .json. Default: commissioning-ROBOT-DATE."
         ),
     ] = None,
+    projects: Annotated[
+        Path | None,
+        Parameter(
+            help="Folder of Sunrise projects: show which of their classes compile, in place of scenarios."
+        ),
+    ] = None,
+    run: Annotated[
+        float,
+        Parameter(
+            help="With --projects: also run each application on a virtual cabinet, for at most so many seconds."
+        ),
+    ] = 0.0,
+    jar: Annotated[
+        tuple[Path, ...], Parameter(help="With --projects: a library of the projects; may be repeated.")
+    ] = (),
     overwrite: Overwrite = False,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
@@ -78,6 +93,15 @@ def check(
         where = target.or_else(testing.stage(speed=1.0 if sim_speed is None else sim_speed))
         return commissioning.run(
             only, where, file=report, overwrite=overwrite, list_only=list_only, yes=yes, as_json=as_json
+        )
+    if projects is not None:
+        from heptarm.cli import projects as surveyed
+
+        return surveyed.run(projects, jars=jar, seconds=run, as_json=as_json)
+    if run or jar:
+        name = "run" if run else "jar"
+        raise CommandRejected(
+            f"--{name} needs --projects", parameter=name, hint="name a folder of Sunrise projects"
         )
     if report is not None:
         raise CommandRejected(

@@ -17,7 +17,7 @@ from typing import Annotated, NoReturn
 from cyclopts import App, CycloptsError, Parameter, UnknownOptionError, UnusedCliTokensError
 
 from heptarm import __version__
-from heptarm.errors import HeptarmError, missing_extra
+from heptarm.errors import HeptarmError, missing_extra, shortage
 
 #: Exit code after misuse of a command, as of other tools.
 _USAGE = 2
@@ -39,6 +39,8 @@ COMMANDS = {
     "record": "record:record",
     "plot": "plot:plot",
     "convert": "record:convert",
+    "twin": "twin:twin",
+    "export": "export:export",
     "doctor": "doctor:doctor",
     "bench": "bench:bench",
     "check": "check:check",
@@ -49,7 +51,13 @@ MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin-rel": "motion:
 PLANS = {"ptp": "plan:plan_ptp", "lin": "plan:plan_lin", "lin-rel": "plan:plan_lin_rel", "to": "plan:plan_to"}
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
-CALIBRATIONS = {"tcp": "calibrate:tcp", "load": "calibrate:load"}
+CALIBRATIONS = {
+    "tcp": "calibrate:tcp",
+    "load": "calibrate:load",
+    "arm": "calibrate:arm",
+    "eye": "calibrate_eye:eye",
+    "board": "calibrate_eye:board",
+}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
 #: Groups that are commands themselves, and where they are.
@@ -102,7 +110,10 @@ _words = [token for token in _tokens if not token.startswith("-")]
 _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
 _plans = App(name="plan", help="Look ahead of a motion: duration, limits, collisions; nothing moves.")
-_calibrate = App(name="calibrate", help="Measure what is on the flange: the tip of a tool, and the load.")
+_calibrate = App(
+    name="calibrate",
+    help="Measure the tip of a tool, the load on the flange, where a camera is, and what the arm itself is like.",
+)
 _keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
 _targets = App(name="targets", help="List, save and remove robots that have a name.")
 _learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
@@ -154,6 +165,11 @@ def main() -> None:
     except BrokenPipeError:  # the reader of our output has gone, as in `heptarm state --watch | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        remedy = shortage(error)
+        if not remedy or os.environ.get("HEPTARM_DEBUG"):
+            raise
+        _fail(f"{(error.strerror or '').lower()} ({remedy})")
     sys.exit(code if isinstance(code, int) else 0)
 
 

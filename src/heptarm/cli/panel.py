@@ -15,6 +15,7 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
 from heptarm.panel.guard import free_port, is_local
 from heptarm.panel.model import PanelArm
+from heptarm.panel.player import open_player
 from heptarm.panel.process import STATE_RATE, Panel, PanelOptions, model_of
 
 
@@ -44,6 +45,13 @@ def panel(
         ),
     ] = "",
     light: Annotated[bool, Parameter(negative="", help="A light page instead of a dark one.")] = False,
+    play: Annotated[
+        Path | None,
+        Parameter(
+            help="Play this recording (MCAP) instead of connecting to an arm; one that heptarm twin --save wrote has "
+            "the twin as a ghost."
+        ),
+    ] = None,
     target: CommandTargets = NO_TARGETS,
     as_json: Json = False,
 ) -> int:
@@ -52,6 +60,8 @@ def panel(
     For example:
 
         heptarm panel --target sim://iiwa14
+
+        heptarm panel --play run.mcap
     """
     require("viser", extra="viz")
     options = PanelOptions(
@@ -73,6 +83,8 @@ def panel(
         )
     free_port(host, port)  # before a simulator starts
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if play is not None:
+        return _play(play, options, as_json=as_json)
     with ExitStack() as stack:
         models: list[PanelArm] = []
         for text, one in target.each():
@@ -96,4 +108,20 @@ def panel(
             page.run()
         except KeyboardInterrupt:
             pass
+    return 0
+
+
+def _play(file: Path, options: PanelOptions, *, as_json: bool) -> int:
+    """Play a recording until Ctrl-C."""
+    player = open_player(file, options)
+    if as_json:
+        emit({"panel": player.url, "may_control": False})
+    else:
+        print(f"{file} plays at {player.url}\nCtrl-C ends it.", flush=True)
+    try:
+        player.run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        player.close()
     return 0

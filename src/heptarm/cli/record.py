@@ -81,15 +81,14 @@ def record(
     With --camera, or any other option of the camera, it also records pictures of a model of the arm.
     """
     limit = None if seconds is None else within(seconds, "for", 0.0, 1e7, above=True, unit="s")
-    settings: dict[str, Any] = {
-        "size": None if camera_size is None else _numbers(camera_size, "camera-size", "x", 2, int),
-        "rate": camera_rate,
-        "place": None if camera_place is None else _numbers(camera_place, "camera-place", ",", 3, float),
-        "target": None if camera_target is None else _numbers(camera_target, "camera-target", ",", 3, float),
-        "frame": camera_frame,
-        "scene": camera_scene,
-    }
-    given = {name: value for name, value in settings.items() if value is not None}
+    given = camera_settings(
+        size=camera_size,
+        rate=camera_rate,
+        place=camera_place,
+        target=camera_target,
+        frame=camera_frame,
+        scene=camera_scene,
+    )
     lens = Camera(**given) if camera or given else None
     if listen:
         if lens is not None:
@@ -122,8 +121,30 @@ def record(
     return 0
 
 
-def _numbers(text: str, name: str, between: str, count: int, kind: type[_Number]) -> tuple[_Number, ...]:
-    """Numbers of an option's text.
+def camera_settings(
+    *,
+    size: str | None = None,
+    place: str | None = None,
+    target: str | None = None,
+    **others: float | str | None,
+) -> dict[str, Any]:
+    """Arguments of a `Camera` from the options of it that were given.
+
+    Raises:
+        CommandRejected: one of them has other numbers.
+    """
+    pixels, metres = "WIDTHxHEIGHT in pixels, such as 640x480", "X,Y,Z in metres, such as 1.5,-1.3,1.1"
+    found: dict[str, Any] = {name: value for name, value in others.items() if value is not None}
+    if size is not None:
+        found["size"] = numbers_of(size, "camera-size", "x", int, form=pixels)
+    for name, text in (("place", place), ("target", target)):
+        if text is not None:
+            found[name] = numbers_of(text, f"camera-{name}", ",", float, form=metres)
+    return found
+
+
+def numbers_of(text: str, name: str, between: str, kind: type[_Number], *, form: str) -> tuple[_Number, ...]:
+    """Numbers of an option's text, as many as its form has.
 
     Raises:
         CommandRejected: it has others.
@@ -132,12 +153,7 @@ def _numbers(text: str, name: str, between: str, count: int, kind: type[_Number]
         found = tuple(kind(part) for part in text.split(between))
     except ValueError:
         found = ()
-    if len(found) != count:
-        form = (
-            "WIDTHxHEIGHT in pixels, such as 640x480"
-            if count == 2
-            else "X,Y,Z in metres, such as 1.5,-1.3,1.1"
-        )
+    if len(found) != len(form.split()[0].split(between)):
         raise CommandRejected(f"{name} must be {form}, got {text!r}", parameter=name, value=text)
     return found
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import HeptarmError
+from heptarm.errors import HeptarmError, shortage, system_errors
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -43,11 +43,12 @@ class MemoryBlock:
     """
 
     def __init__(self, words: int = 0, *, path: str | None = None) -> None:
-        if path is None:
-            folder = _MEMORY if os.access(_MEMORY, os.W_OK) else None
-            handle, path = tempfile.mkstemp(prefix="heptarm-", dir=folder)
-        else:
-            handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
+        with system_errors("shared memory cannot be opened"):
+            if path is None:
+                folder = _MEMORY if os.access(_MEMORY, os.W_OK) else None
+                handle, path = tempfile.mkstemp(prefix="heptarm-", dir=folder)
+            else:
+                handle = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
         try:
             if words:
                 _reserve(handle, 8 * words)
@@ -59,7 +60,8 @@ class MemoryBlock:
             raise HeptarmError(
                 f"{8 * words / 1024:.0f} KiB of shared memory cannot be reserved in {os.path.dirname(path)}: "
                 f"{(error.strerror or str(error)).lower()}",
-                hint=f"free some space there (df -h {os.path.dirname(path)}), or give it more: "
+                hint=shortage(error)
+                or f"free some space there (df -h {os.path.dirname(path)}), or give it more: "
                 "mount -o remount,size=256M /dev/shm, docker run --shm-size=256m",
             ) from error
         finally:

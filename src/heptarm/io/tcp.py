@@ -10,7 +10,7 @@ import struct
 import sys
 from collections.abc import Callable, Iterator
 
-from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.errors import ConnectFailed, ConnectionLost, shortage
 from heptarm.io.udp import ConnectedUdp
 
 #: The connection is lost if the other side reads nothing for this long [s].
@@ -142,7 +142,9 @@ class TcpListener:
         try:
             self._sock = socket.create_server((host, port))
         except OSError as error:
-            raise ConnectFailed(f"cannot listen on {host}:{port}: {error.strerror or error}") from error
+            raise ConnectFailed(
+                f"cannot listen on {host}:{port}: {error.strerror or error}", hint=shortage(error)
+            ) from error
         self.port: int = self._sock.getsockname()[1]
 
     def accept(self, *, timeout: float = 5.0) -> TcpTransport:
@@ -222,6 +224,8 @@ def _reason(error: OSError, timeout: float) -> str:
 
 
 def _advice(error: OSError) -> str:
+    if remedy := shortage(error):
+        return remedy
     if isinstance(error, ConnectionRefusedError):
         return "start the heptarm application on the cabinet, or `heptarm sim`, and check the port"
     if isinstance(error, socket.gaierror):

@@ -10,7 +10,7 @@ import sys
 import time
 from typing import Any
 
-from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.errors import ConnectFailed, ConnectionLost, system_errors
 
 #: Size of the receive buffer; longer than any FRI datagram.
 BUFFER = 2048
@@ -43,7 +43,7 @@ class UdpSocket:
     """
 
     def __init__(self, port: int, *, host: str = "0.0.0.0", patience: float = 0.1) -> None:
-        self.sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.sock = _datagram_socket()
         self._closed = False
         try:
             self.sock.bind((host, port))
@@ -119,6 +119,16 @@ class UdpSocket:
         return ConnectionLost(f"UDP port {self.port} fails: {(error.strerror or str(error)).lower()}")
 
 
+def _datagram_socket(family: int = socket.AF_INET) -> socket.socket:
+    """A UDP socket.
+
+    Raises:
+        ConnectFailed: the system has none left.
+    """
+    with system_errors("a UDP socket cannot be opened", kind=ConnectFailed):
+        return socket.socket(family, socket.SOCK_DGRAM)
+
+
 def _limit_wait(sock: socket.socket, seconds: float) -> None:
     """Limit how long the socket waits for a datagram [s], in the kernel: Python's own limit costs a poll() per call."""
     if sys.platform == "win32":
@@ -148,7 +158,7 @@ def own_address(peer: str) -> str:
     Raises:
         ConnectFailed: the machine cannot be reached, or has no IPv4 address.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+    with _datagram_socket() as probe:
         try:
             probe.connect((peer, 9))
         except OSError as error:
@@ -170,7 +180,7 @@ def address_to_bind(host: str) -> str:
         That address, so that nobody in another network can send to the port. If no interface has it, because
         a router or a container translates addresses: all interfaces.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+    with _datagram_socket() as probe:
         try:
             probe.bind((host, 0))
         except OSError:
@@ -194,7 +204,7 @@ class ConnectedUdp:
 
     def __init__(self, local: tuple[Any, ...], peer: tuple[Any, ...], *, family: int) -> None:
         self._closed = False
-        self._sock = socket.socket(family, socket.SOCK_DGRAM)
+        self._sock = _datagram_socket(family)
         try:
             self._sock.bind((local[0], 0, *local[2:]))
             self._sock.connect(peer)

@@ -156,6 +156,24 @@ def inverse_dynamics(
     return rigid + _friction(friction, dq)
 
 
+def inverse_dynamics_rows(
+    robot: RobotModel,
+    q: Array,
+    dq: Array,
+    ddq: Array,
+    *,
+    load: Body | None = None,
+    acceleration: npt.ArrayLike = GRAVITY,
+) -> Array:
+    """`inverse_dynamics` without friction of many moments, unchecked: arguments and result of shape (n, 7)."""
+    bodies, fall, found, result = _bodies(robot, load), _fall(acceleration), Joints(), np.empty((len(q), 7))
+    function = one().hd_inverse
+    for index, row in enumerate(np.concatenate([q, dq, ddq], axis=1).tolist()):
+        function(bodies, Joints(*row[:7]), Joints(*row[7:14]), Joints(*row[14:]), fall, found)
+        result[index] = found
+    return result
+
+
 def _friction(friction: Friction | None, dq: npt.ArrayLike) -> Array:
     return np.zeros(7) if friction is None else instance(friction, Friction, "friction").torque(dq)
 

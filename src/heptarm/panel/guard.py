@@ -21,7 +21,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any, TypeAlias
 from urllib.parse import parse_qs, urlsplit
 
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError, shortage
 from heptarm.values.checks import integer
 from heptarm.values.frames import check_printable
 
@@ -49,12 +49,12 @@ def _is_everywhere(host: str) -> bool:
 
 def _own_address() -> str:
     """This machine's address towards the network; without a network its name."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.connect(_SOMEWHERE)
             return str(probe.getsockname()[0])
-        except OSError:
-            return socket.gethostname()
+    except OSError:
+        return socket.gethostname()
 
 
 def free_port(host: str, port: int) -> int:
@@ -76,6 +76,8 @@ def free_port(host: str, port: int) -> int:
             with socket.create_server((host, one), family=_family(host)):
                 return one if port else 0
         except OSError as error:
+            if remedy := shortage(error):
+                raise CommandRejected("the panel has no socket to listen on", hint=remedy) from error
             if error.errno not in (errno.EADDRINUSE, errno.EACCES):
                 raise CommandRejected(
                     f"host must be an address of this machine, got {host!r}: {str(error.strerror).partition(' (')[0]}",

@@ -18,7 +18,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +31,7 @@ from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.plan_box import PlanBox
 from heptarm.panel import frame, texts
-from heptarm.panel.guard import PageGuard, free_port, is_local
+from heptarm.panel.guard import Page, PageGuard, free_port, is_local
 from heptarm.panel.model import PanelArm, groups_for
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
 from heptarm.wire.messages import StopKind
@@ -86,6 +86,43 @@ class PanelOptions:
         return not self.read_only and (is_local(self.host) or self.allow_control)
 
 
+def open_server(options: PanelOptions, pages: Mapping[str, Page]) -> tuple[Any, PageGuard]:
+    """A viser server with a floor, and its guard, which lets in nobody before it has the port of the server.
+
+    Args:
+        options: see `PanelOptions`.
+        pages: what is answered besides viser's own page, by their paths.
+
+    Raises:
+        MissingExtra: viser is not installed.
+        CommandRejected: there is no such address to listen on. LimitError: there is no such port.
+    """
+    viser = require("viser", extra="viz")
+    port = free_port(options.host, options.port)  # viser would wait for ever for an address that is none
+    guard = PageGuard(options.host)
+    # viser's own lines have a URL without the token, which lets nobody in
+    with contextlib.redirect_stdout(io.StringIO()), guard.installed(pages):
+        server = viser.ViserServer(host=options.host, port=port, verbose=False)
+    server.gui.configure_theme(
+        dark_mode=not options.light, show_logo=False, show_share_button=False, brand_color=(255, 107, 10)
+    )
+    server.gui.set_panel_label("heptarm")
+    server.gui.add_html(texts.STYLE)
+    server.scene.set_up_direction("+z")
+    server.scene.world_axes.visible = False
+    server.scene.add_grid(
+        "/floor",
+        width=4.0,
+        height=4.0,
+        cell_size=0.1,
+        section_size=0.5,
+        cell_color=(70, 74, 82) if not options.light else (205, 208, 214),
+        section_color=(105, 110, 120) if not options.light else (160, 164, 172),
+        fade_distance=8.0,
+    )
+    return server, guard
+
+
 class Panel:
     """A viser server with the pages of some arms.
 
@@ -104,7 +141,7 @@ class Panel:
     """
 
     def __init__(self, arms: Sequence[PanelArm], options: PanelOptions) -> None:
-        viser = require("viser", extra="viz")
+        require("viser", extra="viz")
         from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld
         from heptarm.panel.page import ArmPage
         from heptarm.sim.plant.appearance import ArmMeshes
@@ -114,35 +151,14 @@ class Panel:
             meshes = ArmMeshes.of(options.meshes)
         except ValueError as error:
             raise CommandRejected(str(error), parameter="meshes", value=options.meshes) from None
-        port = free_port(options.host, options.port)  # viser would wait for ever for an address that is none
-        guard = PageGuard(options.host)
-        # viser's own lines have a URL without the token, which lets nobody in
         pages = {"/": self._frame, frame.STOP_PATH: self._answer_stop}
         self._is_light = options.light
-        with contextlib.redirect_stdout(io.StringIO()), guard.installed(pages):
-            server = viser.ViserServer(host=options.host, port=port, verbose=False)
+        server, guard = open_server(options, pages)
         self.server = server
         self._arms = tuple(arms)
         self._ended = threading.Event()
         self._drawing = threading.RLock()
         self._pages: list[ArmPage] = []
-        server.gui.configure_theme(
-            dark_mode=not options.light, show_logo=False, show_share_button=False, brand_color=(255, 107, 10)
-        )
-        server.gui.set_panel_label("heptarm")
-        server.gui.add_html(texts.STYLE)
-        server.scene.set_up_direction("+z")
-        server.scene.world_axes.visible = False
-        server.scene.add_grid(
-            "/floor",
-            width=4.0,
-            height=4.0,
-            cell_size=0.1,
-            section_size=0.5,
-            cell_color=(70, 74, 82) if not options.light else (205, 208, 214),
-            section_color=(105, 110, 120) if not options.light else (160, 164, 172),
-            fade_distance=8.0,
-        )
         middle = _APART * (len(self._arms) - 1) / 2
         server.initial_camera.position = (1.7, middle - 1.5, 1.15)
         server.initial_camera.look_at = (0.15, middle, 0.5)

@@ -258,10 +258,12 @@ class _Tree:
         Where few are, they are in a ball around random ones of the tree, of the radius of their reach, at most `near`
         [rad].
         """
-        count, drawn = len(self._parents), low + (high - low) * random.random((_DRAWN, 7))
+        count = len(self._parents)
+        drawn: Array = low + (high - low) * random.random((_DRAWN, 7))
         first: int = _functions().hn_within(count, *self._addresses, _DRAWN, drawn.ctypes.data)
         if first >= 0:
-            return drawn[first]
+            chosen: Array = drawn[first]
+            return chosen
         middle = random.integers(count)
         found: Array = self._q[middle] + min(self._reach[middle], near) * _in_ball(random)
         return np.clip(found, low, high)
@@ -643,8 +645,9 @@ class _Search:
 
 def _in_ball(random: np.random.Generator) -> Array:
     """A random place in the ball of radius 1 around the origin, shape (7,)."""
-    found: Array = random.normal(size=7)
-    return found * (random.uniform() ** (1.0 / 7.0) / np.linalg.norm(found))
+    direction = random.normal(size=7)
+    found: Array = direction * (random.uniform() ** (1.0 / 7.0) / np.linalg.norm(direction))
+    return found
 
 
 def _sampled(region: Region, random: np.random.Generator) -> list[Pose]:

@@ -1,4 +1,4 @@
-"""The simulated camera of a recording: a process that draws, fed with the newest state, never waited for.
+"""The simulated camera of recordings and programs: a process that draws, fed with the newest state, never waited for.
 
 One picture is drawn at a time. A picture that is due while the last one is not finished is dropped and counted.
 """
@@ -21,7 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from heptarm.errors import CommandRejected, HeptarmError, require
+from heptarm.errors import CommandRejected, HeptarmError, require, system_errors
 from heptarm.io.keys import environment
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
@@ -56,14 +56,14 @@ class CameraSubject:
     positions: Path | None = None
 
 
-class Picture(NamedTuple):
-    """A picture of a state.
+class DrawnPicture(NamedTuple):
+    """A picture of a state, as the process gives it.
 
     Attributes:
         number: that of the state.
         received: our clock at the state's receipt [ns].
         sampled: our clock at its sampling [ns].
-        data: the bytes of a JPEG file.
+        data: the bytes of its layers, such as of a JPEG file.
     """
 
     number: int
@@ -73,23 +73,26 @@ class Picture(NamedTuple):
 
 
 class CameraFeed:
-    """Gets pictures of one arm from a process; used by the recorder's thread.
+    """Gets pictures of one arm from a process; used by the thread of a recorder or of a `CameraStream`.
 
     Args:
         camera: its place and its pictures.
         subject: what it draws.
+        layers: what a picture consists of: "jpeg"; "pixels", "depth" and "labels" as bytes of arrays.
 
     Attributes:
         camera: likewise.
         dropped: pictures that were due and could not be drawn.
+        names: bodies of the model by their labels, as soon as it can draw.
     """
 
-    def __init__(self, camera: Camera, subject: CameraSubject) -> None:
-        self.camera, self._subject = camera, subject
+    def __init__(self, camera: Camera, subject: CameraSubject, *, layers: Sequence[str] = ("jpeg",)) -> None:
+        self.camera, self._subject, self._layers = camera, subject, tuple(layers)
         self.dropped = 0
+        self.names: tuple[str, ...] = ()
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
-        self._pictures: deque[Picture] = deque()
+        self._pictures: deque[DrawnPicture] = deque()
         self._asked: tuple[int, int, int] | None = None
         self._lock = threading.Lock()
         self._is_idle = threading.Event()
@@ -106,7 +109,9 @@ class CameraFeed:
             CommandRejected: there is no such scene, or this machine cannot draw.
         """
         require("PIL.Image", extra="record")
-        if find_spec("mujoco") is None:  # imported in the process alone
+        with system_errors("the package 'mujoco' cannot be looked for"):
+            is_missing = find_spec("mujoco") is None  # imported in the process alone
+        if is_missing:
             require("mujoco", extra="sim")
         failures: list[str] = []
         for driver in _drivers():
@@ -118,7 +123,7 @@ class CameraFeed:
             f"this machine cannot draw the pictures of a camera: {'; '.join(failures)}",
             parameter="camera",
             hint="install Mesa's EGL, as in apt install libegl1 libgl1-mesa-dri, or name a driver that works here "
-            "by MUJOCO_GL=egl, osmesa or glfw; without a camera all else is recorded",
+            "by MUJOCO_GL=egl, osmesa or glfw; a recording without a camera has all else",
         )
 
     def _begin(self, driver: str) -> str:
@@ -142,6 +147,7 @@ class CameraFeed:
             self.close()
             raise
         if "ready" in answer:
+            self.names = tuple(answer["names"])
             return ""
         self.close()
         if "refused" in answer:
@@ -156,21 +162,28 @@ class CameraFeed:
             "camera": asdict(camera),
             "scene": camera.scene or subject.scene,
             "positions": str(subject.positions or "") if is_its_scene else "",
+            "layers": self._layers,
         }
         # a session of its own: Ctrl-C in the terminal ends the recording, which then ends this process
-        return subprocess.Popen(
-            [sys.executable, "-m", "heptarm.sim.camera", json.dumps(settings)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,  # why it cannot begin
-            start_new_session=True,
-            env={_THREADS: "1"} | environment(None) | ({_DRIVER: driver} if driver else {}),
-        )
+        with system_errors("the process of the camera cannot be started"):
+            return subprocess.Popen(
+                [sys.executable, "-m", "heptarm.sim.camera", json.dumps(settings)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,  # why it cannot begin
+                start_new_session=True,
+                env={_THREADS: "1"} | environment(None) | ({_DRIVER: driver} if driver else {}),
+            )
 
     @property
     def pid(self) -> int:
         """Id of the process that draws; 0: there is none."""
         return 0 if self._process is None else self._process.pid
+
+    @property
+    def is_over(self) -> bool:
+        """Whether there will be no pictures any more."""
+        return self._is_over
 
     def is_due(self, received: int) -> bool:
         """Whether a picture is due at a time of our clock [ns]."""
@@ -222,7 +235,7 @@ class CameraFeed:
             ]
         return json.dumps(request).encode() + b"\n"
 
-    def take(self) -> list[Picture]:
+    def take(self) -> list[DrawnPicture]:
         """The pictures that are finished."""
         return [self._pictures.popleft() for _ in range(len(self._pictures))]
 
@@ -260,10 +273,10 @@ class CameraFeed:
                 data = answers.read(size)
                 if self._asked is None or len(data) < size:
                     break
-                self._pictures.append(Picture(*self._asked, data))
+                self._pictures.append(DrawnPicture(*self._asked, data))
                 self._is_idle.set()
         if "ready" in answer and not self._is_over:
-            _log.warning("the process of the camera has ended: the recording goes on without pictures")
+            _log.warning("the process of the camera has ended: there are no more pictures")
         self._is_over = True
         self._give_up()
 

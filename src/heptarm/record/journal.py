@@ -7,8 +7,10 @@ import json
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple, TypeAlias
+from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
+from types import NoneType
+from typing import Any, NamedTuple, TypeAlias, get_args, get_type_hints
 
 from heptarm.fri.loop.telemetry import Reader
 from heptarm.wire import messages as wire
@@ -94,6 +96,73 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(one) for one in value]
     return value
+
+
+def restored(content: Any, kind: Any) -> Any:
+    """The message that `plain` made plain data of; a number that is null is NaN.
+
+    Args:
+        content: the plain data, from a file.
+        kind: class of the message, or the type of a field.
+
+    Raises:
+        ValueError: it is none, or has what this version does not know.
+    """
+    if is_dataclass(kind):
+        return _restored_message(content, kind)
+    members = get_args(kind)
+    if members and isinstance(content, list):
+        return tuple(restored(one, members[0]) for one in content)
+    if members:  # a union
+        if content is None and NoneType in members:
+            return None
+        name = content.get("type") if isinstance(content, dict) else content
+        for one in members:
+            if getattr(one, "__name__", "") == name:
+                return restored(content, one)
+        raise ValueError(f"{name!r} is not known")
+    if isinstance(kind, type) and issubclass(kind, enum.Enum):
+        return _restored_word(content, kind)
+    if kind is float and content is None:
+        return math.nan
+    if kind is bytes and isinstance(content, str):
+        return bytes.fromhex(content)
+    wanted = (int, float) if kind is float else kind
+    if not isinstance(content, wanted) or (kind is not bool and isinstance(content, bool)):
+        raise ValueError(f"{kind.__name__} expected, got {content!r}")
+    return float(content) if kind is float else content
+
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _restored_message(content: Any, kind: Any) -> Any:
+    if not isinstance(content, dict):
+        raise ValueError(f"{kind.__name__} expected, got {content!r}")
+    known = {field.name: field for field in fields(kind)}
+    unknown = content.keys() - known.keys() - {"type"}
+    if unknown:
+        raise ValueError(f"{kind.__name__} has an unknown field {min(unknown)!r}")
+    missing = [name for name, field in known.items() if field.default is MISSING and name not in content]
+    if missing:
+        raise ValueError(f"{kind.__name__} lacks {missing[0]!r}")
+    hints = _hints(kind)
+    return kind(**{name: restored(content[name], hints[name]) for name in known if name in content})
+
+
+def _restored_word(content: Any, kind: type[enum.Enum]) -> Any:
+    """A member of an enumeration by its name, or flags by theirs; a flag without a name is a number."""
+    if isinstance(content, int):
+        return kind(content)
+    words = str(content).upper().split("|")
+    if any(one not in kind.__members__ for one in words):
+        raise ValueError(f"{kind.__name__} {content!r} is not known")
+    found = kind[words[0]]
+    for one in words[1:]:
+        found |= kind[one]  # type: ignore[operator]
+    return found
 
 
 def describe(message: wire.Run) -> str:

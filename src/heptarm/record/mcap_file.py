@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, require
-from heptarm.record.camera import Picture
+from heptarm.errors import require
+from heptarm.record.camera import DrawnPicture
 from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
 from heptarm.record.layout import (
     CAMERA_CALIBRATION,
@@ -42,8 +42,10 @@ from heptarm.record.layout import (
     encode_transforms,
     transform_head,
 )
+from heptarm.record.recorded import RecordedData
 from heptarm.record.samples import RestWatch, StateSample, state_rows
 from heptarm.values.camera import Camera
+from heptarm.values.files import unwritable
 from heptarm.values.robot import known_robot
 from heptarm.wire import messages as wire
 
@@ -53,6 +55,8 @@ BEGIN, END = "heptarm", "heptarm.end"
 ARM = "arm"
 #: States that are written before other threads get their turn.
 _TURN = 4
+#: Begin of the time line of merged recordings: a day after 1970 [s], so that earlier events have a time; their chunks.
+_MERGED_EPOCH, _MERGED_CHUNK = 86400.0, 524_288
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 #: Shortest time between two poses for a 3D view [ns].
 _POSE_PERIOD = 33_000_000
@@ -99,7 +103,7 @@ class RecordingFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("wb")
         except OSError as error:
-            raise _unwritable(path, error) from error
+            raise unwritable(path, error) from error
         self._epoch = epoch
         self._out: Any = writer.Writer(self._file, chunk_size=chunk)
         try:
@@ -107,7 +111,7 @@ class RecordingFile:
             self._begin(facts, arm)
         except OSError as error:
             self.abandon()
-            raise _unwritable(path, error) from error
+            raise unwritable(path, error) from error
 
     def beside(self, facts: Mapping[str, str], arm: str) -> RecordingFile:
         """A writer of another arm's part of the same file; `flush`, `finish` and `abandon` are left to this one."""
@@ -167,13 +171,14 @@ class RecordingFile:
                 time.sleep(0.0)  # the thread that receives states is not held up by the interpreter's lock
             payload = data[index * size : (index + 1) * size]
             out.add_message(channel, one.received + self._epoch, payload, at, one.number & 0xFFFFFFFF)
-            if one.received >= self._pose_due:
-                self._write_pose(rows[index], one.received, at)
+            self._write_pose(rows[index], one.received, at)
             self._write_rest(one, at, signals)
         self.sampled = at - self._epoch
 
     def _write_pose(self, row: Any, received: int, sampled: int) -> None:
-        """Write what is three-dimensional: the pose of the motion frame, and the frames of the links."""
+        """Write what is three-dimensional, if it is due: the pose of the motion frame, and the frames of the links."""
+        if received < self._pose_due:
+            return
         at, links = received + self._epoch, self._links
         if not np.isnan(row["xyz"]).any():
             self._pose_due = received + _POSE_PERIOD
@@ -210,7 +215,7 @@ class RecordingFile:
             at = received + self._epoch
             self._out.add_message(self._cycles, at, data[index * size : (index + 1) * size], at)
 
-    def picture(self, camera: Camera, picture: Picture) -> None:
+    def picture(self, camera: Camera, picture: DrawnPicture) -> None:
         """Write a picture, how the camera projects, and the camera's frame: z ahead, x to the right, y down."""
         if self._camera is None:
             image = self._add("/camera/image", *COMPRESSED_IMAGE)
@@ -233,6 +238,28 @@ class RecordingFile:
         if entry.kind != REQUEST or isinstance(entry.content, SHOWN_REQUESTS):
             name = "cabinet" if entry.kind in ("event", REFUSAL) else entry.kind
             self._out.add_message(self._log, at, encode_log(at, entry.level, entry.text, name), at)
+
+    def copy(self, recording: RecordedData) -> None:
+        """Write states and events of a recording that was read, at the times of its time line."""
+        rows = STATE.rows(len(recording))
+        for name in rows.dtype.names or ():
+            if name in recording and not name.startswith("_"):
+                rows[name] = recording[name]
+        stamps = np.round(recording.t * 1e9).astype(np.int64)
+        rows["stamp"] = stamps
+        data, size = rows.tobytes(), rows.itemsize
+        for index, at in enumerate((stamps + self._epoch).tolist()):
+            self._out.add_message(self._states, at, data[index * size : (index + 1) * size], at)
+            self._write_pose(rows[index], int(stamps[index]), at)
+        for event in recording.events:
+            at = round(event.t * 1e9) + self._epoch
+            if event.kind == "signals":
+                self._out.add_message(self._signals, at, json.dumps(event.content).encode(), at)
+                continue
+            entry = {"kind": event.kind, "name": event.name, "id": event.id, "text": event.text}
+            data_of = json.dumps(entry | {"content": event.content}, ensure_ascii=False).encode()
+            self._out.add_message(self._journal, at, data_of, at)
+            self._out.add_message(self._log, at, encode_log(at, "info", event.text, event.kind), at)
 
     def flush(self) -> None:
         """Hand complete chunks to the operating system."""
@@ -291,10 +318,29 @@ def sampling_times(stamps: npt.NDArray[np.int64], to_ours: Callable[[int], int])
     return (begin + (stamps - first) * rate).astype(np.int64)
 
 
-def _unwritable(path: Path, error: OSError) -> CommandRejected:
-    return CommandRejected(
-        f"{path} cannot be written: {error.strerror}",
-        parameter="path",
-        value=str(path),
-        hint="choose a folder in which this user may write, on a disk that has space",
-    )
+def merge(path: Path, recordings: Mapping[str, RecordedData]) -> Path:
+    """Write recordings to one file over their common time line: states and events, without FRI cycles and pictures.
+
+    Args:
+        path: the file; one that exists is replaced.
+        recordings: by the name that each gets as an arm of the file; at least one.
+
+    Returns:
+        The file.
+
+    Raises:
+        CommandRejected: the file cannot be written.
+    """
+    zero = round(_MERGED_EPOCH * 1e9)  # files of the same recordings are the same
+    (first, one), *others = recordings.items()
+    same = {"clock_rate": "1"}  # times are the cabinet's already
+    out = RecordingFile(path, {**one.facts, **same}, epoch=zero, chunk=_MERGED_CHUNK, arm=first)
+    try:
+        out.copy(one)
+        for name, other in others:
+            out.beside({**other.facts, **same}, name).copy(other)
+        out.finish({"states": str(sum(map(len, recordings.values()))), "lost": "0"})
+    except BaseException:
+        out.abandon()
+        raise
+    return path

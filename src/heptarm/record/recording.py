@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -345,7 +346,7 @@ def _motions(
     ids, t = signals.get("motion", np.zeros(0, int)), signals["t"]
     for number in np.unique(ids[ids > 0]).tolist():
         seen = t[ids == number]
-        begins.setdefault(number, float(seen[0]))
+        begins[number] = min(float(seen[0]), begins.get(number, inf))  # an event may come late
     for number, begin in sorted(begins.items(), key=lambda pair: pair[1]):
         seen = t[ids == number]
         end, is_open = ends.get(number), bool(len(ids) and ids[-1] == number)

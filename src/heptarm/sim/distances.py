@@ -45,9 +45,12 @@ class _Checks(ctypes.Structure):
             for name in ["model", "data", "kinematics", "distance", "positions", "places", "turns"]
         ],
         *[(name, _POINTER) for name in ["flange_place", "flange_turn", "hulls", "centres"]],
-        *[("shells", _WORD), ("entries", _POINTER), ("count", _WORD), ("all", _WORD)],
+        ("shells", _WORD),
+        ("entries", _POINTER),
+        *[("count", _WORD), ("all", _WORD)],
         *[("levers", _POINTER), ("moves", _POINTER)],
-        *[("levels", _WORD), ("rooms", _POINTER), ("grips", _POINTER)],
+        ("levels", _WORD),
+        *[("rooms", _POINTER), ("grips", _POINTER)],
         ("held", _WORD),
     ]
 

@@ -1,14 +1,28 @@
-"""A simulated camera: where it is, what it looks at, how its pictures are."""
+"""Cameras: a simulated one, where it is and how its pictures are; and a picture with the arm at that moment."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
-from heptarm.errors import LimitError, ShapeError
-from heptarm.values.checks import Array, array, instance, integer, shown, within, word
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.checks import (
+    Array,
+    Value,
+    array,
+    finite_entries,
+    flag,
+    frozen,
+    instance,
+    integer,
+    numbers,
+    shown,
+    within,
+    word,
+)
 from heptarm.values.frames import check_printable
 from heptarm.values.pose import Pose
 
@@ -16,13 +30,42 @@ from heptarm.values.pose import Pose
 FARTHEST, NEAREST = 20.0, 0.001
 #: Least and greatest vertical field of view [rad], width and height [pixels], and pictures per second.
 FIELDS, SIZES, FASTEST = (0.02, 2.8), (16, 4096), 60.0
+#: Most noise of a picture [gray levels], and most blur [pixels].
+NOISIEST, BLURREST = 100.0, 20.0
 #: Frames that a camera may be attached to.
 FRAMES = ("base", "flange")
 
 
+def intrinsic(matrix: npt.ArrayLike, name: str = "matrix") -> Array:
+    """An intrinsic matrix, shape (3, 3) [pixels].
+
+    Raises:
+        ShapeError: a wrong shape or type.
+        LimitError: not of the form (fx 0 cx; 0 fy cy; 0 0 1) with positive focal lengths.
+    """
+    found = numbers(matrix, name, "an intrinsic matrix of shape (3, 3)")
+    if found.shape != (3, 3):
+        raise ShapeError(
+            f"{name} must have the shape (3, 3), got {found.shape}", parameter=name, value=matrix
+        )
+    finite_entries(found, name)
+    rest = found - np.diag(np.diagonal(found))
+    rest[:2, 2] = 0.0
+    if min(found[0, 0], found[1, 1]) <= 0.0 or found[2, 2] != 1.0 or np.abs(rest).max() > 1e-9:
+        raise LimitError(
+            f"{name} must be (fx 0 cx; 0 fy cy; 0 0 1) with focal lengths above 0, got {shown(found.tolist())}",
+            code=2,
+            parameter=name,
+            value=matrix,
+        )
+    return frozen(found)
+
+
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A simulated camera of a recording: it draws a model of the arm at the joint positions that the arm reports.
+    """A simulated camera: it draws a model of the arm at the joint positions that the arm reports.
+
+    `arm.camera(...)` gives its pictures to a program, `arm.record(..., camera=...)` writes them to a file.
 
     Its pictures are no photographs. A robot knows nothing of what is around it: there the camera draws the arm with the
     shapes of its tool and workpiece, and, if one is named, a scene that stands still.
@@ -37,6 +80,10 @@ class Camera:
         frame: "base", or "flange": the camera moves with the arm.
         scene: what is around the arm, as in `heptarm sim --scene`; "": nothing. A private simulator's own scene is
             drawn by itself, with its bodies where they are.
+        principal: where the optical axis meets the pictures, u v [pixels]; None: in their middle.
+        noise: standard deviation of each pixel's colours [gray levels of 255].
+        blur: standard deviation of a Gaussian blur [pixels].
+        shadows: whether there are shadows; without them a picture takes half the time where there is no graphics card.
 
     Raises:
         ShapeError: wrong types.
@@ -50,6 +97,10 @@ class Camera:
     rate: float = 10.0
     frame: str = "base"
     scene: str = ""
+    principal: tuple[float, float] | None = field(default=None, kw_only=True)
+    noise: float = field(default=0.0, kw_only=True)
+    blur: float = field(default=0.0, kw_only=True)
+    shadows: bool = field(default=True, kw_only=True)
 
     def __post_init__(self) -> None:
         for name in ("place", "target"):
@@ -77,6 +128,14 @@ class Camera:
         object.__setattr__(self, "rate", within(self.rate, "rate", 0.0, FASTEST, above=True, unit="Hz"))
         word(self.frame, "frame", FRAMES)
         check_printable(instance(self.scene, str, "scene"), "scene")
+        if self.principal is not None:
+            axis = array(self.principal, 2, "principal").tolist()
+            for index, value in enumerate(axis):
+                within(value, f"principal[{index}]", 0.0, self.size[index] - 1.0, unit="pixels")
+            object.__setattr__(self, "principal", tuple(axis))
+        object.__setattr__(self, "noise", within(self.noise, "noise", 0.0, NOISIEST))
+        object.__setattr__(self, "blur", within(self.blur, "blur", 0.0, BLURREST, unit="pixels"))
+        flag(self.shadows, "shadows")
 
     @property
     def pose(self) -> Pose:
@@ -93,7 +152,127 @@ class Camera:
 
     @property
     def matrix(self) -> Array:
-        """Its intrinsic matrix: a point x y z of `pose` is in the picture at (u/w, v/w) [pixels], shape (3, 3)."""
+        """Its intrinsic matrix: a point x y z of `pose` is in the picture at (u/w, v/w) [pixels], shape (3, 3).
+
+        The middle of the first pixel is at (0, 0), as in OpenCV and ROS.
+        """
         width, height = self.size
         focal = 0.5 * height / math.tan(0.5 * self.fov)
-        return np.array([[focal, 0.0, 0.5 * width], [0.0, focal, 0.5 * height], [0.0, 0.0, 1.0]])
+        u, v = (0.5 * (width - 1), 0.5 * (height - 1)) if self.principal is None else self.principal
+        return np.array([[focal, 0.0, u], [0.0, focal, v], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture(Value):
+    """What a camera saw, with the arm at that moment.
+
+    Attributes:
+        pixels: red, green, blue of a simulated camera, shape (height, width, 3); of your own, what it gave.
+        stamp: the cabinet's clock when it was taken [ns].
+        q: joint positions then, shape (7,) [rad].
+        flange: pose of the flange in the base then.
+        pose: pose of the camera in the base then; None: nobody said where the camera is.
+        matrix: intrinsic matrix, shape (3, 3) [pixels]; None: nobody said.
+        depth: distance of what each pixel shows along the optical axis, shape (height, width) [m], infinite where
+            there is nothing; None: not asked for.
+        labels: what each pixel shows, an index of `names`, shape (height, width), -1 where there is nothing; None: not
+            asked for.
+        names: bodies of the model by their labels.
+    """
+
+    pixels: npt.NDArray[np.uint8]
+    stamp: int
+    q: Array
+    flange: Pose
+    pose: Pose | None = None
+    matrix: Array | None = None
+    depth: npt.NDArray[np.float32] | None = None
+    labels: npt.NDArray[np.int16] | None = None
+    names: tuple[str, ...] = ()
+
+    @property
+    def gray(self) -> npt.NDArray[np.uint8]:
+        """Mean of its colours, shape (height, width)."""
+        return self.pixels if self.pixels.ndim == 2 else self.pixels.mean(axis=2).astype(np.uint8)
+
+    def mask(self, body: str) -> npt.NDArray[np.bool_]:
+        """Where it shows a body, shape (height, width).
+
+        Raises:
+            CommandRejected: it has no labels, or there is no such body; the text lists them.
+        """
+        if self.labels is None:
+            raise CommandRejected(
+                "the picture has no labels", parameter="body", hint="arm.camera(camera, labels=True)"
+            )
+        found = [index for index, name in enumerate(self.names) if name == body]
+        if not found:
+            raise CommandRejected(
+                f"body must be one of {', '.join(self.names)}; got {shown(body)}",
+                parameter="body",
+                value=body,
+            )
+        return np.asarray(self.labels == found[0])
+
+    def point(self, u: float, v: float, *, depth: float | None = None) -> Array:
+        """The point in the base that a pixel shows, shape (3,) [m].
+
+        Args:
+            u: to the right, the middle of the first pixel is 0 [pixels].
+            v: down [pixels].
+            depth: its distance along the optical axis [m]; None: that of the picture.
+
+        Raises:
+            CommandRejected: pose or matrix of the camera, or the depth, is not known.
+            LimitError: the pixel is outside the picture, or shows nothing.
+        """
+        pose, matrix = self._placed()
+        height, width = self.pixels.shape[:2]
+        column, row = within(u, "u", -0.5, width - 0.5), within(v, "v", -0.5, height - 0.5)
+        if depth is not None:
+            far = within(depth, "depth", 0.0, 1e3, above=True, unit="m")
+        elif self.depth is not None:
+            far = float(self.depth[min(round(row), height - 1), min(round(column), width - 1)])
+        else:
+            raise CommandRejected(
+                "the picture has no depth",
+                parameter="depth",
+                hint="arm.camera(camera, depth=True), or give it here",
+            )
+        if not math.isfinite(far):
+            raise LimitError(
+                f"the pixel must show a body, got nothing at u {column:g}, v {row:g}",
+                code=2,
+                parameter="u",
+                value=column,
+            )
+        return pose.xyz + far * pose.rotation @ np.linalg.solve(matrix, (column, row, 1.0))
+
+    def pixel(self, point: npt.ArrayLike) -> Array:
+        """Where a point of the base would be in the picture, u v, shape (2,) [pixels]; it may be outside.
+
+        Raises:
+            CommandRejected: pose or matrix of the camera is not known.
+            LimitError: the point is not in front of the camera.
+        """
+        pose, matrix = self._placed()
+        seen = pose.rotation.T @ (array(point, 3, "point") - pose.xyz)
+        if seen[2] < NEAREST:
+            raise LimitError(
+                f"point must be in front of the camera, got a distance of {seen[2]:.3g} m along its axis",
+                code=2,
+                parameter="point",
+                value=float(seen[2]),
+                allowed=f"at least {NEAREST:g} m",
+            )
+        u, v, w = matrix @ seen
+        return np.array([u / w, v / w])
+
+    def _placed(self) -> tuple[Pose, Array]:
+        if self.pose is None or self.matrix is None:
+            raise CommandRejected(
+                "pose and matrix of the camera are not known",
+                parameter="pose",
+                hint="arm.camera(source, pose=..., matrix=...), as heptarm.calibration.hand_eye measures them",
+            )
+        return self.pose, self.matrix

@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, shortage
 from heptarm.values.checks import instance, shown
 
 #: Largest text that is read [bytes].
@@ -75,7 +75,7 @@ def unwritable(path: Path, error: OSError, *, name: str = "path") -> CommandReje
         f"{path} cannot be written: {(error.strerror or str(error)).lower()}",
         parameter=name,
         value=str(path),
-        hint="choose a folder in which this user may write, on a disk that has space",
+        hint=shortage(error) or "choose a folder in which this user may write, on a disk that has space",
     )
 
 
@@ -96,9 +96,8 @@ def open_regular(path: Path, *, name: str = "path") -> Iterator[BinaryIO]:
             yield file
     except OSError as error:
         why = (error.strerror or str(error)).lower()
-        raise unreadable(
-            path, why, name=name, hint="give a file that exists and that you may read"
-        ) from error
+        hint = shortage(error) or "give a file that exists and that you may read"
+        raise unreadable(path, why, name=name, hint=hint) from error
 
 
 def read_bytes(path: Path, *, largest: int = LARGEST_TEXT, name: str = "path") -> bytes:

@@ -70,12 +70,19 @@ class Body(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Friction(Value):
-    """Friction of the joints: viscous · dq + coulomb · tanh(dq / transition). KUKA publishes none: identify yours.
+    """Friction of the joints; KUKA publishes none: identify yours by `heptarm.calibration.simulator`.
+
+    With s = tanh(dq / transition): viscous · dq + (coulomb + (breakaway - coulomb) · exp(-(dq / stribeck)²)) · s +
+    asymmetry · s² (Armstrong-Hélouvry, Dupont, Canudas de Wit, "A survey of models ... for the control of machines
+    with friction", 1994).
 
     Args:
         viscous: [Nm s/rad], one number for all joints or seven, not negative.
         coulomb: [Nm], likewise.
         transition: joint speed at which the Coulomb friction has 76 % of its value [rad/s], above 0.
+        breakaway: at the slowest motion [Nm], likewise; None: as `coulomb`.
+        stribeck: joint speed at which 37 % of breakaway beyond Coulomb friction are left [rad/s], above 0.
+        asymmetry: by which friction in the positive direction exceeds the mean of both [Nm], of either sign.
 
     Raises:
         ShapeError: neither one number nor seven.
@@ -85,23 +92,44 @@ class Friction(Value):
     viscous: Array
     coulomb: Array
     transition: float
+    breakaway: Array
+    stribeck: float
+    asymmetry: Array
 
     def __init__(
-        self, viscous: npt.ArrayLike = 0.0, coulomb: npt.ArrayLike = 0.0, *, transition: float = 0.01
+        self,
+        viscous: npt.ArrayLike = 0.0,
+        coulomb: npt.ArrayLike = 0.0,
+        *,
+        transition: float = 0.01,
+        breakaway: npt.ArrayLike | None = None,
+        stribeck: float = 0.05,
+        asymmetry: npt.ArrayLike = 0.0,
     ) -> None:
-        for name, value in (("viscous", viscous), ("coulomb", coulomb)):
+        for name, value, least in (
+            ("viscous", viscous, 0.0),
+            ("coulomb", coulomb, 0.0),
+            ("breakaway", coulomb if breakaway is None else breakaway, 0.0),
+            ("asymmetry", asymmetry, -_STRONGEST_FRICTION),
+        ):
             numbers = one_or_each(value, 7, name)
             for index, one in enumerate(numbers.tolist()):
-                within(one, f"{name}[{index}]", 0.0, _STRONGEST_FRICTION)
+                within(one, f"{name}[{index}]", least, _STRONGEST_FRICTION)
             object.__setattr__(self, name, numbers)
-        object.__setattr__(
-            self, "transition", within(transition, "transition", 0.0, 10.0, above=True, unit="rad/s")
-        )
+        for name, speed in (("transition", transition), ("stribeck", stribeck)):
+            object.__setattr__(self, name, within(speed, name, 0.0, 10.0, above=True, unit="rad/s"))
 
     def torque(self, dq: npt.ArrayLike) -> Array:
         """Torque against which the joints move at speeds `dq`, shape (7,) [Nm]."""
-        rates = array(dq, 7, "dq")
-        return self.viscous * rates + self.coulomb * np.tanh(rates / self.transition)
+        return self.at(array(dq, 7, "dq"))
+
+    def at(self, dq: Array) -> Array:
+        """`torque` of many moments at once, unchecked: shape (..., 7)."""
+        turn = np.tanh(dq / self.transition)
+        slow = np.exp(-((dq / self.stribeck) ** 2))
+        dry = self.coulomb + (self.breakaway - self.coulomb) * slow
+        result: Array = self.viscous * dq + (dry + self.asymmetry * turn) * turn
+        return result
 
 
 #: Largest coefficient of friction [Nm], [Nm s/rad].

@@ -146,6 +146,14 @@ class SimulatorOptions:
             in_target=True,
         ),
     )
+    fitted: Path | None = field(
+        default=None,
+        metadata=_about(
+            "file of a measured arm, of `heptarm calibrate arm`: friction, stiffness and errors of its sensors",
+            metavar="FILE",
+            in_target=True,
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(

@@ -13,10 +13,10 @@ from urllib.parse import urlsplit
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.several import Arms
-from heptarm.errors import CommandRejected, require
+from heptarm.errors import CommandRejected, require, shortage
 from heptarm.record.recorder import Recorder, RecordSource, epoch_of
 from heptarm.values.checks import flag, instance, within
-from heptarm.values.files import path_of, refuse_existing
+from heptarm.values.files import path_of, refuse_existing, unwritable
 from heptarm.values.sealed import Sealed
 
 if TYPE_CHECKING:
@@ -192,12 +192,7 @@ def _check_writable(file: Path) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.open("wb").close()
     except OSError as error:
-        raise CommandRejected(
-            f"{file} cannot be written: {error.strerror}",
-            parameter="save",
-            value=str(file),
-            hint="choose a folder in which this user may write, on a disk that has space",
-        ) from error
+        raise unwritable(file, error, name="save") from error
 
 
 def _check_viewer(address: str) -> None:
@@ -221,7 +216,7 @@ def _check_viewer(address: str) -> None:
             f"no rerun viewer answers at {host}:{port}: {error.strerror or error}",
             parameter="to",
             value=address,
-            hint="start one there with: rerun --port 9876",
+            hint=shortage(error) or "start one there with: rerun --port 9876",
         ) from error
 
 

@@ -3,6 +3,7 @@ package sample;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.batch;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.lin;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.splRel;
 
 import java.io.PrintWriter;
 import java.util.Map;
@@ -49,17 +50,34 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 import com.kuka.roboticsAPI.persistenceModel.IPersistenceEngine;
 import com.kuka.roboticsAPI.persistenceModel.XmlApplicationDataSource;
 import com.kuka.roboticsAPI.sensorModel.CartesianPositionInformation;
+import com.kuka.flexfellow.AbstractFlexFellow;
+import com.kuka.med.deviceModel.LBRMed;
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationData;
+import com.kuka.roboticsAPI.deviceModel.MobilePlatform;
+import com.kuka.roboticsAPI.deviceModel.PoseInformation;
+import com.kuka.roboticsAPI.geometricModel.ITransformationProvider;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.SceneGraphObject;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.motionModel.RelativeSPL;
+import com.kuka.roboticsAPI.motionModel.Spline;
+import com.kuka.roboticsAPI.persistenceModel.templateModel.FramesTemplate;
+import com.kuka.roboticsAPI.persistenceModel.templateModel.GeometricObjectTemplate;
+import com.kuka.roboticsAPI.persistenceModel.templateModel.TemplateElement;
+import com.kuka.roboticsAPI.persistenceModel.templateModel.ToolTemplate;
+import com.kuka.roboticsAPI.uiModel.ITaskUI;
 
 /** Members that few applications use; each step leaves a line that the test reads. */
 public class Members extends RoboticsAPIApplication {
     /** Types that applications only name. */
     private static final Class<?>[] NAMED = {CartesianVelocityLimitInfo.class, CartesianPositionInformation.class,
-        XmlApplicationDataSource.class};
+        TemplateElement.class, FramesTemplate.class, GeometricObjectTemplate.class, ToolTemplate.class, MobilePlatform.class,
+        RoboticsAPIApplicationData.class, PoseInformation.class, AbstractFlexFellow.class, LBRMed.class};
 
     /** A condition of the application's own, without `and`. */
     private static final class Own implements ICondition {
         @Override
-        public ICondition or(ICondition... others) {
+        public ICondition or(ICondition other, ICondition... more) {
             return this;
         }
 
@@ -101,7 +119,7 @@ public class Members extends RoboticsAPIApplication {
         String file = getApplicationData().getProcessData("sample.file").getValue();
         out = new PrintWriter(file, "UTF-8");
         say("process data as text", file.equals(String.valueOf(getApplicationData().getProcessData("sample.file").getValue())));
-        say("a robot by its name", lbr != null && NAMED.length == 3);
+        say("a robot by its name", lbr != null && NAMED.length == 11);
         lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
         frames();
         modes();
@@ -119,7 +137,7 @@ public class Members extends RoboticsAPIApplication {
     private void frames() {
         Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
         Map<?, IRedundancyCollection> found = here.getRedundancyInformation();
-        IRedundancyCollection redundancy = found.get(lbr).copy();
+        IRedundancyCollection redundancy = found.get(lbr.getName()).copy();
         IParameterSet all = redundancy.getAllParameters();
         StringBuilder kinds = new StringBuilder();
         for (IParameter<?> one : all) {
@@ -133,16 +151,54 @@ public class Members extends RoboticsAPIApplication {
         Transformation turned = MatrixTransformation.of(Vector.of(1, 2, 3),
                 MatrixRotation.of(Transformation.ofRad(0, 0, 0, 0.1, 0, 0).getRotationMatrix()));
         say("a transformation of a matrix", Math.abs(turned.getAlphaRad() - 0.1) < 1e-12);
+        say("no additional parameter", lbr.getFlange().getAdditionalParameter("colour") == null);
+        XmlApplicationDataSource data = getContext().getEngine(IPersistenceEngine.class).getDefaultDataSource();
         try {
-            lbr.getFlange().getAdditionalParameter("colour");
+            data.loadAllTemplates();
         } catch (UnsupportedOperationException e) {
-            say("what is not simulated throws", e.getMessage().contains("colour"));
+            say("what is not simulated throws", e.getMessage().startsWith("heptarm: not modelled: loadAllTemplates"));
         }
         try {
-            getContext().getEngine(IPersistenceEngine.class).getDefaultDataSource();
+            getContext().getEngine(String.class);
         } catch (UnsupportedOperationException e) {
-            say("the project's data are not written", e.getMessage().contains("IPersistenceEngine"));
+            say("there is one engine", e.getMessage().contains("java.lang.String"));
         }
+        RelativeSPL curve = splRel(Transformation.ofTranslation(0, 0, 50)).setAlphaOffset(0.1).setBetaOffset(0.1).setGammaOffset(0.1);
+        try {
+            lbr.move(new Spline(curve));
+        } catch (UnsupportedOperationException e) {
+            say("a relative segment is not simulated", e.getMessage().contains("use spl"));
+        }
+        SceneGraphObject thing = new SceneGraphObject() {
+            @Override
+            protected void changeParent(ObjectFrame parent) {
+            }
+        };
+        ITransformationProvider place = new ITransformationProvider() {
+            @Override
+            public boolean isStatic() {
+                return true;
+            }
+
+            @Override
+            public PoseInformation getPoseInformation() {
+                return null;
+            }
+
+            @Override
+            public ITransformation getTransformation() {
+                return Transformation.ofTranslation(0, 0, 7);
+            }
+
+            @Override
+            public String getUniqueName() {
+                return "seven";
+            }
+        };
+        ObjectFrame own = new ObjectFrame("own", lbr.getRootFrame(), thing, place);
+        say("a frame of one's own", Math.abs(lbr.getRootFrame().transformationTo(own).getZ() - 7) < 1e-9);
+        ITaskUI keys = getApplicationUI();
+        keys.createUserKeyBar("few").addUserKey(0, (key, event) -> { }, true).setCriticalText("sure?");
     }
 
     private void modes() {

@@ -229,6 +229,12 @@ class Session:
         """
         if sample.q is not None and not math.isfinite(sum(sample.q)):
             raise ImplausibleMessage("FRI message: joint positions must be finite; the datagram is damaged")
+        for axis, value in enumerate(sample.q or (), 1):
+            if abs(value) > math.tau:
+                raise ImplausibleMessage(
+                    f"FRI message: the measured position of A{axis} must be in [-2π, 2π] rad, got {value:.4g} rad: "
+                    "the datagram is damaged"
+                )
         self._check_periods(sample, now)
         for name, values in (("interpolated", sample.q_ipo), ("commanded", sample.q_cmd)):
             if values is None:

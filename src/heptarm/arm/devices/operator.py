@@ -10,7 +10,7 @@ from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.errors import CommandRejected
 from heptarm.values.checks import array, finite, instance, integer, within, word
 from heptarm.values.frames import check_name, check_printable
-from heptarm.values.pose import Pose
+from heptarm.values.pose import Pose, check_pose
 from heptarm.values.sealed import Sealed
 
 Fault: TypeAlias = Literal[
@@ -34,7 +34,7 @@ class Operator(Sealed):
         self._cabinet = cabinet
 
     def do(self, words: str) -> str:
-        """Carry out a command such as "push 0 0 -20 1.5".
+        """Carry out a command such as "push 0 0 -20 1.5", or at a time of the simulator's clock: "emergency_stop@12.5".
 
         Returns:
             What it shows; "" if it shows nothing.
@@ -57,6 +57,20 @@ class Operator(Sealed):
         """
         x, y, z, *quat = (float(part) for part in self.do(f"where {check_name(body, 'body')}").split())
         return Pose.of((x, y, z), quat)
+
+    def place(self, body: str, pose: Pose) -> None:
+        """Place a free body of the simulator's scene at rest, at a pose in the base; it falls or collides from there.
+
+        Raises:
+            CommandRejected: the scene has no such body, or it is fixed; the text lists those that can be placed.
+        """
+        check_name(body, "body")
+        check_pose(pose)
+        self.do(" ".join(["place", body, *(f"{value:.9f}" for value in (*pose.xyz, *pose.quat))]))
+
+    def reset(self) -> None:
+        """Put all free bodies of the scene back where they were at the start, at rest. The arm stays."""
+        self.do("reset")
 
     def fault(
         self,
@@ -127,8 +141,8 @@ class Operator(Sealed):
         """
         self.do(f"answer {integer(button, 'button', 0, 11)}")
 
-    def push(self, force: npt.ArrayLike, *, duration: float) -> None:
-        """Push the flange.
+    def start_push(self, force: npt.ArrayLike, *, duration: float) -> None:
+        """Push the flange from now on; returns at once, and replaces the push before it.
 
         Args:
             force: in the base axes, shape (3,) [N].

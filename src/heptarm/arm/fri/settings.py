@@ -322,6 +322,8 @@ def _listening(port: int | None, address: str, make: Callable[[int], Client]) ->
 def _is_free(port: int, address: str) -> bool:
     try:
         UdpSocket(port, host=address).close()
-    except ConnectFailed:
+    except ConnectFailed as error:
+        if error.parameter != "port":
+            raise
         return False
     return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import os
 import threading
@@ -38,7 +39,7 @@ from heptarm.errors import (
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.record.black_box import BlackBox, BlackBoxFile
-from heptarm.record.journal import ERROR, EVENT, Journal
+from heptarm.record.journal import ERROR, EVENT, Journal, plain
 from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.checks import within
 from heptarm.values.io import Signal
@@ -858,7 +859,16 @@ class Connection:
             "rate": f"{self.options.rate:g}",
             "groups": ",".join(self.options.groups),
             "clock_rate": f"{self.real_time_factor:.6g}",
+            "protocol": f"{wire.MAJOR}.{wire.MINOR}",
+            "tools": json.dumps([plain(tool) for tool in self._tools]),
         }
+
+    @property
+    def _tools(self) -> tuple[wire.ToolInfo, ...]:
+        """Tools of the cabinet, and what is attached; of the same name the newest."""
+        event = self.events.attached
+        latest = () if event is None else (event.tool, event.workpiece)
+        return tuple({tool.name: tool for tool in (*self.welcome.tools, *latest) if tool}.values())
 
     @property
     def signal_names(self) -> tuple[str, ...]:

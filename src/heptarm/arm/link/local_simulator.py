@@ -23,12 +23,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from heptarm.arm.link.target import Target
-from heptarm.errors import ConnectFailed, ConnectionLost, refuse_windows, require_extra
+from heptarm.errors import ConnectFailed, ConnectionLost, refuse_windows, require_extra, system_errors
 from heptarm.io.keys import environment
 from heptarm.values.simulator_options import flag
 
 _log = logging.getLogger("heptarm.sim")
 
+_NOT_STARTED = "the virtual cabinet did not start"
 #: Longest time to start a virtual cabinet [s]: a few seconds, more on a busy machine.
 READY_TIMEOUT = 60.0
 _END_TIMEOUT = 5.0
@@ -126,20 +127,27 @@ class PrivateCabinet:
         if key is None:
             command += ["--data", "heptarm.key="]  # a key in a project's file is that of the real cabinet
         scene = dict(target.options).get("scene", "")
-        positions = Path(tempfile.mkdtemp(prefix="heptarm-")) / "positions" if scene else None
+        with system_errors(_NOT_STARTED, kind=ConnectFailed):
+            positions = Path(tempfile.mkdtemp(prefix="heptarm-")) / "positions" if scene else None
         if positions is not None:
             command += ["--positions", str(positions)]
         command.append("--parent-pipe")
         # a session of its own: Ctrl-C in the terminal reaches only this process, which then stops the arm
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-            env=_NO_WINDOW | environment(key),  # never an argument, which all users of the machine can read
-        )
+        try:
+            with system_errors(_NOT_STARTED, kind=ConnectFailed):
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                    start_new_session=True,
+                    env=_NO_WINDOW
+                    | environment(key),  # never an argument, which all users of the machine can read
+                )
+        except BaseException:
+            _remove(positions)
+            raise
         output: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[_Ready | None] = queue.SimpleQueue()
         replies: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
@@ -173,9 +181,7 @@ class PrivateCabinet:
             hint = "run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'"
             if wrong_option.is_set():
                 hint = f'correct the target "{target}"'
-            raise ConnectFailed(
-                f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}", hint=hint
-            )
+            raise ConnectFailed(f"{_NOT_STARTED}: {' | '.join(output) or 'no output'}", hint=hint)
         for note in found.notes:
             _log.warning("%s", note)
         return cls(process, found.port, found.model, readers, replies, scene, positions)
@@ -276,5 +282,10 @@ def _end(process: subprocess.Popen[str], readers: list[threading.Thread], positi
         reader.join(1.0)
         if pipe is not None and not reader.is_alive():
             pipe.close()
+    _remove(positions)
+
+
+def _remove(positions: Path | None) -> None:
+    """Remove the file of positions and its folder."""
     if positions is not None:
         shutil.rmtree(positions.parent, ignore_errors=True)

@@ -16,7 +16,15 @@ from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
 from heptarm.arm.motion.program_request import CheckedProgram, ProgramTerms, checked
-from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, ShapeError, Timeout, require
+from heptarm.errors import (
+    CollisionForeseen,
+    CommandRejected,
+    ModeConflict,
+    ShapeError,
+    Timeout,
+    require,
+    system_errors,
+)
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
@@ -239,7 +247,8 @@ class Foresight:
     def _planned(self, items: Sequence[wire.Item], start: Array, step: float) -> PlannedProgram:
         """The program as the controller would plan it."""
         require("ruckig", extra="sim")
-        from heptarm.planning.lookahead import FramesOfArm, look_ahead
+        with system_errors("the planner cannot be loaded"):
+            from heptarm.planning.lookahead import FramesOfArm, look_ahead
 
         frames = FramesOfArm(self._tooling.on_flange, self._tooling.in_base)
         return look_ahead(self._connection.robot, start, items, frames, step=step)

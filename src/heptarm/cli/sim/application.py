@@ -75,6 +75,10 @@ def application(
             "sessions, as in 172.31.1.25=127.0.0.1; may be repeated.",
         ),
     ] = DEFAULTS.map,
+    jar: Annotated[
+        tuple[Path, ...],
+        Parameter(help="Library of the application that is in no folder of the project; may be repeated."),
+    ] = (),
     port: Annotated[
         int | None,
         Parameter(
@@ -115,7 +119,9 @@ def application(
     )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with TemporaryDirectory(prefix="heptarm-") as out, ExitStack() as stack:
-        simulator = page.positions(stack, _compiled(folder, Path(out), app_class, mapped, simulator))
+        simulator = page.positions(
+            stack, _compiled(folder, Path(out), app_class, mapped, simulator, jars=jar)
+        )
         return _run(simulator, page=page, key_file=options.key_file, as_json=options.as_json)
 
 
@@ -162,7 +168,13 @@ def _read_answers(file: Path | None) -> list[int]:
 
 
 def _compiled(
-    folder: Path, out: Path, main: str, addresses: AddressMap, options: SimulatorOptions
+    folder: Path,
+    out: Path,
+    main: str,
+    addresses: AddressMap,
+    options: SimulatorOptions,
+    *,
+    jars: tuple[Path, ...],
 ) -> SimulatorOptions:
     """Compile the application into a folder; return the options of the cabinet that runs it.
 
@@ -171,7 +183,7 @@ def _compiled(
     """
     from heptarm.sim.runtime.application import compile_application, unused_addresses
 
-    application = compile_application(folder, out, main=main, addresses=addresses)
+    application = compile_application(folder, out, main=main, addresses=addresses, jars=jars)
     data_file = options.project or application.project
     notes = [*application.left_out]
     for address in unused_addresses(folder, data_file, addresses):

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Any
 
 from heptarm.cli.output import is_silent, lines
-from heptarm.errors import ConnectFailed, refuse_windows, require_extra
+from heptarm.errors import ConnectFailed, refuse_windows, require_extra, system_errors
 from heptarm.io.keys import environment
 from heptarm.sim.runtime.operator import WORDS
 from heptarm.values.simulator_options import SimulatorOptions
@@ -30,14 +30,15 @@ class Child(subprocess.Popen[str]):
 
     def __init__(self, command: list[str], key: str | None) -> None:
         # a session of its own: Ctrl-C reaches this process only, which then ends its children in order
-        super().__init__(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-            env=environment(key),
-        )
+        with system_errors("a process cannot be started"):
+            super().__init__(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+                env=environment(key),
+            )
 
     def __exit__(self, *_: Any) -> None:
         assert self.stdin is not None

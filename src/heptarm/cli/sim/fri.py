@@ -182,7 +182,7 @@ def _made(
     from heptarm.sim.fri.faults import FaultScenario
     from heptarm.sim.fri.settings import SessionConfiguration
     from heptarm.sim.plant.payload import parse_payload
-    from heptarm.sim.plant.plant import Plant
+    from heptarm.sim.plant.plant import Plant, fitted_arm
     from heptarm.sim.plant.sensor_errors import sensor_errors
     from heptarm.sim.runtime.operator import SimulatedOperator
     from heptarm.sim.runtime.standalone_fri import (
@@ -215,11 +215,12 @@ def _made(
     )
     start = deg(*(numbers(options.start, "--fri-start", 7) if options.start else START))
     model.check(start, "--fri-start")
+    fitted = fitted_arm(arm.fitted, model)
     try:
-        errors = sensor_errors(model, arm.sensors)
+        errors = sensor_errors(model, arm.sensors, fitted)
     except ValueError as error:
         raise CommandRejected(str(error), parameter="sensors", value=arm.sensors) from None
-    plant = Plant(model.name, q=tuple(start.tolist()), errors=errors)
+    plant = Plant(model.name, q=tuple(start.tolist()), errors=errors, fitted=fitted)
     if options.force:
         x, y, z = numbers(options.force, "--fri-force", 3)
         plant.apply_wrench((x, y, z))

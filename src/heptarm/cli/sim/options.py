@@ -63,6 +63,13 @@ class ArmOptions:
             "Default: ideal ones."
         ),
     ] = DEFAULTS.sensors
+    fitted: Annotated[
+        Path | None,
+        Parameter(
+            help="File of a measured arm, of heptarm calibrate arm: friction, stiffness in position control, the "
+            "errors of its sensors. Default: what the simulator assumes."
+        ),
+    ] = DEFAULTS.fitted
     verbose: Annotated[
         bool,
         Parameter(
@@ -173,6 +180,7 @@ class CabinetOptions(ArmOptions):
             payload=self.payload,
             safety=self.safety,
             sensors=self.sensors,
+            fitted=self.fitted,
             scene=self.scene,
             project=self.project,
             parent_pipe=True,

@@ -117,7 +117,7 @@ class TorqueGuard:
             is_braking: bring the arm to rest, whatever the torques are.
 
         Returns:
-            Torques to send [Nm]; zero if q or dq are not finite.
+            Torques to send [Nm]; zero if q or dq are not finite, or are none that a robot has.
         """
         call = self._call
         call[0], call[1], call[2] = q, dq, tau
@@ -148,7 +148,7 @@ class TorqueGuard:
             is_braking: likewise.
 
         Returns:
-            Wrench to send [N, Nm]; zero if q or dq are not finite.
+            Wrench to send [N, Nm]; zero if q or dq are not finite, or are none that a robot has.
         """
         call = self._call
         call[0], call[1], self._wrench[:] = q, dq, wrench

@@ -16,7 +16,7 @@ import time
 
 import numpy as np
 
-from heptarm.errors import ConnectFailed
+from heptarm.errors import ConnectFailed, system_errors
 from heptarm.fri.loop.native import library
 from heptarm.fri.loop.process import request_realtime
 from heptarm.io.udp import UdpSocket
@@ -51,7 +51,9 @@ def floor(seconds: float, *, period: float, cpu: int | None = None) -> Array:
     folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
     command = [sys.executable, "-m", "heptarm.fri.loop.echo", str(count), "" if cpu is None else str(cpu)]
     environment = {**os.environ, "PYTHONPATH": folders}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as echo:
+    with system_errors("the echo cannot be started", kind=ConnectFailed):
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+    with process as echo:
         assert echo.stdout is not None
         port = echo.stdout.readline().strip()
         if not port:

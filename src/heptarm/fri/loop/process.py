@@ -26,7 +26,7 @@ from typing import Any
 
 import cloudpickle
 
-from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError
+from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError, system_errors
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import CompiledLaw
 from heptarm.fri.loop.cycle import Cycle, describe
@@ -184,12 +184,13 @@ class Worker:
 
     def __init__(self, path: str, sent: bytes) -> None:
         folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "heptarm.fri.loop.process", path],
-            env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
-            stdin=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-        )
+        with system_errors("the loop's process cannot be started", kind=ConnectFailed):
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "heptarm.fri.loop.process", path],
+                env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
+                stdin=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+            )
         self._printed: deque[str] = deque(maxlen=20)
         self._reader = threading.Thread(target=self._pass_on, name="heptarm-fri-log", daemon=True)
         self._reader.start()

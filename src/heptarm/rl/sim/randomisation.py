@@ -6,15 +6,16 @@ simulation did.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, asdict, dataclass
-from math import inf, isfinite, log
+from dataclasses import KW_ONLY, asdict, dataclass, replace
+from math import ceil, floor, inf, isfinite, log
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.checks import Array, integer, numbers, shown, within
+from heptarm.values.checks import Array, instance, integer, numbers, shown, within
+from heptarm.values.fitted_arm import FittedArm
 
 #: Largest relative error of a velocity.
 _NOISIEST = 0.99
@@ -71,6 +72,31 @@ class Randomisation:
                 parameter="stiffness",
             )
         within(self.velocity_noise, "velocity_noise", 0.0, _NOISIEST)
+
+    @staticmethod
+    def of_arm(arm: FittedArm, *, period: float, base: Randomisation | None = None) -> Randomisation:
+        """Ranges about a measured arm: two standard deviations of what is known of it.
+
+        Args:
+            arm: the fitted arm, see `heptarm.calibration.simulator`.
+            period: of the decisions [s].
+            base: the other ranges, and those of what the arm does not have; None: `MILD`.
+
+        Raises:
+            LimitError: a period outside its range.
+        """
+        instance(arm, FittedArm, "arm")
+        every = within(period, "period", 0.0, 1.0, above=True, unit="s")
+        found = replace(MILD if base is None else instance(base, Randomisation, "base"))
+        if "state_delay" in arm:
+            late = arm["state_delay"]
+            ends = late.value[0] + 2.0 * np.array([-1.0, 1.0]) * np.nan_to_num(late.sigma[0])
+            low, high = max(floor(ends[0] / every), 0), min(ceil(ends[1] / every), LATEST)
+            found = replace(found, latency=(min(low, high), high))
+        if "load" in arm:
+            mass, sigma = float(arm["load"].value[0]), float(np.nan_to_num(arm["load"].sigma[0]))
+            found = replace(found, payload=(max(mass - 2.0 * sigma, 0.0), mass + 2.0 * sigma))
+        return found
 
     def draw_latency(self, random: np.random.Generator, count: int) -> npt.NDArray[np.int64]:
         """Decisions, shape (count,)."""

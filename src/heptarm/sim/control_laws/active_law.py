@@ -9,6 +9,7 @@ from heptarm.planning.seam import HandGuide
 from heptarm.sim.control_laws.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
 from heptarm.sim.control_laws.hand_guiding_law import HandGuidingLaw
 from heptarm.sim.control_laws.laws import (
+    GAINS,
     ControlLaw,
     JointImpedanceLaw,
     MeasuredState,
@@ -33,12 +34,15 @@ class ActiveLaw:
         robot: the robot.
         model: MuJoCo's model; its first seven joints are the arm's.
         data: its state.
+        gains: of position control, see `position_gains`.
     """
 
-    def __init__(self, robot: RobotModel, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        self._robot = robot
+    def __init__(
+        self, robot: RobotModel, model: mujoco.MjModel, data: mujoco.MjData, *, gains: Array = GAINS
+    ) -> None:
+        self._robot, self._gains = robot, gains
         self._flange = FlangeKinematics(model, data)
-        self._law: ControlLaw = PositionLaw()
+        self._law: ControlLaw = PositionLaw(gains=gains)
         self._frames: _Frames | None = None
 
     @property
@@ -115,7 +119,7 @@ class ActiveLaw:
         """Switch to position control; returns whether the arm was compliant, as `take` does."""
         if self._law.is_stiff:
             return False
-        self._law, self._frames = PositionLaw(), None
+        self._law, self._frames = PositionLaw(gains=self._gains), None
         return True
 
     def take_over(self, law: PositionLaw) -> None:

@@ -30,9 +30,15 @@ STIFFNESS = frozen([15000.0, 15000.0, 10000.0, 10000.0, 7500.0, 5000.0, 5000.0])
 #: of the arm have damping ratios of 0.6 to 1, and the law is stable at 1 ms in every posture.
 MASS_DAMPING = 90.0
 STIFFNESS_DAMPING = 0.004
-#: All of these for `ht_position` of tick.c.
-GAINS = frozen([*STIFFNESS, MASS_DAMPING, STIFFNESS_DAMPING])
-_GAINS_AT = GAINS.ctypes.data
+
+
+def position_gains(stiffness: Array) -> Array:
+    """Gains of position control for `ht_position` of tick.c: stiffness, shape (7,) [Nm/rad], and damping."""
+    return frozen([*stiffness, MASS_DAMPING, STIFFNESS_DAMPING])
+
+
+#: Those of the assumed stiffness.
+GAINS = position_gains(STIFFNESS)
 #: Time constant with which a preload fades when the brakes have opened [s].
 PRELOAD_FADING = 0.1
 #: Least damping of a joint, also of one without stiffness [Nm s/rad].
@@ -148,21 +154,24 @@ class PositionLaw:
     Args:
         preload: torques beside those of the set-points, shape (7,) [Nm]; None: zero.
         is_locked: the brakes hold the motors, so that the preload stays; otherwise it fades.
+        gains: of `position_gains`.
     """
 
     is_stiff = True
     stays = False
     violation = ""
 
-    def __init__(self, preload: Array | None = None, *, is_locked: bool = False) -> None:
-        self._preload = preload
+    def __init__(
+        self, preload: Array | None = None, *, is_locked: bool = False, gains: Array = GAINS
+    ) -> None:
+        self._preload, self._gains, self._gains_at = preload, gains, gains.ctypes.data
         self.is_plain = preload is None
         self._keeps = 1.0 if is_locked else exp(-TICK / PRELOAD_FADING)
 
     @classmethod
-    def locked(cls, torque: Array, sensed: MeasuredState) -> PositionLaw:
+    def locked(cls, torque: Array, sensed: MeasuredState, gains: Array = GAINS) -> PositionLaw:
         """The law of closed brakes: they hold the motors where the present torques [Nm] have wound the joints."""
-        return cls(torque - sensed.bias + sensed.passive, is_locked=True)
+        return cls(torque - sensed.bias + sensed.passive, is_locked=True, gains=gains)
 
     def released(self, held: MeasuredState) -> PositionLaw:
         """The law that takes over from closed brakes at the measured positions: without a step, then unwinding.
@@ -170,7 +179,7 @@ class PositionLaw:
         Args:
             held: the measured state, with the positions where the brakes hold the motors as set-points.
         """
-        return PositionLaw(self.torque(held) - held.bias + held.passive)
+        return PositionLaw(self.torque(held) - held.bias + held.passive, gains=self._gains)
 
     def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
@@ -180,8 +189,7 @@ class PositionLaw:
             torque += self._preload
         return torque
 
-    @staticmethod
-    def _undisturbed(sensed: MeasuredState) -> Array:
+    def _undisturbed(self, sensed: MeasuredState) -> Array:
         """The torques without a preload."""
         given = np.concatenate(
             (
@@ -196,7 +204,7 @@ class PositionLaw:
             )
         )
         mass = sensed.mass
-        _position_law()(_GAINS_AT, given.ctypes.data, mass.ctypes.data, mass.strides[0] // 8)
+        _position_law()(self._gains_at, given.ctypes.data, mass.ctypes.data, mass.strides[0] // 8)
         torque: Array = given[49:]
         return torque
 

@@ -202,21 +202,26 @@ class RunningMotion:
         self.follower, self.stop, self.guided = follower, None, None
         self.phase, self.has_braked = "braking", True
 
-    def halt(self, here: Array, speed: Array, hardest: tuple[float, float]) -> None:
+    def halt(self, here: Array, speed: Array, hardest: tuple[float, float]) -> Array:
         """Come to rest off the path: all axes together, in the direction of the present velocity.
 
         Args:
             here: present set-point, shape (7,) [rad].
             speed: its velocity, shape (7,) [rad/s].
             hardest: acceleration [rad/s²] and jerk [rad/s³] of the fastest axis.
+
+        Returns:
+            Where it comes to rest, shape (7,) [rad].
         """
         full = float(np.abs(speed).max())
         self.give_up()
         if full < 1e-9:
-            return
+            return here
         self.path, self.phase = JointLine(here.copy(), here + speed), "braking"
         limits = ProfileLimits(2.0, hardest[0] / full, hardest[1] / full)
         self.profile, self.time = brake((0.0, 1.0, 0.0), limits), 0.0
+        rest: Array = here + speed * self.profile.at(self.profile.duration)[0]
+        return rest
 
 
 #: A motion is done when every measured joint is within this distance of its command [rad] and this slow [rad/s] ...
@@ -705,19 +710,20 @@ class Interpolator:
     def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
         """Come to rest off the path: all axes together, in the direction of the present velocity.
 
-        The axes of an overlay or of a servo motion in joint space have no path in common: each brakes as hard as it
-        may, or it would get beyond its range for the sake of a faster one. Those of an overlay do so as soon as the
-        guard of the client expects. A jerk as gentle as that of a motion would take several degrees more.
+        Where an axis would get beyond its range for the sake of a faster one, each brakes as hard as it may; so do the
+        axes of an overlay or of a servo motion in joint space, which have no path in common. Those of an overlay do so
+        as soon as the guard of the client expects: a jerk as gentle as that of a motion would take several degrees
+        more.
         """
-        if run.phase == "overlaid" or isinstance(run.follower, SmartFollower | DirectFollower):
-            if run.phase == "overlaid":
-                jerk = FAST_JERK
-            run.brake_by(braking_axes(self._robot, self._command.after, self._command.speed, jerk=jerk))
-            return
+        here, speed = self._command.after, self._command.speed
+        is_apart = run.phase == "overlaid" or isinstance(run.follower, SmartFollower | DirectFollower)
+        if run.phase == "overlaid":
+            jerk = FAST_JERK
         if run.phase == "guided":
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
-        run.halt(self._command.after, self._command.speed, hardest)
+        if is_apart or self._command.beyond(run.halt(here, speed, hardest)) is not None:
+            run.brake_by(braking_axes(self._robot, here, speed, jerk=jerk))
 
     def _cancel(self, cancellation: Cancellation) -> None:
         """Execute a cancellation."""

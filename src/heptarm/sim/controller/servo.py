@@ -7,6 +7,7 @@ SmartServoLIN does; all of them plan online with `OnlineTrajectory`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from math import cos, sin, sqrt
@@ -160,8 +161,8 @@ class OnlineTrajectory:
         plan = self._to((here, dq - speed, ddq), rest, speed=rest, frame=speed, minimum=minimum)
         if plan is None or plan.duration > latest:
             return False
-        way = speed * plan.duration
-        low, high = within[0] - origin - np.minimum(way, 0.0), within[1] - origin - np.maximum(way, 0.0)
+        moved = speed * plan.duration
+        low, high = within[0] - origin - np.minimum(moved, 0.0), within[1] - origin - np.maximum(moved, 0.0)
         if not _stays(plan, here, (low, high)):
             return False
         self._plan, self._frame, self.time = plan, (origin, speed), 0.0
@@ -199,12 +200,18 @@ class OnlineTrajectory:
         parameters.current_position, parameters.current_velocity, parameters.current_acceleration = (
             values.tolist() for values in state
         )
-        plan = Trajectory(self._axes)
+        acceleration = parameters.max_acceleration
         try:
-            result = self._planner.calculate(parameters, plan)
-        except (RuckigError, ValueError):  # the latter: a result that its Python has no name for
-            return None
-        return plan if result in (Result.Working, Result.Finished) else None
+            for factor in _SLIGHTLY:
+                parameters.max_acceleration = [factor * one for one in acceleration]
+                plan = Trajectory(self._axes)
+                # a ValueError: a result that its Python has no name for
+                with suppress(RuckigError, ValueError):
+                    if self._planner.calculate(parameters, plan) in (Result.Working, Result.Finished):
+                        return plan
+        finally:
+            parameters.max_acceleration = acceleration
+        return None
 
 
 def _stays(plan: Trajectory, start: Array, within: tuple[Array, Array]) -> bool:
@@ -215,6 +222,8 @@ def _stays(plan: Trajectory, start: Array, within: tuple[Array, Array]) -> bool:
     )
 
 
+#: Ruckig finds no trajectory where two of its kinds meet exactly, as with 0.1 rad at 5 rad/s²; beside that it does.
+_SLIGHTLY = (1.0, 1.0 - 1e-6)
 #: Time step for the angular acceleration, by differences of the angular velocity [s].
 _STEP = 1e-5
 #: Angles below it [rad] do not determine their axis.

@@ -12,8 +12,9 @@ from heptarm.values.robot import RobotModel
 
 #: Set-points this far beyond a limit are rounding errors [rad].
 ON_LIMIT = 1e-9
-#: So far beyond a limit a compliant arm gives at a set-point on it [rad]: position control begins with no more.
-GIVEN = 2e-4
+#: So far beyond a limit a compliant arm gives when it is pushed there [rad]: position control begins on the limit
+#: then, and its pull is a fiftieth of what a drive may lag behind.
+GIVEN = 1e-3
 #: Largest velocity of a set-point, relative to the axis' limit.
 OVERSPEED = 1.2
 

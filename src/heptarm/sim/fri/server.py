@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from heptarm.errors import ConnectFailed
+from heptarm.errors import ConnectFailed, system_errors
 from heptarm.fri.protocol.messages import DriveState
 from heptarm.fri.protocol.version import MAX_DATAGRAM
 from heptarm.io.udp import own_address
@@ -288,7 +288,8 @@ def _towards(client: Address) -> str:
 
 
 def _bound(bind: str, port: int) -> socket.socket:
-    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with system_errors("the FRI controller has no UDP socket", kind=ConnectFailed):
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sock.bind((bind, port))
     except (OSError, OverflowError) as error:

@@ -27,11 +27,13 @@ class Brakes:
 
     Args:
         sensed: measured state.
+        gains: of position control.
     """
 
-    __slots__ = ("_halted", "_held", "_law", "_sensed")
+    __slots__ = ("_gains", "_halted", "_held", "_law", "_sensed")
 
-    def __init__(self, sensed: MeasuredState) -> None:
+    def __init__(self, sensed: MeasuredState, gains: Array) -> None:
+        self._gains = gains
         self._sensed = self._held = sensed
         self._law: PositionLaw | None = None  # open
         self._halted = 0  # ticks for which the set-points have rested under a stop
@@ -45,7 +47,7 @@ class Brakes:
         """Close; `torque`: what the motors exert now, shape (7,) [Nm]."""
         here = self._sensed.q.copy()
         self._held = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-        self._law = PositionLaw.locked(torque, self._held)
+        self._law = PositionLaw.locked(torque, self._held, self._gains)
 
     def open(self) -> PositionLaw:
         """Open; returns the law that takes over without a step.
@@ -86,6 +88,7 @@ class Drives:
         native: computes on the same.
         sensed: measured state; the set-points are put into it for the laws.
         law: control law in force.
+        gains: of position control, see `position_gains`.
         monitor: the drives' own supervision; None: no drive trips.
         errors: of friction; None: the joints have none.
 
@@ -100,12 +103,13 @@ class Drives:
         sensed: MeasuredState,
         law: ActiveLaw,
         *,
+        gains: Array,
         monitor: DriveMonitor | None,
         errors: SensorErrors | None,
     ) -> None:
         self._arm, self._native, self._sensed = arm, native, sensed
         self._law, self._monitor, self._errors = law, monitor, errors
-        self._brakes = Brakes(sensed)
+        self._brakes = Brakes(sensed, gains)
         self.is_tripped = False
 
     @property

@@ -15,7 +15,6 @@ from heptarm._library import Unavailable, library
 from heptarm.model.native import constants
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 from heptarm.planning.table import Cursor, MotionTable
-from heptarm.sim.control_laws.laws import GAINS
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.plant.arm_vectors import ArmVectors
 from heptarm.sim.plant.shared_state import SharedState
@@ -139,6 +138,7 @@ class NativeTick:
         data: its state.
         shared: where the states are published.
         arm: its vectors; they stay where they are.
+        gains: of position control, see `position_gains`.
         ranges: of the drives' supervision, see `DriveMonitor`; None: it is off.
 
     Raises:
@@ -153,6 +153,7 @@ class NativeTick:
         shared: SharedState,
         arm: ArmVectors,
         *,
+        gains: Array,
         ranges: Array | None,
     ) -> None:
         library = tick_library()
@@ -164,7 +165,7 @@ class NativeTick:
         self._words = (0, 0, 0)
         self._at = ctypes.addressof(memory)
         numbers, vector, product = constants(robot), np.zeros(model.nv), np.zeros(model.nv)
-        self._kept = (model, data, shared, ranges, arm, numbers, vector, product)
+        self._kept = (model, data, shared, ranges, arm, gains, numbers, vector, product)
         memory.model, memory.data = model._address, data._address
         functions = mujoco_library(_CALLED)
         for name, member in _CALLED.items():
@@ -177,7 +178,7 @@ class NativeTick:
         if ranges is not None:
             memory.ranges = ranges.ctypes.data
         memory.arm = ctypes.cast(numbers, _POINTER).value
-        memory.gains = GAINS.ctypes.data
+        memory.gains = gains.ctypes.data
         memory.most[:] = robot.tau_max.tolist()
         self._points = np.frombuffer(memory.points).reshape(3, AXES)
 

@@ -53,14 +53,24 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
+from heptarm.errors import CommandRejected, LimitError
+from heptarm.model.dynamics import ROTOR
 from heptarm.planning.motion import TICK
 from heptarm.planning.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.sim.control_laws.active_law import ActiveLaw
-from heptarm.sim.control_laws.laws import MeasuredState, Superposition
+from heptarm.sim.control_laws.laws import (
+    GAINS,
+    STIFFNESS,
+    STIFFNESS_DAMPING,
+    MeasuredState,
+    Superposition,
+    position_gains,
+)
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.plant.arm_vectors import ArmVectors
@@ -69,6 +79,7 @@ from heptarm.sim.plant.drive_monitor import DriveMonitor
 from heptarm.sim.plant.drives import Drives
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.flange_load import FlangeLoad
+from heptarm.sim.plant.free_bodies import FreeBodies
 from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.native import DONE, ELSEWHERE, LOADED, NativeTick
@@ -78,6 +89,7 @@ from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.values.checks import Array
+from heptarm.values.fitted_arm import FittedArm, load_fitted
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import Body, RobotModel, robot
 
@@ -86,6 +98,9 @@ log = logging.getLogger("heptarm.sim")
 #: Flags as plain integers: an operation on two flags of an enumeration takes a microsecond.
 _MOVING, _BRAKES_OPEN = int(SafetyFlags.MOVING), int(SafetyFlags.BRAKES_OPEN)
 _PAUSED = int(SafetyFlags.PAUSED)
+
+#: Stiffness by inertia up to which the damping of position control is stable in ticks [1/s²].
+_STIFFEST = 1.2 / (STIFFNESS_DAMPING * TICK)
 
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
 
@@ -137,6 +152,55 @@ class _Inputs:
         return value
 
 
+def fitted_gains(fitted: FittedArm) -> Array:
+    """Gains of position control of a fitted arm, see `position_gains`.
+
+    Raises:
+        LimitError: it is too stiff to be simulated with its rotors.
+    """
+    stiffness, rotor = fitted.value("stiffness", STIFFNESS), fitted.value("rotor", ROTOR)
+    most = _STIFFEST * rotor
+    for axis in range(7):
+        if stiffness[axis] > most[axis]:
+            raise LimitError(
+                f"stiffness of A{axis + 1} must be in (0, {most[axis]:.0f}] Nm/rad with a rotor of "
+                f"{rotor[axis]:g} kg m², got {stiffness[axis]:.0f} Nm/rad",
+                code=2,
+                parameter="fitted",
+                value=float(stiffness[axis]),
+                hint="the simulator's tick of 1 ms is too long for a stiffer one: fit both, or leave one out",
+            )
+    return position_gains(stiffness)
+
+
+def fitted_arm(file: Path | None, model: RobotModel) -> FittedArm | None:
+    """The measured arm that is simulated; None: no file is given.
+
+    Raises:
+        CommandRejected: the file cannot be read, or is of another robot.
+        LimitError: a number outside its range, or an arm that is too stiff to be simulated.
+    """
+    if file is None:
+        return None
+    found = load_fitted(file)
+    if found.model.base_name != model.base_name:
+        raise CommandRejected(
+            f"{file} is of the robot {found.robot}, and the simulated one is {model.name}",
+            parameter="fitted",
+            value=str(file),
+            hint=f"simulate its model: sim://{found.model.base_name}?fitted={file}",
+        )
+    fitted_gains(found)
+    return found
+
+
+def _fit(model: mujoco.MjModel, fitted: FittedArm) -> None:
+    """Give a world the rotors and the damping of a fitted arm."""
+    model.dof_armature[:7] = fitted.value("rotor", model.dof_armature[:7])
+    if "viscous" in fitted:
+        model.dof_damping[:7] = 0.0  # all of it is in the friction of the joints
+
+
 class Plant:
     """A simulated robot.
 
@@ -148,8 +212,13 @@ class Plant:
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
         errors: of the sensors, and friction of the joints; None: ideal ones.
         limits: of safety functions that depend on the load; see `heptarm.sim.plant.safety_monitor`.
+        fitted: a measured arm: its stiffness, rotors and load are this one's. Its sensors and friction are `errors`.
+
+    Raises:
+        LimitError: the fitted arm is too stiff to be simulated with its rotors.
 
     Attributes:
+        bodies: the free bodies of the scene, which can be placed.
         submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
     """
 
@@ -163,9 +232,14 @@ class Plant:
         monitored: bool = True,
         errors: SensorErrors | None = None,
         limits: SafetyLimits = UNLIMITED,
+        fitted: FittedArm | None = None,
     ) -> None:
         self.robot: RobotModel = robot(model)
         self.model = compiled(model, boxes, scene, room=True)
+        gains = GAINS
+        if fitted is not None:
+            gains = fitted_gains(fitted)
+            _fit(self.model, fitted)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
@@ -180,23 +254,30 @@ class Plant:
         self._load = ExternalLoad(self.model, self.data, arm)
         bare = compiled(model) if is_mounted(self.model) else None
         self._carried = FlangeLoad(self.model, self.data, arm.mass, bare=bare, limits=limits)
+        self.bodies = FreeBodies(self.model, self.data)
         self._gripper: SimulatedGripper | None = None
         if scene is not None and has_gripper(self.model):
             self._gripper = SimulatedGripper(self.model, self.data, self.signals, scene.wiring)
         monitor = DriveMonitor(self.robot) if monitored else None
         ranges = None if monitor is None else monitor.scales
-        self._native = NativeTick(self.robot, self.model, self.data, self.shared, arm, ranges=ranges)
+        self._native = NativeTick(
+            self.robot, self.model, self.data, self.shared, arm, gains=gains, ranges=ranges
+        )
         self._sensed = MeasuredState(
             arm.q, arm.dq, arm.mass[:7, :7], arm.bias, arm.passive, arm.q, arm.q, arm.q
         )
-        law = ActiveLaw(self.robot, self.model, self.data)
-        self._drives = Drives(arm, self._native, self._sensed, law, monitor=monitor, errors=errors)
+        law = ActiveLaw(self.robot, self.model, self.data, gains=gains)
+        self._drives = Drives(
+            arm, self._native, self._sensed, law, gains=gains, monitor=monitor, errors=errors
+        )
         self.interpolator = Interpolator(
             self.robot, _Inputs(self.shared), self._sensed, self._load, law, self.safety
         )
         self.condition_monitor = self.interpolator.condition_monitor
         self.submit = self.interpolator.queue.submit
         self._foreseen: int | None = None
+        if fitted is not None and fitted.load is not None:
+            self._carried.set_true(fitted.load)
         self._take_loads()
         self.tick_count = -1
         self._write(0.0, nan)
@@ -351,6 +432,7 @@ class Plant:
         """Whether nothing has happened since the last tick that the next one has to look at."""
         return not (
             self._carried.has_changed
+            or self.bodies.has_changed
             or self._load.is_pushed
             or self.safety.flags != self._foreseen
             or self.interpolator.is_disturbed
@@ -394,6 +476,7 @@ class Plant:
         """Compute the next tick: set-point, control law, dynamics."""
         if self._carried.has_changed:
             self._take_loads()
+        self.bodies.take()
         progress, remaining = self._advance()
         if self._gripper is not None:
             self._gripper.tick()
@@ -460,9 +543,8 @@ class Plant:
         load, is_loaded = self._load, self._native.sense()
         if self._errors is not None:
             arm = self._arm
-            reading = self._errors.read(arm.q, arm.tau)
-            arm.shown[:], arm.tau[:] = reading.q, reading.tau
-            load.torque -= reading.tau_error
+            reading = self._errors.read(arm.q, arm.tau, load.torque)
+            arm.shown[:], arm.tau[:], load.torque[:] = reading.q, reading.tau, reading.load
             is_loaded = True
         load.resolve(is_loaded=is_loaded)
 

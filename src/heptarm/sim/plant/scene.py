@@ -26,6 +26,8 @@ FOLDER = Path(__file__).parents[1] / "scenes"
 PREFIX = "scene/"
 #: Body of a scene that is mounted on the flange; its frame is the flange's.
 TOOL = "tool"
+#: Put before the names of meshes and the like of what is around the arm, where the tool has some of the same names.
+_AROUND = "around/"
 #: Actuator of a scene that is a gripper, and text that names its signals.
 GRIPPER = "gripper"
 #: What a scene decides in `<option>`: how contacts are solved. All else is the arm's.
@@ -189,6 +191,7 @@ class Scene:
             adopt(alone, arm)
             world.delete(tool)
             arm.site(flange).attach_body(alone.body(TOOL), PREFIX, "")
+            _rename_assets(world)  # the tool has brought its copies
         adopt(world, arm)
         frame = arm.worldbody.add_frame(pos=at.xyz, quat=np.roll(at.quat, 1))
         arm.attach(world, frame=frame, prefix=PREFIX)
@@ -261,6 +264,20 @@ def find_body(model: mujoco.MjModel, name: str) -> int:
 def plain(name: str) -> str:
     """A name as the scene's file has it."""
     return name.removeprefix(PREFIX)
+
+
+def _rename_assets(spec: mujoco.MjSpec) -> None:
+    """Give meshes, materials and textures of a description other names, and those to what refers to them."""
+    for one in (*spec.meshes, *spec.hfields, *spec.textures):
+        one.name = _AROUND + (one.name or Path(one.file).stem)  # which MuJoCo names by its file otherwise
+    for one in spec.materials:
+        one.name = _AROUND + one.name
+    for geom in spec.geoms:
+        geom.hfieldname = geom.hfieldname and _AROUND + geom.hfieldname
+        geom.meshname = geom.meshname and _AROUND + geom.meshname
+        geom.material = geom.material and _AROUND + geom.material
+    for material in spec.materials:
+        material.textures = [name and _AROUND + name for name in material.textures]
 
 
 def _top_level(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody | None:

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import zipfile
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,7 +17,8 @@ from heptarm import _resources
 from heptarm.errors import CommandRejected, MissingExtra
 from heptarm.sim.runtime import station
 from heptarm.sim.runtime.addresses import AddressMap
-from heptarm.values.files import read_bytes
+from heptarm.sim.runtime.moved import renamed
+from heptarm.values.files import read_bytes, read_xml
 
 #: Every address stays.
 UNMAPPED = AddressMap({})
@@ -27,8 +29,8 @@ PROJECT = "RoboticsAPI.data.xml"
 _CLASS = re.compile(r"\bclass\s+(\w+)(?:<[^{]*?>)?\s+extends\s+(?:\w+\.)*(\w+)")
 _ROOTS = ("RoboticsAPIApplication",)
 _BACKGROUND = ("RoboticsAPIBackgroundTask", "RoboticsAPICyclicBackgroundTask")
-#: Folders with Workbench's copies and KUKA's own jars.
-_LEFT_OUT = ("bin", "KUKAJavaLib")
+#: Folders with Workbench's copies, KUKA's own jars, and programs for the PC.
+_LEFT_OUT = ("bin", "KUKAJavaLib", "FastRobotInterface_Client_Source")
 _PACKAGE = re.compile(r"^\s*package\s+([\w.]+)\s*;", re.MULTILINE)
 #: A comment, or a literal in which the signs of a comment mean nothing.
 _COMMENT = re.compile(r"""("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|/\*.*?\*/|//[^\n]*""", re.DOTALL)
@@ -46,6 +48,20 @@ _STILL_THERE = re.compile(
 )
 #: For so short a run javac's own code needs no thorough compilation: half the time, and half of it in one thread.
 _QUICKLY = ("-J-XX:TieredStopAtLevel=1", "-J-XX:+UseSerialGC")
+#: What javac reports only because a class is missing that another error names.
+_CONSEQUENCE = ("method does not override or implement", "exception ")
+#: Beginnings of packages that the doubles will not have, and what to say of them.
+_OTHER_SYSTEMS = (
+    (
+        r"com\.kuka\.(nav|resource|kmpOmniMove|roboticsAPI\.deviceModel\.kmp|roboticsAPI\.motionModel\.kmp)\b",
+        "the project drives a mobile platform (KMR, KMP): the virtual cabinet has the arm only",
+    ),
+    (
+        r"com\.kuka\.(sensitivity|geometry|math|device|servoing|fri|scenegraph|threading|statistics|time|motion|condition|io|"
+        r"handguiding|jogging|statuscontroller|med\.devicemodel|med\.cyclicbraketest)\b",
+        "the project is for Sunrise.OS 2, whose packages differ: the virtual cabinet has 1.x",
+    ),
+)
 #: javac reports the first 100 errors only, and none in method bodies after a wrong import.
 _EVERY_ERROR = ("-Xmaxerrs", "100000", "--should-stop=ifError=FLOW")
 _ERROR = re.compile(r"^(.+?\.java):(\d+): error: (.*)$")
@@ -86,12 +102,44 @@ def background(folder: Path) -> list[str]:
 
 
 def _sources(folder: Path, suffix: str) -> list[Path]:
-    """Files of a project without Workbench's copies and libraries."""
-    return [
+    """Files of a project without Workbench's copies and libraries; Java only where Workbench compiles it."""
+    found = [
         file
         for file in sorted(folder.rglob(f"*.{suffix}"))
         if not set(_LEFT_OUT) & set(file.relative_to(folder).parts[:-1])
     ]
+    compiled = _source_folders(folder) if suffix == "java" else {}
+    if not compiled:
+        return found
+    return [
+        file
+        for file in found
+        for root, excluded in compiled.items()
+        if file.is_relative_to(root) and not _matches(file.relative_to(root).as_posix(), excluded)
+    ]
+
+
+def _source_folders(folder: Path) -> dict[Path, tuple[str, ...]]:
+    """Folders of sources in a project's .classpath, and the patterns that each excludes; none: it is no project."""
+    file, usual = folder / ".classpath", folder / "src"
+    if not file.is_file():
+        return {usual: ()} if (folder / station.FILE).is_file() and usual.is_dir() else {}
+    try:
+        entries = read_xml(file, "a class path", name="app").iter("classpathentry")
+    except CommandRejected:
+        return {}  # it is Eclipse's, and the sources are there without it
+    return {
+        folder / path: tuple(filter(None, one.get("excluding", "").split("|")))
+        for one in entries
+        if one.get("kind") == "src"
+        and not (path := one.get("path", "")).startswith("/")
+        and (folder / path).is_dir()
+    }
+
+
+def _matches(path: str, patterns: tuple[str, ...]) -> bool:
+    """Whether one of Eclipse's patterns fits a path: a folder with a slash at its end, a file, or with * and **."""
+    return any(path.startswith(one) if one.endswith("/") else fnmatch(path, one) for one in patterns)
 
 
 def _descendants(sources: list[Path], roots: tuple[str, ...]) -> list[str]:
@@ -186,8 +234,30 @@ def _libraries(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
+def _checked_jars(jars: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Jars that the user names.
+
+    Raises:
+        CommandRejected: a file is missing, or is none.
+    """
+    for jar in jars:
+        if not zipfile.is_zipfile(jar):
+            raise CommandRejected(
+                f"--jar must be a jar file, got {jar}",
+                parameter="jar",
+                value=str(jar),
+                hint="name an existing .jar file",
+            )
+    return jars
+
+
 def compile_application(
-    folder: Path, out: Path, *, main: str = "", addresses: AddressMap = UNMAPPED
+    folder: Path,
+    out: Path,
+    *,
+    main: str = "",
+    addresses: AddressMap = UNMAPPED,
+    jars: tuple[Path, ...] = (),
 ) -> Application:
     """Compile a folder of Java sources against the doubles.
 
@@ -196,9 +266,10 @@ def compile_application(
         out: an empty folder for the classes.
         main: the application's class, with or without its package; "": the only one.
         addresses: replaced in string literals.
+        jars: libraries beside those in the project's folder.
 
     Raises:
-        CommandRejected: no sources, no such application, several of them, or errors of the compiler.
+        CommandRejected: no sources, no such application, several of them, no jar, or errors of the compiler.
         MissingExtra: there is no Java compiler.
     """
     sources = _sources(folder, "java")
@@ -207,15 +278,16 @@ def compile_application(
             f"{folder} contains no Java sources", parameter="app", hint="name the folder of a Sunrise project"
         )
     chosen = _chosen(find(folder), main, folder)
-    jars, tasks = _libraries(folder), background(folder)
-    data = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
-    stations = [file for file in _sources(folder, "cat") if file.name == station.FILE]
-    found = stations[0] if stations else station.find_station(data or folder)
+    jars, tasks = (*_libraries(folder), *_checked_jars(jars)), background(folder)
+    data, found = _configuration(folder)
     left_out: list[str] = []
     with TemporaryDirectory(prefix="heptarm-sources-") as place:
         copies = _Copies(Path(place), folder, sources, addresses)
         if not main:
-            left_out += _compile_all(copies, chosen, out, jars)
+            left_out += [
+                f"{file} is left out, it does not compile: {text}"
+                for file, text in _compile_all(copies, out, jars, chosen=chosen)[0].items()
+            ]
             tasks = [task for task in tasks if task in _compiled(out)]
         else:
             _compile(copies, [copies.of(chosen)], out, jars)
@@ -230,6 +302,89 @@ def compile_application(
                     tasks = [task for task in tasks if task != name]
                     left_out.append(f"{name} is left out: {error.text}")
     return Application(chosen, out, data, found, tuple(tasks), jars, tuple(left_out))
+
+
+def _configuration(folder: Path) -> tuple[Path | None, Path | None]:
+    """A project's `RoboticsAPI.data.xml` and `StationSetup.cat`; None for what it lacks."""
+    data = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
+    stations = [file for file in _sources(folder, "cat") if file.name == station.FILE]
+    return data, stations[0] if stations else station.find_station(data or folder)
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What of a project compiles.
+
+    Attributes:
+        folder: of the project.
+        compiled: full names of the classes whose files compile.
+        failed: full name and first error of the others.
+        applications: those that compile and can be run.
+        hint: what would help the others; "": nothing is left out.
+    """
+
+    folder: Path
+    compiled: tuple[str, ...]
+    failed: tuple[tuple[str, str], ...]
+    applications: tuple[Application, ...]
+    hint: str
+
+
+def find_projects(folder: Path) -> list[Path]:
+    """Projects of Sunrise in a folder: by their station setup, class path or folder `src`, otherwise its folders.
+
+    Raises:
+        CommandRejected: there is no such folder, or no Java in it that names Sunrise.
+    """
+    if not folder.is_dir():
+        raise CommandRejected(
+            f"--projects must be a folder, got {folder}", parameter="projects", value=str(folder)
+        )
+    sources = [file for file in sorted(folder.rglob("*.java")) if b"com.kuka." in read_bytes(file)]
+    found = {_project_of(file, folder) for file in sources if not set(_LEFT_OUT) & set(file.parts)}
+    if not found:
+        raise CommandRejected(
+            f"{folder} contains no Java sources of Sunrise",
+            parameter="projects",
+            value=str(folder),
+            hint="name a folder that contains Sunrise projects",
+        )
+    return sorted(found)
+
+
+def _project_of(source: Path, folder: Path) -> Path:
+    above = [one for one in source.parents if one == folder or folder in one.parents]
+    marked = [one for one in above if (one / station.FILE).is_file() or (one / ".classpath").is_file()]
+    named = [one.parent for one in above if one.name == "src" and one != folder]
+    return next(iter([*marked, *named[-1:], *above[-2:]]))
+
+
+def survey(folder: Path, out: Path, *, jars: tuple[Path, ...] = ()) -> Survey:
+    """Compile each class of a project that can be compiled.
+
+    Args:
+        folder: of the project.
+        out: an empty folder for the classes.
+        jars: libraries beside those in the project's folder.
+
+    Raises:
+        CommandRejected: a jar that is none.
+        MissingExtra: there is no Java compiler.
+    """
+    libraries = (*_libraries(folder), *_checked_jars(jars))
+    data, found = _configuration(folder)
+    with TemporaryDirectory(prefix="heptarm-sources-") as place:
+        copies = _Copies(Path(place), folder, _sources(folder, "java"), UNMAPPED)
+        names = {copies.original(copy.as_posix()): name for name, copy in copies.names.items()}
+        left_out, hint = _compile_all(copies, out, libraries)
+    failed = tuple((names[file], text) for file, text in sorted(left_out.items()))
+    compiled = tuple(sorted(set(names.values()) - {name for name, _ in failed}))
+    classes = _compiled(out)
+    tasks = tuple(name for name in background(folder) if name in classes)
+    applications = tuple(
+        Application(name, out, data, found, tasks, libraries) for name in find(folder) if name in classes
+    )
+    return Survey(folder, compiled, failed, applications, hint)
 
 
 def _full_name(source: Path, text: str) -> str:
@@ -247,7 +402,7 @@ class _Copies:
         texts = {source: read_source(source) for source in sources}
         own = frozenset(_full_name(source, text) for source, text in texts.items())
         for source, original in texts.items():
-            text = _in_literals(_modern(original, own), addresses)
+            text = _in_literals(_modern(renamed(original, own, _without_comments), own), addresses)
             package = _PACKAGE.search(_without_comments(text))
             path = Path(*(package[1].split(".") if package else ()), source.name)
             # two files of one name keep apart, so that javac reports the duplicate
@@ -262,6 +417,11 @@ class _Copies:
             name = ".".join(path.with_suffix("").parts)
             self.names[name if name not in self.names else f"{name} {root.name}"] = copy
             self._origin[copy.as_posix()] = source.relative_to(folder).as_posix()
+
+    @property
+    def simple_names(self) -> frozenset[str]:
+        """Names of the classes without their packages."""
+        return frozenset(copy.stem for copy in self.names.values())
 
     def of(self, name: str) -> Path:
         """The file of a class; a second class of a file is found by its text."""
@@ -286,20 +446,28 @@ def _compiled(out: Path) -> set[str]:
     return {".".join(file.relative_to(out).with_suffix("").parts) for file in out.rglob("*.class")}
 
 
-def _compile_all(copies: _Copies, chosen: str, out: Path, jars: tuple[Path, ...]) -> list[str]:
-    """Compile all sources, as Workbench does: one that is wrong, and what needs it, is left out beside the application.
+def _compile_all(
+    copies: _Copies, out: Path, jars: tuple[Path, ...], *, chosen: str = ""
+) -> tuple[dict[str, str], str]:
+    """Compile all sources, as Workbench does: one that is wrong, and what needs it, is left out.
+
+    Args:
+        copies: the sources.
+        out: folder for the classes.
+        jars: libraries.
+        chosen: full name of the class that must not be left out; "": every one may.
 
     Returns:
-        Why files are left out.
+        The files that are left out with the first error of each, and what would help.
 
     Raises:
-        CommandRejected: the application itself is wrong, or it needs a file that is.
+        CommandRejected: the chosen class itself is wrong, or it needs a file that is.
     """
     files = {copies.original(copy.as_posix()): copy for copy in copies.names.values()}
-    needed = copies.original(copies.of(chosen).as_posix())
+    needed = copies.original(copies.of(chosen).as_posix()) if chosen else ""
     refused: CommandRejected | None = None
-    left_out: list[str] = []
-    while True:
+    left_out: dict[str, str] = {}
+    while files:
         try:
             _compile(copies, list(files.values()), out, jars, only=refused is not None)
         except CommandRejected as error:
@@ -309,9 +477,10 @@ def _compile_all(copies: _Copies, chosen: str, out: Path, jars: tuple[Path, ...]
                 raise refused from None
             for file, text in sorted(wrong.items()):
                 del files[file]
-                left_out.append(f"{file} is left out, it does not compile: {text}")
+                left_out[file] = text
         else:
-            return left_out
+            break
+    return left_out, "" if refused is None else refused.hint
 
 
 def _compile(
@@ -346,21 +515,33 @@ def _compile(
     if done.returncode:
         text = copies.original(done.stderr.strip())
         raise CommandRejected(
-            f"the application does not compile:\n{text}\n", parameter="app", hint="\n".join(_hints(text))
+            f"the application does not compile:\n{text}\n",
+            parameter="app",
+            hint="\n".join(_hints(text, copies.simple_names)),
         )
 
 
-def _hints(text: str) -> list[str]:
-    """Remedies for errors of the compiler: bad characters, libraries that are not there, members of Sunrise."""
+def _hints(text: str, own: frozenset[str]) -> list[str]:
+    """Remedies for errors of the compiler: libraries and members of Sunrise that are missing, bad characters.
+
+    Args:
+        text: of the compiler.
+        own: simple names of the project's classes.
+    """
     members: dict[str, None] = {}
     packages: dict[str, None] = {}
     internal: dict[str, None] = {}
+    other_systems: dict[str, None] = {}
     encoding = other = False
     for message, symbol, location in _errors(text):
         absent = re.match(r"package ([\w.]+) does not exist", message)
         name = absent[1] if absent else ""
-        owner = _sunrise(location)
-        if name.startswith("com.kuka."):
+        owner = (
+            "" if symbol.startswith("class ") and location.startswith("class ") else _sunrise(location, own)
+        )
+        if system := next((what for pattern, what in _OTHER_SYSTEMS if re.match(pattern, name)), ""):
+            other_systems[system] = None
+        elif name.startswith("com.kuka."):
             members[f"package {name}"] = None
         elif re.fullmatch(_GONE, name):
             internal[name] = None
@@ -372,19 +553,22 @@ def _hints(text: str) -> list[str]:
             internal[f"{location.removeprefix('package ')}.{symbol.removeprefix('class ')}"] = None
         elif message == "cannot find symbol" and owner:
             members[f"{symbol} of {owner}"] = None
-        elif (used := re.match(r"(?:method|constructor) (\w+) in \w+ (\w+)", message)) and _sunrise(used[2]):
-            members[f"{used[1]} of {_sunrise(used[2])} with these parameters"] = None
+        elif (used := re.match(r"(?:method|constructor) (\w+) in \w+ (\w+)", message)) and _sunrise(
+            used[2], own
+        ):
+            members[f"{used[1]} of {_sunrise(used[2], own)} with these parameters"] = None
         elif message != "cannot find symbol":
-            other = True
-    found = []
+            other = other or not message.startswith(_CONSEQUENCE)
+    found = list(other_systems)
+    if packages:
+        found.append(
+            f"name the jar of {', '.join(packages)} with --jar, or put it into a folder of the project"
+        )
     if members:
         found.append(f"missing in the virtual cabinet's Sunrise, please report: {'; '.join(members)}")
-    if packages:
-        found.append(f"put the jar of {', '.join(packages)} into a folder of the project")
     if internal:
         found.append(
-            f"Java 17 no longer offers {', '.join(internal)}: use a public class instead, or put a jar with it into a "
-            "folder of the project"
+            f"Java 17 no longer offers {', '.join(internal)}: use a public class instead, or name a jar with --jar"
         )
     if encoding:
         found.append("a character outside comments is neither UTF-8 nor windows-1252: save the file as UTF-8")
@@ -409,11 +593,13 @@ def _places(text: str) -> list[tuple[str, str]]:
     return [(match[1], match[3]) for line in text.splitlines() if (match := _ERROR.match(line))]
 
 
-def _sunrise(location: str) -> str:
-    """The class or package of Sunrise in a location such as "variable robot of type LBR"; "": none."""
+def _sunrise(location: str, own: frozenset[str]) -> str:
+    """The class or package of Sunrise in a location such as "variable robot of type LBR"; "": another's."""
     name = re.sub(r"<.*", "", location.rpartition(" ")[2])
     if name.startswith("com.kuka."):
         return name
+    if name in own:
+        return ""
     return _sunrise_classes().get(name, "")
 
 

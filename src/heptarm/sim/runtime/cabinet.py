@@ -29,7 +29,7 @@ from heptarm.fri.protocol.version import Version
 from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
-from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.plant import Plant, fitted_arm
 from heptarm.sim.plant.safety_monitor import parse_safety
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.sensor_errors import parse_sensors, sensor_errors
@@ -108,10 +108,10 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
     Raises:
         ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
-    data = project.read_process_data(cabinet_sources() / "project" / PROJECT)
+    data = project.read_process_data(cabinet_sources() / "project" / PROJECT).values
     if options.project is not None:
         addresses = AddressMap.of(options.map)
-        for name, value in project.read_process_data(options.project).items():
+        for name, value in project.read_process_data(options.project).values.items():
             data[name] = addresses.apply(value) if isinstance(value, str) else value
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
     if options.observed:
@@ -147,13 +147,15 @@ class VirtualCabinet:
         from heptarm.sim.runtime import java_plant, jvm
 
         self.options, self.notes = options, notes
+        fitted = fitted_arm(options.fitted, robot)
         self.plant = Plant(
             robot.name,
             boxes=[Box.of(text) for text in options.box],
             scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
-            errors=sensor_errors(robot, options.sensors),
+            errors=sensor_errors(robot, options.sensors, fitted),
             limits=parse_safety(options.safety),
+            fitted=fitted,
         )
         self.sessions = Sessions(
             self.plant,
@@ -191,6 +193,9 @@ class VirtualCabinet:
             self._station.setProcessData(name, java_plant.boxed(value))
         if options.project is not None:
             java_plant.add_project(self._station, project.read_project(options.project))
+            for name, why in project.read_process_data(options.project).unusable.items():
+                if name not in data:
+                    self._station.setUnusable(name, why)
         if options.payload:
             self.plant.set_payload(parse_payload(options.payload))
         for button in options.answer:
@@ -433,6 +438,7 @@ def main(argv: list[str] | None = None) -> int:
         if options.drive_monitoring not in ("on", "off"):
             raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
         parse_sensors(options.sensors)
+        fitted_arm(options.fitted, arm)
         parse_safety(options.safety)
         real_time_of(options)
         if options.project is not None:

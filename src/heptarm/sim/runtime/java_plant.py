@@ -137,6 +137,8 @@ def add_project(station: Any, project: Project) -> None:
         station.addFrame(path, _doubles(placed))
     for path, redundancy in project.redundancies:
         station.setRedundancy(path, *redundancy)
+    for path, name, value in project.parameters:
+        station.setParameter(path, name, boxed(value))
 
 
 def _doubles(values: Sequence[float]) -> Any:

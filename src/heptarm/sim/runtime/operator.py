@@ -10,11 +10,14 @@ from __future__ import annotations
 
 import heapq
 import logging
+import math
 import re
 import time
 from collections.abc import Callable
 from itertools import count
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from heptarm.planning.motion import TICK
 from heptarm.planning.seam import OperationMode
@@ -46,6 +49,8 @@ WORDS = {
     "start": "press Start: execution continues",
     "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
     "where BODY": "show the pose of a body of the scene in the base: x y z [m] and quaternion x y z w",
+    "place BODY X Y Z [QX QY QZ QW]": "place a free body of the scene, at rest: in the base [m], quaternion x y z w",
+    "reset": "put all free bodies of the scene back where they were at the start",
     "set SIGNAL VALUE": "set a signal of the cabinet: a number, true or false",
     "answer BUTTON": "press a button of the dialog that is shown, from 0",
     "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; BAR where several have it",
@@ -72,6 +77,7 @@ _COUNTS = {
             "aut",
             "pause",
             "start",
+            "reset",
         ),
         (0, 0),
     ),
@@ -79,6 +85,7 @@ _COUNTS = {
     "override": (1, 1),
     "push": (3, 4),
     "where": (1, 1),
+    "place": (4, 8),
     "set": (2, 2),
     "press": (1, 20),  # the name of a bar may have blanks
     "answer": (1, 1),
@@ -123,6 +130,8 @@ def understood(words: str) -> tuple[str, list[float | str]]:
         return name, [words.split()[1]]
     if name in ("set", "press"):
         return name, _word_values(words, name)
+    if name == "place":
+        return name, [words.split()[1], *_pose_values(words, rest[1:])]
     if name == "clear":
         rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
         if rest and rest[0] not in _REQUESTS:
@@ -137,6 +146,19 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     if name == "override" and not 0.0 <= values[0] <= 1.0:
         raise ValueError(f"{words!r}: override must be in [0, 1], got {values[0]:g}")
     return name, list(values)
+
+
+def _pose_values(words: str, rest: list[str]) -> list[float | str]:
+    """Position and unit quaternion of a place; upright where only the position is given."""
+    try:
+        values = [float(one) for one in rest]
+    except ValueError:
+        values = []
+    place, quat = values[:3], values[3:] or [0.0, 0.0, 0.0, 1.0]
+    norm = math.hypot(*quat)
+    if len(quat) != 4 or not all(map(math.isfinite, values)) or abs(norm - 1.0) > 1e-3 or len(place) != 3:
+        raise ValueError(f"{words!r}: a place must be three numbers, or seven with a unit quaternion")
+    return [*place, *(one / norm for one in quat)]
 
 
 def _word_values(words: str, name: str) -> list[float | str]:
@@ -184,6 +206,8 @@ class SimulatedOperator:
             "start": plant.resume,
             "push": self._push,
             "where": self._where,
+            "place": lambda body, *pose: plant.bodies.place(body, np.array(pose)),
+            "reset": plant.bodies.reset,
             "set": self._set,
             "press": self._press,
             "answer": self._answer,
@@ -223,14 +247,18 @@ class SimulatedOperator:
                 log.warning("%s: %s", words, error)
 
     def do(self, words: str) -> str:
-        """Execute an action now.
+        """Execute an action now, or at a plant time: "NAME@SECONDS".
 
         Returns:
-            What it shows; "" if it shows nothing.
+            What it shows; "" if it shows nothing, or nothing yet.
 
         Raises:
             ValueError: there is no such action, or its values are illegal; nothing has changed.
         """
+        if _TIMED.fullmatch(words):
+            self.schedule(words)
+            self.on_action()
+            return ""
         name, values = understood(words)
         shown = self._verbs[name](*values) or ""
         self._acted_at = self._ticks

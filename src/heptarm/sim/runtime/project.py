@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -77,14 +78,28 @@ def like(old: Value | None, text: str) -> Value:
     return _convert(names.get(type(old), "java.lang.String"), text)
 
 
-def read_process_data(file: Path) -> dict[str, Value]:
-    """Read the process data of a project file by their ids; without a value the default counts.
+@dataclass(frozen=True, slots=True)
+class StoredProcessData:
+    """Process data of a project.
+
+    Attributes:
+        values: by their ids.
+        unusable: by their ids why others have no value; an application that asks for one gets this as error.
+    """
+
+    values: dict[str, Value]
+    unusable: dict[str, str]
+
+
+def read_process_data(file: Path) -> StoredProcessData:
+    """Read the process data of a project file; without a value the default counts.
 
     Raises:
-        CommandRejected: the file cannot be read or is not XML, or a value does not fit its type.
+        CommandRejected: the file cannot be read or is not XML.
     """
     root = read_xml(file, _WHAT, name="project", hint=_HINT)
     found: dict[str, Value] = {}
+    unusable: dict[str, str] = {}
     for one in root.iter("processData"):
         name, kind = one.get("id"), one.get("dataType", "java.lang.String")
         text = one.get("value", one.get("defaultValue"))
@@ -93,8 +108,8 @@ def read_process_data(file: Path) -> dict[str, Value]:
         try:
             found[name] = _convert(kind, text)
         except ValueError as error:
-            raise _unreadable(file, f"process data {shown(name)}: {error}") from None
-    return found
+            unusable[name] = f"{file.name}: {error}"
+    return StoredProcessData(found, unusable)
 
 
 #: x y z [mm], a b c [rad], as in the file.
@@ -141,11 +156,13 @@ class Project:
         templates: tools and workpieces.
         frames: taught frames: path and transformation from the parent; parents first.
         redundancies: path and E1 [rad], status, turn of the frames taught with an arm.
+        parameters: path, name and value of the frames' additional parameters.
     """
 
     templates: tuple[Template, ...] = ()
     frames: tuple[tuple[str, Six], ...] = ()
     redundancies: tuple[tuple[str, Redundancy], ...] = ()
+    parameters: tuple[tuple[str, str, Value], ...] = ()
 
 
 def read_project(file: Path) -> Project:
@@ -158,8 +175,9 @@ def read_project(file: Path) -> Project:
     try:
         return Project(
             tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
-            tuple(frame for world in root.iter("world") for frame in _frames(world, "")),
-            tuple(redundancy for world in root.iter("world") for redundancy in _redundancies(world, "")),
+            tuple(frame for world in root.iter("world") for frame in _frames(world)),
+            tuple(redundancy for world in root.iter("world") for redundancy in _redundancies(world)),
+            tuple(parameter for world in root.iter("world") for parameter in _parameters(world)),
         )
     except ValueError as error:
         raise _unreadable(file, str(error)) from None
@@ -177,35 +195,47 @@ def _template(one: ElementTree.Element) -> Template:
         tuple(_number(load, f"cog{axis}", f"centerOfMass{axis}") for axis in "XYZABC"),
         tuple(_number(load, f"inertia{axis}") for axis in "XYZ"),
         one.get("defaultMotionFrameRef", "").strip("/"),
-        tuple(_frames(one, "")),
+        tuple(_frames(one)),
         one.get("class", ""),
     )
 
 
-def _frames(parent: ElementTree.Element, path: str) -> Iterator[tuple[str, Six]]:
+def _elements(parent: ElementTree.Element, path: str = "") -> Iterator[tuple[str, ElementTree.Element]]:
+    """Path and element of each frame; parents first."""
     for one in parent:
         if one.tag == "frames":
-            yield from _frames(one, path)
+            yield from _elements(one, path)
         elif one.tag == "frame":
             name = f"{path}{one.get('name', '')}"
-            found = one.find("transformation")
-            placed = ElementTree.Element("transformation") if found is None else found
-            yield name, tuple(_number(placed, axis) for axis in "xyzabc")
-            yield from _frames(one, f"{name}/")
+            yield name, one
+            yield from _elements(one, f"{name}/")
 
 
-def _redundancies(parent: ElementTree.Element, path: str) -> Iterator[tuple[str, Redundancy]]:
-    for one in parent:
-        if one.tag == "frames":
-            yield from _redundancies(one, path)
-        elif one.tag == "frame":
-            name = f"{path}{one.get('name', '')}"
-            for found in one.iterfind("redundancyData/redundancy"):
-                infos = {info.get("type", "").rpartition("$")[2]: info for info in found.iterfind("info")}
-                if _E1 in infos:
-                    values = [_number(infos[key], "value") if key in infos else -1.0 for key in _PARAMETERS]
-                    yield name, (values[0], int(values[1]), int(values[2]))
-            yield from _redundancies(one, f"{name}/")
+def _frames(parent: ElementTree.Element) -> Iterator[tuple[str, Six]]:
+    for name, one in _elements(parent):
+        found = one.find("transformation")
+        placed = ElementTree.Element("transformation") if found is None else found
+        yield name, tuple(_number(placed, axis) for axis in "xyzabc")
+
+
+def _redundancies(parent: ElementTree.Element) -> Iterator[tuple[str, Redundancy]]:
+    for name, one in _elements(parent):
+        for found in one.iterfind("redundancyData/redundancy"):
+            infos = {info.get("type", "").rpartition("$")[2]: info for info in found.iterfind("info")}
+            if _E1 in infos:
+                values = [_number(infos[key], "value") if key in infos else -1.0 for key in _PARAMETERS]
+                yield name, (values[0], int(values[1]), int(values[2]))
+
+
+def _parameters(parent: ElementTree.Element) -> Iterator[tuple[str, str, Value]]:
+    for name, one in _elements(parent):
+        for info in one.iterfind("additionalInformation/info"):
+            key, text = info.get("key"), info.get("value")
+            if key is not None and text is not None:
+                with suppress(
+                    ValueError
+                ):  # of a type that no application reads, as the time of its last change
+                    yield name, key, _convert(info.get("type", "java.lang.String"), text)
 
 
 def _number(element: ElementTree.Element, *names: str) -> float:

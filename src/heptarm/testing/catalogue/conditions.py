@@ -30,17 +30,17 @@ def forces(arm: Arm) -> None:
     )
     for condition, push in leaves:
         handle = arm.start(hold(30.0), until=condition)
-        arm.operator.push(np.multiply(push, 1 / 3), duration=30.0)
+        arm.operator.start_push(np.multiply(push, 1 / 3), duration=30.0)
         third = 0.25 * float(np.linalg.norm(push))
         while float(np.linalg.norm(arm.state.wrench.force - rest.force)) < third and not handle.done:
             fresh(arm)
         holds(not handle.done, f"a third of it is not enough for {condition}")
-        arm.operator.push(push, duration=30.0)
+        arm.operator.start_push(push, duration=30.0)
         result = handle.wait(timeout=30.0)
         holds(
             result.cause is Cause.CONDITION and result.stopped_by == condition, f"fired: {result.stopped_by}"
         )
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
         arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force) < 2.0, timeout=20.0)
     holds(arm.move(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 5))).arrived, "the next motion has no condition")
 
@@ -51,13 +51,13 @@ def torques(arm: Arm) -> None:
     either = (abs(torque[0]) > 6) | (torque.about("z") > 50)
     handle = arm.start(lin_rel(y=0.1, frame="base", speed_mps=0.02), until=either)
     arm.wait_until(lambda s: np.linalg.norm(s.dq) > 0.01, timeout=20.0)
-    arm.operator.push((0.0, 16.0, 0.0), duration=1.0)
+    arm.operator.start_push((0.0, 16.0, 0.0), duration=1.0)
     result = handle.wait(timeout=30.0)
     holds(result.stopped_by == (abs(torque[0]) > 6), f"the part that fired: {result.stopped_by}")
     holds(result.fired_at is not None, "the state when it fired is reported")
     assert result.fired_at is not None
     above(abs(float(result.fired_at.tau_ext[0])), 6.0, "external torque of A1 then", unit="Nm")
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
 
 
 @scenario(line=4, rows="H4 H14", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel"))
@@ -125,10 +125,10 @@ def servo(arm: Arm) -> None:
             stream.set(Pose.of(start.xyz + [0.0, 0.03 * min(seconds, 3.0), 0.0], start.quat))
             if seconds > 0.3 and not pushed:
                 pushed = True
-                arm.operator.push((0.0, -15.0, 0.0), duration=3.0)
+                arm.operator.start_push((0.0, -15.0, 0.0), duration=3.0)
             if seconds > 10.0:
                 break
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
     result = stream.result
     holds(result is not None and result.stopped_by == contact, "it ended by the condition")
     assert result is not None and result.fired_at is not None

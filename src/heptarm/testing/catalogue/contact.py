@@ -36,16 +36,16 @@ def reaction(arm: Arm) -> None:
     bump = force > 20
     handle = arm.start(lin_rel(y=0.15, frame="base", speed_mps=0.03), until=bump)
     arm.wait_until(lambda s: np.linalg.norm(s.dq) > 0.01, timeout=20.0)
-    arm.operator.push((0.0, -28.0, 0.0), duration=_LONG)
+    arm.operator.start_push((0.0, -28.0, 0.0), duration=_LONG)
     result = handle.wait()
     holds(result.cause is Cause.CONDITION and result.stopped_by == bump, f"ended by {result.stopped_by}")
-    arm.operator.push((0.0, -9.0, 0.0), duration=_LONG)
+    arm.operator.start_push((0.0, -9.0, 0.0), duration=_LONG)
     arm.wait_until(lambda s: np.abs(s.tau_ext).max() < 8.0, timeout=20.0)
     rests = arm.wait_for_rest()
     compliant = held(arm, JointImpedance(300.0))
     watch(arm, 0.5)
     above(fresh(arm).pose.distance_to(rests.pose), 5e-3, "then a light push moves it by", unit="m")
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
     let_go(arm, compliant)
 
 
@@ -55,12 +55,12 @@ def plane(arm: Arm) -> None:
     start = arm.wait_for_rest()
     mode = CartesianImpedance((200.0, 200.0, 5000.0, 300.0, 300.0, 300.0), damping=0.9, frame="base")
     compliant = held(arm, mode)
-    arm.operator.push((0.0, 14.0, -14.0), duration=_LONG)
+    arm.operator.start_push((0.0, 14.0, -14.0), duration=_LONG)
     led = arm.wait_until(lambda s: s.pose.distance_to(start.pose) > 0.05, timeout=20.0)
     offset = led.pose.xyz - start.pose.xyz
     above(abs(float(offset[1])), 0.045, "guided in the plane by", unit="m")
     below(abs(float(offset[2])), 0.006, "across it by", unit="m")
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
     back = arm.start(ptp(HOME, speed=0.3), when="replace")
     holds(compliant.wait().cause is Cause.REPLACED and back.wait().arrived, "it returned")
     near(arm.wait_for_rest().q, HOME, 2e-3, "home", unit="rad")
@@ -92,7 +92,7 @@ def relaxing(arm: Arm) -> None:
 def waits(arm: Arm) -> None:
     """The arm waits for a contact in the pushed states."""
     rest = baseline(arm).force
-    arm.operator.push((0.0, 0.0, -12.0), duration=0.5)
+    arm.operator.start_push((0.0, 0.0, -12.0), duration=0.5)
     state = arm.wait_until(lambda s: s.wrench.force[2] - rest[2] < -8.0, timeout=20.0)
     near(state.wrench.force[:2], rest[:2], 3.0, "it came from above: force across", unit="N")
     arm.wait_until(lambda s: abs(s.wrench.force[2] - rest[2]) < 2.0, timeout=20.0)
@@ -132,7 +132,7 @@ def led(arm: Arm) -> None:
     with arm.servo(
         "joint", rate=50, speed=0.5, acceleration=1.0, mode=JointImpedance(200.0), watchdog=2.0
     ) as servo:
-        arm.operator.push((0.0, 20.0, 0.0), duration=1.0)
+        arm.operator.start_push((0.0, 20.0, 0.0), duration=1.0)
         first = arm.state.stamp
         while servo.tick() and arm.state.stamp < first + 1.5e9:
             servo.set(arm.state.q)

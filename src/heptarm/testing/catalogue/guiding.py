@@ -28,9 +28,9 @@ _HANDSHAKE = 0.3
 def _guide(arm: Arm, push: tuple[float, float, float], offset: float, *, at_most: float = _LONG) -> None:
     """Push until a joint has turned by this angle [rad], and for at most so many seconds of the robot."""
     before = arm.state.q
-    arm.operator.push(push, duration=at_most)
+    arm.operator.start_push(push, duration=at_most)
     arm.wait_until(lambda s: np.abs(s.q - before).max() > offset, timeout=60.0)
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
 
 
@@ -89,14 +89,14 @@ def taps(arm: Arm) -> None:
     target = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=0.2)
     handle = arm.start(target, until=force > 15)
     arm.wait_until(lambda s: s.q[6] > 0.1 or handle.done, timeout=20.0)
-    arm.operator.push((0.0, 0.0, 30.0), duration=0.15)
+    arm.operator.start_push((0.0, 0.0, 30.0), duration=0.15)
     holds(handle.wait().stopped_by == (force > 15), "the first tap ends the motion")
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
     done = Event()
 
     def tap() -> None:
         while not done.wait(0.4 / max(arm.real_time_factor, 1.0)):
-            arm.operator.push((0.0, 0.0, 30.0), duration=0.1)
+            arm.operator.start_push((0.0, 0.0, 30.0), duration=0.1)
 
     hand = Thread(target=tap)
     hand.start()
@@ -106,7 +106,7 @@ def taps(arm: Arm) -> None:
         done.set()
         hand.join()
     note("two taps were detected")
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
     holds(arm.move(target).arrived, "then it continues to its end")
 

@@ -80,10 +80,10 @@ def free_guiding(arm: Arm) -> None:
     wall = 0.03
     law = laws.free_guiding(box=(begin - [1.0, 1.0, 1.0], begin + [1.0, wall, 1.0]), wall_stiffness=1500.0)
     with _session(arm, law, _COMPLIANT) as session:
-        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        arm.operator.start_push((0.0, force, 0.0), duration=_LONG)
         _run(session, 2.0)
         beyond, pushing = _place(arm, session.state.q)[1] - begin[1] - wall, session.memory.force
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
         near(beyond, force / 1500.0, 4e-3, "behind the wall it rests", unit="m")
         near(pushing, (0.0, -force, 0.0), 3.0, "force of the wall", unit="N")
 
@@ -99,10 +99,10 @@ def admittance(arm: Arm) -> None:
     due = (1.0 - band / float(np.linalg.norm(pushed))) * pushed / damping
     with _session(arm, law) as session:
         _run(session, 0.1)
-        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        arm.operator.start_push((0.0, force, 0.0), duration=_LONG)
         first = _run(session, 0.5)
         last = _run(session, 0.5)
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
         speed = (_place(arm, last.q) - _place(arm, first.q)) / (last.t - first.t)
         near(speed[1], due[1], 0.02, "speed along the push", unit="m/s")
         _run(session, 0.5)
@@ -173,10 +173,10 @@ def hybrid(arm: Arm) -> None:
     with _session(arm, law) as session:
         begin = _place(arm, _run(session, 0.1).q)
         session.params.goal = session.memory.goal + [0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        arm.operator.start_push((0.0, force, 0.0), duration=_LONG)
         first = _run(session, 0.5)
         last = _run(session, 0.5)
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
         speed = (_place(arm, last.q) - _place(arm, first.q)) / (last.t - first.t)
         near(speed[1], force / damping, 0.02, "speed along the push", unit="m/s")
         moved = _place(arm, last.q) - begin
@@ -189,10 +189,10 @@ def low_pass_readings(arm: Arm) -> None:
     frequency, force, rest = 1.0, 20.0, baseline(arm)
     with _session(arm, laws.low_pass_readings(frequency=frequency)) as session:
         _run(session, 0.3)
-        arm.operator.push((0.0, force, 0.0), duration=_LONG)
+        arm.operator.start_push((0.0, force, 0.0), duration=_LONG)
         _run(session, 1.0)
         shown = session.memory.wrench[1] - rest.force[1]
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
         near(shown, force, 3.0, "force after six time constants", unit="N")
         _run(session, 0.1)
         fading = session.memory.wrench[1] - rest.force[1]

@@ -67,10 +67,10 @@ def stiff(arm: Arm) -> None:
     moved = []
     for mode in (Position(), JointImpedance(500.0), Position()):
         handle = held(arm, mode)
-        arm.operator.push(push, duration=_LONG)
+        arm.operator.start_push(push, duration=_LONG)
         watch(arm, 0.5)
         moved.append(float(np.linalg.norm(bent(arm))))
-        arm.operator.push(push * 0, duration=0.0)
+        arm.operator.start_push(push * 0, duration=0.0)
         let_go(arm, handle)
     below(max(moved[0], moved[2]), 1e-3, "deflection, position control, before and after", unit="m")
     above(moved[1], 3e-3, "deflection, under impedance", unit="m")
@@ -83,7 +83,7 @@ def joints(arm: Arm) -> None:
     over = []
     for damping in (0.1, 1.0):
         handle = held(arm, JointImpedance(stiffness, damping=damping))
-        arm.operator.push((0.0, 18.0, -10.0), duration=_LONG)
+        arm.operator.start_push((0.0, 18.0, -10.0), duration=_LONG)
         arm.wait_until(lambda s: s.wrench.force[1] > 15.0, timeout=20.0)
         watch(arm, 0.5)
         settled(arm)
@@ -97,7 +97,7 @@ def joints(arm: Arm) -> None:
             "offset of each joint",
             unit="rad",
         )
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
         after = np.array([s.q[0] - s.q_cmd[0] for s in watch(arm, 1.0)])
         over.append(float((-np.sign(offset[0]) * after).max()))
         let_go(arm, handle)
@@ -144,7 +144,7 @@ def bounds(arm: Arm) -> None:
     for most in (1000.0, 10.0):
         limit = (most, *far[1:])
         handle = held(arm, CartesianImpedance((2000.0,) * 3 + _TURNING, max_force=limit, frame="base"))
-        arm.operator.push((20.0, 0.0, 0.0), duration=0.5)
+        arm.operator.start_push((20.0, 0.0, 0.0), duration=0.5)
         offsets.append(max(float(np.linalg.norm(s.pose.xyz - s.pose_cmd.xyz)) for s in watch(arm, 0.6)))
         let_go(arm, handle)
         arm.move(ptp(HOME))
@@ -226,7 +226,7 @@ def online(arm: Arm) -> None:
 def validation(arm: Arm) -> None:
     """Impedance control does not start while the external torques exceed what the declared load explains."""
     rest = baseline(arm).tau_ext
-    arm.operator.push((0.0, 0.0, -40.0), duration=_LONG)
+    arm.operator.start_push((0.0, 0.0, -40.0), duration=_LONG)
     # Force and torques are read one after the other: wait for both, lest what follows sees torques of before.
     arm.wait_until(lambda s: s.wrench.force[2] < -35.0 and np.abs(s.tau_ext).max() > 12.0, timeout=20.0)
     try:
@@ -234,7 +234,7 @@ def validation(arm: Arm) -> None:
             holds(False, "a servo motion under impedance is refused")
     except NotReady as error:
         holds("load" in error.text, error.text)
-    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.tau_ext - rest).max() < 1.0, timeout=20.0)
     settled(
         arm

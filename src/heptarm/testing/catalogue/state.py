@@ -58,7 +58,7 @@ def velocity(arm: Arm) -> None:
 def push(arm: Arm) -> None:
     """The wrench shows a push, and the external joint torques are J^T f."""
     rest, force = baseline(arm), np.array([12.0, -8.0, -15.0])
-    arm.operator.push(force, duration=60.0)
+    arm.operator.start_push(force, duration=60.0)
     arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force - force) < 2.0, timeout=20.0)
     watch(arm, 0.3)
     seen, state = baseline(arm), arm.state
@@ -71,7 +71,7 @@ def push(arm: Arm) -> None:
     turned = arm.wrench("flange", axes="flange", state=state).force
     own = arm.pose("flange", state=state).rotation.T @ state.wrench.force
     near(turned, own, 1.0, "in the flange's axes", unit="N")
-    arm.operator.push(0.0 * force, duration=0.0)
+    arm.operator.start_push(0.0 * force, duration=0.0)
     arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force) < 2.0, timeout=20.0)
 
 

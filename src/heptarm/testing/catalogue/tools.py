@@ -148,7 +148,7 @@ def wrench(arm: Arm) -> None:
     with arm.tool(_GRIPPER):
         arm.move(hold(0.3))
         rest, bare = baseline(arm), arm.wrench("flange")
-        arm.operator.push(push, duration=60.0)
+        arm.operator.start_push(push, duration=60.0)
         arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force - push) < 1.5, timeout=20.0)
         watch(arm, 0.3)
         seen, tip, flange = baseline(arm), arm.wrench(), arm.wrench("flange")
@@ -164,4 +164,4 @@ def wrench(arm: Arm) -> None:
         near(seen.torque - rest.torque, np.cross(lever, push), 0.3, "torque at the tip", unit="Nm")
         own = arm.wrench(axes="tool").force
         near(own, arm.pose().rotation.T @ tip.force, 2.0, "force in the tip's axes", unit="N")
-        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+        arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)

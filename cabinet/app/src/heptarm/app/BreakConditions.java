@@ -108,11 +108,11 @@ final class BreakConditions {
         if (tree.node instanceof Inverted) {
             return first.invert();
         }
-        ICondition[] others = new ICondition[tree.parts.length - 1];
-        for (int i = 0; i < others.length; i++) {
-            others[i] = make(tree.parts[i + 1], moved, tools, signals);
+        for (int i = 1; i < tree.parts.length; i++) {
+            ICondition next = make(tree.parts[i], moved, tools, signals);
+            first = tree.node instanceof AllOf ? first.and(next) : first.or(next);
         }
-        return tree.node instanceof AllOf ? first.and(others) : first.or(others);
+        return first;
     }
 
     private static ICondition leaf(ConditionNode node, AbstractFrame moved, SunriseTools tools, SunriseSignals signals) throws CommandRejected {

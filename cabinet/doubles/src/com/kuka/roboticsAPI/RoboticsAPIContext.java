@@ -4,12 +4,16 @@ import java.util.Collection;
 import java.util.Collections;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.persistenceModel.IPersistenceEngine;
+import com.kuka.roboticsAPI.persistenceModel.XmlApplicationDataSource;
 
+import heptarm.doubles.runtime.NotModelled;
 import heptarm.doubles.runtime.Station;
 
 /** Cabinets and devices of the project; here one of each. */
 public class RoboticsAPIContext {
     private final Station station;
+    private final XmlApplicationDataSource data = new XmlApplicationDataSource();
 
     /** Created by the simulation. */
     public RoboticsAPIContext(Station station) {
@@ -24,10 +28,12 @@ public class RoboticsAPIContext {
         return station.controller;
     }
 
-    /** Not simulated: the project's data are read before the application starts, and never written. */
+    /** The persistence engine; there is no other. */
     public <T> T getEngine(Class<T> type) {
-        throw new UnsupportedOperationException("the virtual cabinet has no " + type.getName()
-                + "; it reads the project's data.xml once and does not change it");
+        if (type != IPersistenceEngine.class) {
+            throw new NotModelled("getEngine of " + type.getName());
+        }
+        return type.cast((IPersistenceEngine) () -> data);
     }
 
     /** The device of a type. */

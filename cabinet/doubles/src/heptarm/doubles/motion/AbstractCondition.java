@@ -80,21 +80,22 @@ public abstract class AbstractCondition implements ICondition {
         return inverted;
     }
 
-    private Combined with(Kind kind, ICondition... others) {
-        ICondition[] all = new ICondition[others.length + 1];
+    private Combined with(Kind kind, ICondition other, ICondition... more) {
+        ICondition[] all = new ICondition[more.length + 2];
         all[0] = this;
-        System.arraycopy(others, 0, all, 1, others.length);
+        all[1] = other;
+        System.arraycopy(more, 0, all, 2, more.length);
         return new Combined(kind, all);
     }
 
     @Override
-    public ICondition or(ICondition... others) {
-        return with(Kind.ANY, others);
+    public ICondition or(ICondition other, ICondition... more) {
+        return with(Kind.ANY, other, more);
     }
 
     @Override
-    public ICondition and(ICondition... others) {
-        return with(Kind.ALL, others);
+    public ICondition and(ICondition other, ICondition... more) {
+        return with(Kind.ALL, other, more);
     }
 
     @Override

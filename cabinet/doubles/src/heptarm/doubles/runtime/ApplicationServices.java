@@ -149,9 +149,16 @@ public final class ApplicationServices implements IApplicationData, IApplication
     }
 
     @Override
+    public IProcessData tryGetProcessData(String id) {
+        return station.processData.containsKey(id) ? getProcessData(id) : null;
+    }
+
+    @Override
     public IProcessData getProcessData(final String id) {
         if (!station.processData.containsKey(id)) {
-            throw new PersistenceException("no process data " + id + " in the project");
+            String why = station.unusable.get(id);
+            throw new PersistenceException(why == null ? "no process data " + id + " in the project"
+                    : "the process data " + id + " cannot be used: " + why);
         }
         return new IProcessData() {
             @Override

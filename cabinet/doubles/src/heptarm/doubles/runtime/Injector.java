@@ -23,7 +23,6 @@ import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
-import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseLBR;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
@@ -37,15 +36,16 @@ final class Injector {
     private final ApplicationServices services;
     private final Station station;
     private final Object[] offers;
-    private final Class<?>[] types = {SunriseLBR.class, SunriseController.class, Controller.class, IApplicationData.class,
-        ITaskLogger.class, IApplicationUI.class, ObserverManager.class, IApplicationControl.class, RoboticsAPIContext.class,
-        ITaskManager.class, AutomaticResumeManager.class};
+    private final Class<?>[] types;
     private final Map<Class<?>, Object> singletons = new HashMap<>();
     private final Set<Class<?>> underConstruction = new HashSet<>();
 
     Injector(ApplicationServices services, Station station) {
         this.services = services;
         this.station = station;
+        this.types = new Class<?>[] {station.robot.getClass(), SunriseController.class, Controller.class, IApplicationData.class,
+            ITaskLogger.class, IApplicationUI.class, ObserverManager.class, IApplicationControl.class, RoboticsAPIContext.class,
+            ITaskManager.class, AutomaticResumeManager.class};
         this.offers = new Object[] {station.robot, station.controller, station.controller, services, services.logger, services.pad,
             services.observers, services, station.context, station.tasks, station.automaticResume.manager};
     }
@@ -89,8 +89,8 @@ final class Injector {
     }
 
     private Object find(Class<?> type, Named named, String where) throws ReflectiveOperationException {
-        if (named != null && type.isAssignableFrom(SunriseLBR.class) && Device.class.isAssignableFrom(type)) {
-            return device(named.value(), where);
+        if (Device.class.isAssignableFrom(type) && (named != null || !type.isInstance(station.robot))) {
+            return device(type, named, where);
         }
         try {
             if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
@@ -114,12 +114,12 @@ final class Injector {
         return made == null ? make(type, where) : made;
     }
 
-    /** The robot, by its name in the station setup. */
-    private Object device(String name, String where) {
+    /** The robot, by its name in the station setup if one is given. */
+    private Object device(Class<?> type, Named named, String where) {
         String present = station.robot.getName();
-        if (!present.equals(name)) {
+        if (named != null && !present.equals(named.value()) || !type.isInstance(station.robot)) {
             throw new IllegalArgumentException("nothing to inject into " + where + ": the virtual cabinet's robot is " + present
-                    + ", not " + name + "; choose another robot with --model");
+                    + ", not " + (named == null ? "a " + type.getName() : named.value()) + "; choose another robot with --model");
         }
         return station.robot;
     }

@@ -7,6 +7,7 @@ import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
 import java.util.concurrent.TimeUnit;
 
+import com.kuka.med.deviceModel.LBRMed;
 import com.kuka.roboticsAPI.RoboticsAPIContext;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
@@ -37,6 +38,7 @@ public final class Station {
     public final SharedState sharedState;
     public final TimerQueue timers;
     public final Map<String, Object> processData = new ConcurrentHashMap<>();
+    public final Map<String, String> unusable = new ConcurrentHashMap<>();
     public final Map<String, ObjectTemplate> templates = new ConcurrentHashMap<>();
     public final ExecutorService dispatch;
     public final Controller controller;
@@ -58,7 +60,8 @@ public final class Station {
             return thread;
         });
         this.controller = new SunriseController("KUKA_Sunrise_Cabinet_1", this);
-        this.robot = new SunriseLBR(description.title.replace(' ', '_') + "_1", controller, this);
+        String name = description.title.replace(' ', '_') + "_1";
+        this.robot = name.contains("_Med_") ? new LBRMed(name, controller, this) : new SunriseLBR(name, controller, this);
     }
 
     /** Creates the cabinet; called once, before anything else. */
@@ -133,9 +136,23 @@ public final class Station {
         frame.setRedundancyInformation(robot, new LBRE1Redundancy(e1, status, turn));
     }
 
+    /** Sets an additional parameter that a taught frame is stored with. */
+    public void setParameter(String path, String name, Object value) {
+        ObjectFrame frame = World.Current.getRootFrame();
+        for (String part : path.split("/")) {
+            frame = frame.getChild(part);
+        }
+        frame.setAdditionalParameter(name, value);
+    }
+
     /** The safety state has changed; called on the realtime thread of the plant. */
     public void safetyChanged(long flags, long mode) {
         safetyEvents.changed(sharedState.computed(), flags, mode);
+    }
+
+    /** Process data whose value cannot be read: an application that asks for them gets this as error. */
+    public void setUnusable(String name, String why) {
+        unusable.put(name, why);
     }
 
     public void setProcessData(String name, Object value) {

@@ -7,6 +7,9 @@ import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 public interface IApplicationData {
     IProcessData getProcessData(String id);
 
+    /** The same; null: there are none of that name. */
+    IProcessData tryGetProcessData(String id);
+
     /** A new tool or workpiece from the project's template of that name. */
     <T> T createFromTemplate(String name);
 

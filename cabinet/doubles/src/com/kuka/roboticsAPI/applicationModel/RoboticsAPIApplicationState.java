@@ -2,5 +2,5 @@ package com.kuka.roboticsAPI.applicationModel;
 
 /** State of an application. */
 public enum RoboticsAPIApplicationState {
-    RUNNING, STOPPING
+    RUNNING, MOTIONPAUSING, RESUMING, STOPPING
 }

@@ -3,6 +3,7 @@ package com.kuka.roboticsAPI.controllerModel;
 import java.util.Collection;
 import java.util.Collections;
 
+import com.kuka.roboticsAPI.RoboticsAPIContext;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
 import com.kuka.roboticsAPI.deviceModel.Device;
 
@@ -25,6 +26,10 @@ public class Controller {
 
     public String getName() {
         return name;
+    }
+
+    public RoboticsAPIContext getContext() {
+        return station.context;
     }
 
     public Collection<Device> getDevices() {

@@ -22,7 +22,6 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.SceneGraphObject;
 import com.kuka.roboticsAPI.geometricModel.Tool;
 import com.kuka.roboticsAPI.geometricModel.Workpiece;
-import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
@@ -182,11 +181,6 @@ public abstract class LBR extends Robot {
         ApplicationServices.current().logger.info("ESM state " + state);
     }
 
-    /** Changes a frame of the robot, or of an attached object, relative to its parent. */
-    public void changeFramePosition(ObjectFrame frame, ITransformation fromParent) {
-        frame.place(fromParent);
-    }
-
     /**
      * Joint positions for a frame of the flange and its redundancy; what is not given stays as close as possible to the current one.
      *
@@ -200,6 +194,16 @@ public abstract class LBR extends Robot {
             throw new IllegalArgumentException("no joint positions bring the flange to " + frame.toStringInWorld());
         }
         return new JointPosition(found);
+    }
+
+    /** Pose of the flange at given joint positions, in the root frame of the robot. */
+    public Frame getForwardKinematic(JointPosition joints) {
+        return cartesian(joints, flange);
+    }
+
+    /** Where a frame on the robot is now. */
+    public PositionInformation getPositionInformation(ObjectFrame frameOnRobot) {
+        return new PositionInformation(getCurrentCartesianPosition(frameOnRobot), getCommandedCartesianPosition(frameOnRobot));
     }
 
     public RoboticsAPIContext getContext() {

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.deviceModel;
 
 import com.kuka.roboticsAPI.geometricModel.Frame;
 
-/** Where the flange of a robot was at a moment, in the world. */
+/** Where a frame of a robot was at a moment, in the world. */
 public class PositionInformation {
     private final Frame current;
     private final Frame commanded;

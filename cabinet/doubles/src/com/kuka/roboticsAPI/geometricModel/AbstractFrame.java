@@ -14,6 +14,7 @@ import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 /** A frame in the tree whose root is the world. Millimetres, radians. */
 public abstract class AbstractFrame {
     private final Map<Device, IRedundancyCollection> redundancy = new HashMap<>();
+    private final Map<String, Object> parameters = new HashMap<>();
 
     /** The parent frame; null for the world. */
     public abstract AbstractFrame getParent();
@@ -81,6 +82,63 @@ public abstract class AbstractFrame {
         return transformationFromWorld().toString();
     }
 
+    /** Pose in the parent frame. */
+    public String toStringTrafo() {
+        return fromParent().toString();
+    }
+
+    /** Name of the frame; empty for one that an application created. */
+    public String getName() {
+        return "";
+    }
+
+    /** Path from the root of its object, or from the world, as in "/Table/P1"; a frame of the application has that of its parent. */
+    public String getPath() {
+        AbstractFrame parent = getParent();
+        return parent == null ? "" : parent.getPath();
+    }
+
+    /** A frame of the application at the present place, in the same parent. */
+    public Frame copy() {
+        return new Frame(getParent(), fromParent());
+    }
+
+    /** A frame of the application at the present place, in another one. */
+    public Frame copy(AbstractFrame reference) {
+        return new Frame(reference, reference.transformationTo(this));
+    }
+
+    /** The same with redundancy and additional parameters. */
+    public Frame copyWithRedundancy() {
+        return withRest(copy());
+    }
+
+    /** The same in another parent. */
+    public Frame copyWithRedundancy(AbstractFrame reference) {
+        return withRest(copy(reference));
+    }
+
+    private Frame withRest(Frame copy) {
+        AbstractFrame other = copy; // whose private fields are visible here
+        other.redundancy.putAll(redundancy);
+        other.parameters.putAll(parameters);
+        return copy;
+    }
+
+    public boolean hasAdditionalParameter(String name) {
+        return parameters.containsKey(name);
+    }
+
+    /** An additional parameter, as set or as stored with a taught frame; null: there is none. */
+    @SuppressWarnings("unchecked")
+    public <T> T getAdditionalParameter(String name) {
+        return (T) parameters.get(name);
+    }
+
+    public void setAdditionalParameter(String name, Object value) {
+        parameters.put(name, value);
+    }
+
     public double getX() {
         return fromParent().getX();
     }
@@ -109,16 +167,15 @@ public abstract class AbstractFrame {
         return redundancy.get(device);
     }
 
-    public Map<Device, IRedundancyCollection> getRedundancyInformation() {
-        return new HashMap<>(redundancy);
+    /** By the names of the devices. */
+    public Map<String, IRedundancyCollection> getRedundancyInformation() {
+        Map<String, IRedundancyCollection> found = new HashMap<>();
+        redundancy.forEach((device, one) -> found.put(device.getName(), one));
+        return found;
     }
 
     public void setRedundancyInformation(Device device, IRedundancyCollection value) {
         redundancy.put(device, value);
-    }
-
-    void copyRedundancyTo(AbstractFrame other) {
-        ((AbstractFrame) other).redundancy.putAll(redundancy);
     }
 
     static Transformation transformation(ITransformation any) {

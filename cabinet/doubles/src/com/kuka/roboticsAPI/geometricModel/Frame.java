@@ -47,16 +47,6 @@ public class Frame extends AbstractFrame {
         return fromParent;
     }
 
-    public Frame copy() {
-        return new Frame(parent, fromParent);
-    }
-
-    public Frame copyWithRedundancy() {
-        Frame copy = copy();
-        copyRedundancyTo(copy);
-        return copy;
-    }
-
     /** Another frame as seen from this one, now. */
     public Transformation staticTransformationTo(Frame other) {
         return transformationTo(other);
@@ -85,6 +75,11 @@ public class Frame extends AbstractFrame {
         }
         parent = newParent;
         return this;
+    }
+
+    /** As older applications call it, with the result of the forward kinematics: places it as another frame in its parent. */
+    public Frame setTransformationFromParent(Frame other) {
+        return setTransformationFromParent(other.fromParent());
     }
 
     public Frame setTransformationFromParent(ITransformation transformation) {

@@ -1,7 +1,6 @@
 package com.kuka.roboticsAPI.geometricModel;
 
 import java.util.ArrayList;
-import java.util.Collection;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.function.Supplier;
@@ -15,9 +14,9 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 
 /** A frame of an object, which moves with the object. */
 public class ObjectFrame extends AbstractFrame {
-    private final String name;
+    private volatile String name;
     private final SceneGraphObject owner;
-    private final Supplier<? extends AbstractFrame> parent;
+    private volatile Supplier<? extends AbstractFrame> parent;
     private final Supplier<Transformation> fromParent; // null: placed by hand
     private volatile Transformation placed;
     private final List<ObjectFrame> children = new CopyOnWriteArrayList<>();
@@ -31,6 +30,13 @@ public class ObjectFrame extends AbstractFrame {
         this.fromParent = fromParent;
     }
 
+    /** A frame of the application's own; it is no child of its parent, and keeps the place that the provider gives now. */
+    public ObjectFrame(String name, ObjectFrame parent, SceneGraphObject owner, ITransformationProvider place) {
+        this(name, owner, () -> parent, null);
+        placed = Transformation.of(place.getTransformation());
+    }
+
+    @Override
     public String getName() {
         return name;
     }
@@ -63,8 +69,46 @@ public class ObjectFrame extends AbstractFrame {
         return null;
     }
 
-    public Collection<ObjectFrame> getChildren() {
+    public List<ObjectFrame> getChildren() {
         return new ArrayList<>(children);
+    }
+
+    public List<ObjectFrame> getChildrenSnapshot() {
+        return getChildren();
+    }
+
+    /** Renames a frame of the project; for its data. */
+    public void rename(String wanted) {
+        ObjectFrame above = above();
+        if (wanted.isEmpty() || wanted.contains("/") || above.getChild(wanted) != null) {
+            throw new IllegalArgumentException("a frame of " + above.name + " cannot be named \"" + wanted + "\"");
+        }
+        name = wanted;
+    }
+
+    /** Removes a frame of the project; for its data. */
+    public void remove() {
+        above().children.remove(this);
+    }
+
+    /** Gives a frame of the project another parent, where it stays in its place; for its data. */
+    public void moveTo(ObjectFrame newParent) {
+        if (newParent.getChild(name) != null) {
+            throw new IllegalArgumentException("a frame " + name + " of " + newParent.name + " exists already");
+        }
+        Transformation there = newParent.transformationTo(this);
+        remove();
+        parent = () -> newParent;
+        place(there);
+        newParent.children.add(this);
+    }
+
+    private ObjectFrame above() {
+        AbstractFrame above = getParent();
+        if (fromParent != null || !(above instanceof ObjectFrame)) {
+            throw new IllegalArgumentException("the frame " + name + " is none of the project's frames");
+        }
+        return (ObjectFrame) above;
     }
 
     /** A new child frame; for the simulation. */
@@ -92,26 +136,11 @@ public class ObjectFrame extends AbstractFrame {
         return null;
     }
 
-    /** A frame of the application at the present place, in the same parent. */
-    public Frame copy() {
-        return new Frame(getParent(), fromParent());
-    }
-
-    /** A frame of the application at the present place, in another one. */
-    public Frame copy(ObjectFrame reference) {
-        return new Frame(reference, reference.transformationTo(this));
-    }
-
-    /** Not simulated: where projects store such parameters is not known. */
-    public <T> T getAdditionalParameter(String parameter) {
-        throw new UnsupportedOperationException("the virtual cabinet does not read additional parameters of frames, such as "
-                + parameter + " of " + name + "; use process data");
-    }
-
-    public Frame copyWithRedundancy() {
-        Frame copy = new Frame(transformationFromWorld());
-        copyRedundancyTo(copy);
-        return copy;
+    @Override
+    public String getPath() {
+        AbstractFrame above = getParent();
+        boolean isRoot = !(above instanceof ObjectFrame) || ((ObjectFrame) above).owner != owner;
+        return isRoot ? "" : above.getPath() + "/" + name;
     }
 
     /** Attaches the object of this frame so that this frame coincides with another. */

@@ -9,6 +9,11 @@ public abstract class SceneGraphObject {
     private final String name;
     private final List<SceneGraphObject> children = new CopyOnWriteArrayList<>();
 
+    /** An object of the application's own. */
+    protected SceneGraphObject() {
+        this("");
+    }
+
     protected SceneGraphObject(String name) {
         this.name = name;
     }
@@ -20,6 +25,10 @@ public abstract class SceneGraphObject {
     /** The attached objects; a copy, so that objects can be detached while it is iterated. */
     public List<SceneGraphObject> getChildren() {
         return new ArrayList<>(children);
+    }
+
+    /** An application's own object may have it; never called. */
+    protected void changeParent(ObjectFrame parent) {
     }
 
     void adopt(SceneGraphObject child) {

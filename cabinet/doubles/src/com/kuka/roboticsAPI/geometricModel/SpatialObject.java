@@ -43,6 +43,11 @@ public abstract class SpatialObject extends SceneGraphObject {
         return root.add(name, fromRoot);
     }
 
+    /** Changes a frame of this object, or of one that is attached to it, relative to its parent. */
+    public void changeFramePosition(ObjectFrame frame, ITransformation fromParent) {
+        frame.place(fromParent);
+    }
+
     /** Attaches the root of this object to a frame, and detaches it from its current one. */
     public void attachTo(AbstractFrame frame) {
         attachTo(frame, Transformation.IDENTITY);

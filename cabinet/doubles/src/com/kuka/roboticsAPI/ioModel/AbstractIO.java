@@ -10,12 +10,14 @@ public abstract class AbstractIO {
     private final String group;
     private final String name;
     private final IOTypes type;
+    private final int bits;
     private final int place;
 
-    AbstractIO(String group, String name, IOTypes type, boolean output) {
+    AbstractIO(String group, String name, IOTypes type, int bits, boolean output) {
         this.group = group;
         this.name = name;
         this.type = type;
+        this.bits = bits;
         this.place = station.plant.signal(group + "." + name, output);
     }
 
@@ -44,12 +46,22 @@ public abstract class AbstractIO {
         return Double.POSITIVE_INFINITY;
     }
 
-    final String name() {
+    public String getIOName() {
         return name;
     }
 
-    final IOTypes type() {
+    public IOTypes getDataType() {
         return type;
+    }
+
+    /** Its width. */
+    public int getBitSize() {
+        return bits;
+    }
+
+    /** Whether it is set; false for the number 0. */
+    public boolean getBooleanIOValue() {
+        return value() != 0.0;
     }
 
     final double value() {

@@ -1,5 +1,7 @@
 package com.kuka.roboticsAPI.ioModel;
 
+import java.util.ArrayList;
+import java.util.Collection;
 import java.util.LinkedHashMap;
 import java.util.Map;
 
@@ -27,17 +29,29 @@ public abstract class AbstractIOGroup {
     }
 
     protected void addInput(String name, IOTypes type, int bits) {
-        inputs.put(name, new Input(group, name, type));
+        inputs.put(name, new Input(group, name, type, bits));
     }
 
     protected void addInput(String name, IOTypes type, int bits, double low, double high) {
         addInput(name, type, bits);
     }
 
+    /** An input that no device is connected to, with its first value. */
+    protected void addMockedInput(String name, IOTypes type, int bits, Object value) {
+        addInput(name, type, bits);
+        setMockedInput(name, value);
+    }
+
+    /** Sets an input that no device is connected to; the operator of the virtual cabinet sets it, too. */
+    protected void setMockedInput(String name, Object value) {
+        Input input = getInput(name);
+        input.setValue(number(input, value));
+    }
+
     protected void addDigitalOutput(String name, IOTypes type, int bits) {
         double low = type == IOTypes.INTEGER ? -Math.pow(2, bits - 1) : 0;
         double high = type == IOTypes.INTEGER ? -low - 1 : Math.pow(2, bits) - 1;
-        outputs.put(name, new Output(group, name, type, low, high));
+        outputs.put(name, new Output(group, name, type, bits, low, high));
     }
 
     /** An output that no device is connected to; here like any other. */
@@ -46,11 +60,11 @@ public abstract class AbstractIOGroup {
     }
 
     protected void addAnalogOutput(String name, IOTypes type, int bits, double low, double high) {
-        outputs.put(name, new Output(group, name, type, low, high));
+        outputs.put(name, new Output(group, name, type, bits, low, high));
     }
 
     public boolean getBooleanIOValue(String name, boolean isOutput) {
-        return getIO(name, isOutput).value() != 0.0;
+        return getIO(name, isOutput).getBooleanIOValue();
     }
 
     protected Number getNumberIOValue(String name, boolean isOutput) {
@@ -63,11 +77,16 @@ public abstract class AbstractIOGroup {
 
     protected void setDigitalOutput(String name, Object value) {
         Output output = getOutput(name);
-        boolean truth = output.type() == IOTypes.BOOLEAN;
+        write(output, number(output, value));
+    }
+
+    private double number(AbstractIO signal, Object value) {
+        boolean truth = signal.getDataType() == IOTypes.BOOLEAN;
         if (truth != value instanceof Boolean || !truth && !(value instanceof Number)) {
-            throw new IllegalArgumentException("output " + name + " of " + group + " is " + output.type() + ", not " + value);
+            throw new IllegalArgumentException((signal instanceof Output ? "output " : "input ") + signal.getIOName() + " of " + group
+                    + " is " + signal.getDataType() + ", not " + value);
         }
-        write(output, truth ? (Boolean) value ? 1.0 : 0.0 : ((Number) value).doubleValue());
+        return truth ? (Boolean) value ? 1.0 : 0.0 : ((Number) value).doubleValue();
     }
 
     protected void setAnalogOutput(String name, double value) {
@@ -89,6 +108,14 @@ public abstract class AbstractIOGroup {
 
     public Output getOutput(String name) {
         return known(outputs.get(name), name);
+    }
+
+    public Collection<Input> getInputs() {
+        return new ArrayList<>(inputs.values());
+    }
+
+    public Collection<Output> getOutputs() {
+        return new ArrayList<>(outputs.values());
     }
 
     public AbstractIO getIO(String name, boolean isOutput) {

@@ -5,8 +5,8 @@ public class Output extends AbstractIO {
     private final double low;
     private final double high;
 
-    Output(String group, String name, IOTypes type, double low, double high) {
-        super(group, name, type, true);
+    Output(String group, String name, IOTypes type, int bits, double low, double high) {
+        super(group, name, type, bits, true);
         this.low = low;
         this.high = high;
     }
@@ -23,7 +23,7 @@ public class Output extends AbstractIO {
 
     void check(double value) {
         if (!(value >= low && value <= high)) {
-            throw new IllegalArgumentException("output " + name() + " must be in [" + low + ", " + high + "], got " + value);
+            throw new IllegalArgumentException("output " + getIOName() + " must be in [" + low + ", " + high + "], got " + value);
         }
     }
 }

@@ -46,6 +46,21 @@ public final class BasicMotions {
         return new MotionBatch(motions);
     }
 
+    /** An offset of zero; its setters change it. */
+    public static RelativeLIN linRel() {
+        return linRel(Transformation.IDENTITY);
+    }
+
+    /** Not simulated; applications that name it compile. */
+    public static RelativeSPL splRel(ITransformation offset) {
+        return new RelativeSPL(offset, null);
+    }
+
+    /** See {@link #splRel(ITransformation)}. */
+    public static RelativeSPL splRel(ITransformation offset, AbstractFrame reference) {
+        return new RelativeSPL(offset, reference);
+    }
+
     public static RelativeLIN linRel(double x, double y, double z) {
         return linRel(Transformation.ofTranslation(x, y, z));
     }

@@ -9,26 +9,15 @@ import heptarm.doubles.seam.LinRel;
 import heptarm.doubles.seam.PlantMotion;
 
 /** Straight line relative to the pose of the motion frame at the start. */
-public class RelativeLIN extends SplineMotionCP<RelativeLIN> {
-    private final Transformation offset;
-    private final AbstractFrame reference;
-
+public class RelativeLIN extends RelativeSplineMotionCP<RelativeLIN> {
     public RelativeLIN(ITransformation offset, AbstractFrame reference) {
-        this.offset = Transformation.of(offset);
-        this.reference = reference;
-    }
-
-    public Transformation getOffset() {
-        return offset;
-    }
-
-    /** Frame whose axes the offset refers to; null: the motion frame. */
-    public AbstractFrame getReference() {
-        return reference;
+        super(offset, reference);
     }
 
     @Override
     public PlantMotion describe(MotionTranslator to) {
+        Transformation offset = getOffset();
+        AbstractFrame reference = getReference();
         LinRel motion = new LinRel();
         if (to.isOnFlange(reference)) { // it moves with the arm, which will be elsewhere when the motion runs: use the motion frame's axes
             Transformation seen = to.motionFrame().transformationTo(reference);

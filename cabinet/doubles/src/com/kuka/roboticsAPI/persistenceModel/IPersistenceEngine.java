@@ -2,5 +2,5 @@ package com.kuka.roboticsAPI.persistenceModel;
 
 /** Access to the project's stored data. */
 public interface IPersistenceEngine {
-    Object getDefaultDataSource();
+    XmlApplicationDataSource getDefaultDataSource();
 }

@@ -24,6 +24,20 @@ public class SmartServo extends ServoMotionJP<SmartServo> {
         return running(waitForActivation);
     }
 
+    /** The first axis's; 1 if it is not set. */
+    public double getJointVelocityRel() {
+        return setOr1(jointDynamics().velocity[0]);
+    }
+
+    /** See {@link #getJointVelocityRel}. */
+    public double getJointAccelerationRel() {
+        return setOr1(jointDynamics().acceleration[0]);
+    }
+
+    private static double setOr1(double value) {
+        return Double.isNaN(value) ? 1.0 : value;
+    }
+
     public JointPosition getStart() {
         return new JointPosition(start);
     }

@@ -14,7 +14,7 @@ public abstract class RoboticsAPICyclicBackgroundTask extends RoboticsAPIBackgro
     private long initialDelay = -1;
     private long period;
 
-    public abstract void runCyclic() throws Exception;
+    protected abstract void runCyclic() throws Exception;
 
     /** Sets delay and period of the cycles; called from {@link #initialize}. */
     protected void initializeCyclic(long delay, long every, TimeUnit unit, CycleBehavior behavior) {

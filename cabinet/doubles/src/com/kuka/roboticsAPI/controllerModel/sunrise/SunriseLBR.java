@@ -6,7 +6,7 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import heptarm.doubles.runtime.Station;
 
 /** The robot of a cabinet. */
-public final class SunriseLBR extends LBR {
+public class SunriseLBR extends LBR {
     /** Created by the simulation. */
     public SunriseLBR(String name, Controller controller, Station station) {
         super(name, controller, station);

@@ -50,6 +50,14 @@ public final class Transformation implements ITransformation {
         return of(translation, getRotationMatrix());
     }
 
+    public Transformation withTranslation(double newX, double newY, double newZ) {
+        return withTranslation(Vector.of(newX, newY, newZ));
+    }
+
+    public Transformation withRotationRad(double a, double b, double c) {
+        return withRotation(Rotation.ofRad(a, b, c));
+    }
+
     /** The same translation with another rotation. */
     public Transformation withRotation(Rotation rotation) {
         return of(Vector.of(x, y, z), rotation);

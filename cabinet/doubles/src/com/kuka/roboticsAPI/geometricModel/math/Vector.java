@@ -28,6 +28,20 @@ public final class Vector {
         return z;
     }
 
+    /** Coordinate 0, 1 or 2. */
+    public double get(int index) {
+        return switch (index) {
+            case 0 -> x;
+            case 1 -> y;
+            case 2 -> z;
+            default -> throw new IndexOutOfBoundsException("index of a vector must be 0, 1 or 2, got " + index);
+        };
+    }
+
+    public double length() {
+        return Math.sqrt(x * x + y * y + z * z);
+    }
+
     @Override
     public String toString() {
         return "(" + x + ", " + y + ", " + z + ")";

@@ -11,6 +11,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.ControlModeTranslator;
 import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.runtime.NotModelled;
 import heptarm.doubles.seam.CartesianImpedance;
 import heptarm.doubles.seam.ImpedanceMode;
 
@@ -26,19 +27,21 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     private static final double STIFFEST_ROTATION = 300.0;
     /** Largest stiffness that the plant takes [Nm/rad]. */
     private static final double PLANT_NULL_SPACE_STIFFNESS = 5000.0;
+    private static final double[] DEFAULT_STIFFNESS = {2000, 2000, 2000, 200, 200, 200};
     private static final double DEFAULT_DAMPING = 0.7;
+    private static final double DEFAULT_NULL_SPACE_STIFFNESS = 100.0;
     private static final double LEAST_DAMPING = 0.1;
     private static final double LEAST_NULL_SPACE_DAMPING = 0.3;
 
-    private final double[] stiffness = {2000, 2000, 2000, 200, 200, 200};
+    private final double[] stiffness = DEFAULT_STIFFNESS.clone();
     private final double[] damping = filled(DEFAULT_DAMPING);
     private final double[] additionalControlForce = new double[DIRECTIONS];
     private double[] maxControlForce = filled(OFF);
     private double[] maxCartesianVelocity = filled(OFF);
     private double[] maxPathDeviation = filled(OFF);
     private boolean stopsAtMaxControlForce;
-    private double nullSpaceStiffness = 100.0;
-    private double nullSpaceDamping = 0.7;
+    private double nullSpaceStiffness = DEFAULT_NULL_SPACE_STIFFNESS;
+    private double nullSpaceDamping = DEFAULT_DAMPING;
     private AbstractFrame referenceSystem;
 
     public CartesianImpedanceControlMode() {
@@ -145,6 +148,24 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
+    public CartesianImpedanceControlMode setNullSpaceStiffnessToDefaultValue() {
+        return setNullSpaceStiffness(DEFAULT_NULL_SPACE_STIFFNESS);
+    }
+
+    public CartesianImpedanceControlMode setNullSpaceDampingToDefaultValue() {
+        return setNullSpaceDamping(DEFAULT_DAMPING);
+    }
+
+    public CartesianImpedanceControlMode setAdditionalControlForceToDefaultValue() {
+        Arrays.fill(additionalControlForce, 0.0);
+        return this;
+    }
+
+    public CartesianImpedanceControlMode setStiffnessToDefaultValue() {
+        System.arraycopy(DEFAULT_STIFFNESS, 0, stiffness, 0, DIRECTIONS);
+        return this;
+    }
+
     public CartesianImpedanceControlMode setNullSpaceDamping(double value) {
         nullSpaceDamping = within("nullSpaceDamping", value, LEAST_NULL_SPACE_DAMPING, 1.0);
         return this;
@@ -194,7 +215,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
 
     /** Not simulated: the unit and the effect are not documented. */
     public CartesianImpedanceControlMode setMaxJointSpeed(double... speeds) {
-        throw new UnsupportedOperationException("the virtual cabinet has no largest joint speed of Cartesian impedance");
+        throw new NotModelled("a largest joint speed of Cartesian impedance");
     }
 
     public CartesianImpedanceControlMode setDampingToDefaultValue() {

@@ -1,0 +1,1 @@
+"""How well calibration finds what the simulator hides, and what live pictures cost."""

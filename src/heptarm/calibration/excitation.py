@@ -1,0 +1,239 @@
+"""Motions that show what an arm is like: through postures that differ in gravity, at speeds from very slow to fast."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.arm.verbs import ArmVerbs
+from heptarm.errors import CollisionForeseen, CommandRejected, OutsideWorkspace
+from heptarm.model.kinematics import forward
+from heptarm.values.checks import Array, Value, array, callback, frozen, instance, integer, within
+from heptarm.values.clearance import CollisionCheck
+from heptarm.values.mode.mode import Position
+from heptarm.values.motion.motion import Motion
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.robot import RobotModel
+from heptarm.values.text import lines
+
+_log = logging.getLogger("heptarm.calibration")
+
+#: Default duration [s], fraction of each axis' maximum in the fastest motion, largest distance from the start [rad].
+SECONDS, SPEED, REACH = 60.0, 0.4, 0.6
+#: Speeds of the motions in turn, by the fastest one: the slow ones show breakaway friction.
+_SPEEDS = (1.0, 0.06, 0.25, 0.02, 0.5, 0.12)
+#: The slow motions are shorter by this root of their speed, or they would take all of the time.
+_SHORTER = 0.7
+#: Part of the axes that change their direction in a motion.
+_TO_AND_FRO = 0.75
+#: Room that is left to the limits of the joints [rad].
+_ROOM = math.radians(5.0)
+#: Postures that are tried for a motion before the room is taken as too narrow.
+_TRIES = 40
+#: Rate of the recording, the most that a cabinet pushes [Hz]; an FRI session beside it adds its cycles at 1 kHz.
+_RATE = 500.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExcitationPlan(Value):
+    """What moves to identify an arm; nothing has moved yet.
+
+    Attributes:
+        robot: the robot.
+        postures: joint positions between which it moves, the first one is where it rests, shape (n, 7) [rad].
+        speeds: of the motion to each posture but the first, fractions of each axis' maximum, shape (n - 1,).
+        duration: of all motions [s].
+        low: lowest coordinates that the flange has in a posture, base frame, shape (3,) [m].
+        high: highest ones, shape (3,) [m].
+        is_checked: bodies that would touch were looked for.
+    """
+
+    robot: RobotModel
+    postures: Array
+    speeds: Array
+    duration: float
+    low: Array
+    high: Array
+    is_checked: bool
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motions, back to the first posture at last."""
+        pairs = zip(self.postures[1:], self.speeds.tolist(), strict=True)
+        return tuple(ptp(q, speed=speed) for q, speed in pairs)
+
+    def __str__(self) -> str:
+        """What moves, how far, how fast, and for how long."""
+        off = np.degrees(self.postures - self.postures[0])
+        moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(7))
+        pairs = zip("xyz", self.low, self.high, strict=True)
+        box = ", ".join(f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in pairs)
+        rows = {
+            "moves": f"{moves} deg",
+            "flange": f"in the postures {box} m in the base; between them it moves on arcs",
+            "speed": f"{self.speeds.min():.1%} to {self.speeds.max():.0%} of each axis' maximum",
+            "collisions": "none foreseen" if self.is_checked else "not checked: set arm.collision_check",
+            "duration": f"{self.duration:.0f} s, {len(self.speeds)} motions",
+        }
+        return lines(f"Identify the {self.robot.title}", rows)
+
+
+def next_posture(
+    model: RobotModel,
+    start: Array,
+    before: Array,
+    *,
+    reach: Array | float,
+    turn: int,
+    random: np.random.Generator,
+) -> tuple[Array, float]:
+    """Draw the posture after one, and the relative speed of the motion to it.
+
+    Args:
+        model: the robot.
+        start: middle of the range, shape (7,) [rad].
+        before: the posture where the motion begins, shape (7,) [rad].
+        reach: the most by which an axis moves from `start`, one number or shape (7,) [rad].
+        turn: number of the motion.
+        random: draws the posture.
+    """
+    low = np.maximum(start - reach, model.q_min + _ROOM)
+    high = np.minimum(start + reach, model.q_max - _ROOM)
+    speed = _SPEEDS[turn % len(_SPEEDS)]
+    # most axes turn back, but not all of them together
+    is_up = np.where(random.random(7) < _TO_AND_FRO, before < start, before >= start)
+    part = speed**_SHORTER * random.uniform(0.6, 1.0, 7)
+    return before + part * (np.where(is_up, high, low) - before), speed
+
+
+def excitation(
+    arm: ArmVerbs,
+    *,
+    seconds: float = SECONDS,
+    speed: float = SPEED,
+    reach: npt.ArrayLike = REACH,
+    collision_check: CollisionCheck | None = None,
+    seed: int = 0,
+) -> ExcitationPlan:
+    """Plan motions that identify the arm, from where it rests. Nothing moves.
+
+    Each motion is planned and checked as `arm.plan` does: against the limits, `arm.workspace`, and bodies.
+
+    Args:
+        arm: connected, at rest, with room around it; best with A2, A4 and A6 bent.
+        seconds: least duration of the motions [s], up to 3600.
+        speed: of the fastest motions, (0, 1]; the lower one of this and `arm.speed`.
+        reach: the most by which an axis moves from its position now, one number or shape (7,) [rad].
+        collision_check: checks for collisions, such as a `heptarm.CollisionModel`; None: `arm.collision_check`.
+        seed: other motions of the same kind, such as those for a validation.
+
+    Raises:
+        CommandRejected: there is no room for such motions.
+        MissingExtra: the planner is not installed.
+        ModeConflict: a motion runs.
+        LimitError: a value outside its range.
+    """
+    model = instance(arm, ArmVerbs, "arm").robot
+    least = within(seconds, "seconds", 1.0, 3600.0, unit="s")
+    fastest = min(within(speed, "speed", 0.0, 1.0, above=True), arm.speed)
+    far = array(
+        np.broadcast_to(np.asarray(reach, dtype=np.float64), 7) if np.ndim(reach) == 0 else reach, 7, "reach"
+    )
+    for index, one in enumerate(far.tolist()):
+        within(one, f"reach[{index}]", 0.05, 3.0, unit="rad")
+    postures, speeds, duration = [np.asarray(arm.state.q_cmd)], list[float](), 0.0
+    tried, goes_back = 0, False
+    random = np.random.default_rng(integer(seed, "seed", 0, 2**31))
+    while not goes_back or tried:
+        goes_back = duration >= least and len(speeds) >= len(_SPEEDS)
+        posture, part = next_posture(
+            model, postures[0], postures[-1], reach=far, turn=len(speeds), random=random
+        )
+        goal, one = (postures[0], fastest) if goes_back else (posture, part * fastest)
+        taken = _duration(arm, postures[-1], goal, speed=one, collision_check=collision_check)
+        if taken is None:
+            tried += 1
+            if tried > _TRIES:
+                raise CommandRejected(
+                    f"there is no room to identify the arm: {_TRIES} motions in a row would collide or leave the "
+                    "workspace",
+                    parameter="reach",
+                    hint="begin where the arm has more room around it, or with a smaller reach",
+                )
+            continue
+        tried = 0
+        postures.append(goal)
+        speeds.append(one)
+        duration += taken
+    places = np.array([forward(model, q)[:3, 3] for q in postures])
+    return ExcitationPlan(
+        model,
+        frozen(np.array(postures)),
+        frozen(speeds),
+        duration,
+        frozen(places.min(axis=0)),
+        frozen(places.max(axis=0)),
+        collision_check is not None or arm.collision_check is not None,
+    )
+
+
+def _duration(
+    arm: ArmVerbs, start: Array, goal: Array, *, speed: float, collision_check: CollisionCheck | None
+) -> float | None:
+    """Duration of a motion [s]; None: it would collide or leave the workspace."""
+    try:
+        found = arm.plan(
+            ptp(goal, speed=speed), start=start, mode=Position(), step=0.05, collision_check=collision_check
+        )
+    except (OutsideWorkspace, CollisionForeseen):
+        return None
+    return None if found.collisions else float(found.t[-1])
+
+
+def record_excitation(
+    arm: ArmVerbs,
+    path: str | Path,
+    *,
+    plan: ExcitationPlan | None = None,
+    confirm: Callable[[ExcitationPlan], bool] | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Move as planned and record it. The arm moves, and returns.
+
+    Args:
+        arm: in control, at rest, in position control, with nothing that touches it.
+        path: the file, MCAP; for `heptarm.calibration.simulator`.
+        plan: what moves; None: that of `excitation(arm)`.
+        confirm: called with the plan; nothing moves unless it returns true. None: it moves.
+        overwrite: replace a file that exists.
+
+    Returns:
+        The file.
+
+    Raises:
+        CommandRejected: it was not confirmed, or the file exists.
+        MotionAborted: a stop or an error ended it. Others as `arm.move`.
+    """
+    instance(arm, ArmVerbs, "arm").wait_for_rest()
+    made = excitation(arm) if plan is None else instance(plan, ExcitationPlan, "plan")
+    if np.abs(arm.state.q_cmd - made.postures[0]).max() > math.radians(1.0):
+        raise CommandRejected(
+            "the plan begins where the arm does not rest any more",
+            parameter="plan",
+            hint="make a new one with calibration.excitation(arm)",
+        )
+    recorder = arm.record(path, rate=_RATE, overwrite=overwrite)
+    _log.info("%s", made)
+    if confirm is not None and not callback(confirm, "confirm")(made):
+        raise CommandRejected("identifying the arm was not confirmed: nothing was moved", parameter="confirm")
+    with recorder:
+        for motion in made.motions:
+            arm.move(motion, mode=Position())
+        arm.wait_for_rest()
+    return Path(path)

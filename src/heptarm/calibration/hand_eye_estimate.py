@@ -1,0 +1,461 @@
+"""Hand-eye calibration from views: where a camera is, on the flange or beside the arm, from sightings of a board.
+
+First each view's pose of the board by OpenCV's perspective-n-point; then A X = X B in closed form (Park, Martin, "Robot
+sensor calibration: solving AX = XB on the Euclidean group", 1994); then least squares of the distances in the pictures
+over camera, board and, if asked for, focal lengths, centre and distortion (Tabb, Ahmad Yousef, "Solving the robot-world
+hand-eye(s) calibration problem with iterative methods", 2017), by SciPy. Errors of the arm are the same for all corners
+of a picture, so the standard deviations are those of a jackknife over pictures (Efron, Stein, 1981), which needs no
+model of the errors; the same computation predicts each view from the others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.calibration.board import Sighting
+from heptarm.calibration.tip import student
+from heptarm.errors import CommandRejected, ShapeError, require
+from heptarm.values.camera import intrinsic
+from heptarm.values.checks import Array, Value, finite_entries, flag, frozen, instance, numbers, shown, word
+from heptarm.values.pose import Pose, check_pose
+from heptarm.values.text import lines
+
+#: Where a camera is: on the flange ("eye in hand"), or in the base ("eye to hand", with the board on the flange).
+FRAMES = ("flange", "base")
+#: Fewest views; more parameters need more.
+FEWEST, FEWEST_REFINED = 4, 6
+#: Least angle by which the arm turns the camera about a second axis between views [rad].
+_TURNED = math.radians(4.0)
+#: Standard deviations above which the views do not determine the camera [m], [rad].
+_LOST, _LOST_ANGLE = 0.01, math.radians(1.0)
+#: Distances in a picture from which on a corner counts less at first [pixels].
+_ROBUST = 1.0
+#: The worst view is suspect if its distances are larger by this factor than the median.
+_SUSPECT = 4.0
+#: Parameters: camera and board, then focal lengths, centre, and two terms of radial distortion.
+_POSES, _LENS = 12, 6
+_NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandEyeView(Value):
+    """A board in a picture, and where the flange was.
+
+    Attributes:
+        flange: pose of the flange in the base.
+        sighting: what `Board.find` has found.
+
+    Raises:
+        ShapeError: wrong types.
+    """
+
+    flange: Pose
+    sighting: Sighting
+
+    def __post_init__(self) -> None:
+        check_pose(self.flange, "flange")
+        instance(
+            self.sighting, Sighting, "sighting", hint="what board.find(picture) returns, unless it is None"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class HandEyeGuess:
+    """Parameters about which the least squares are linear.
+
+    Attributes:
+        camera: in its frame.
+        board: in the other one.
+        lens: focal lengths, centre, k1, k2, shape (6,).
+        rest: p1, p2, k3.
+    """
+
+    camera: Pose
+    board: Pose
+    lens: Array
+    rest: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def moved(self, step: Array) -> HandEyeGuess:
+        """The parameters after a step: translations in the frame's axes, rotations about them, then the lens."""
+        lens = self.lens.copy()
+        lens[: len(step) - _POSES] += step[_POSES:]
+        return HandEyeGuess(_moved(self.camera, step[:6]), _moved(self.board, step[6:12]), lens, self.rest)
+
+
+def _moved(pose: Pose, step: Array) -> Pose:
+    return Pose.of(pose.xyz + step[:3], (Pose.from_rotvec((0, 0, 0), step[3:]) @ pose).quat)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandEyeEstimate(Value):
+    """A camera that was measured. Standard deviations are of a jackknife over the views, and count how few there were.
+
+    Attributes:
+        pose: pose of the camera in `frame`: x to the right of its pictures, y down, z ahead.
+        frame: "flange" or "base".
+        board: pose of the board in the base, or in the flange frame if the camera is in the base.
+        matrix: intrinsic matrix, shape (3, 3) [pixels].
+        distortion: k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
+        sigma: standard deviation of the camera's place along the axes of `frame`, shape (3,) [m].
+        sigma_angle: standard deviation of its rotation about the axes of `frame`, shape (3,) [rad].
+        residuals: root mean square distance of the corners in each view, shape (n,) [pixels].
+        predicted: the same when each view is predicted from the others, shape (n,) [pixels].
+        predicted_m: the same on the board [m].
+        worst: the view that the others predict least, from 1.
+    """
+
+    pose: Pose
+    frame: str
+    board: Pose
+    matrix: Array
+    distortion: Array
+    sigma: Array
+    sigma_angle: Array
+    residuals: Array
+    predicted: Array
+    predicted_m: Array
+    worst: int
+
+    @property
+    def guess(self) -> HandEyeGuess:
+        """Its numbers as parameters of `HandEyeModel`."""
+        (fx, _, cx), (_, fy, cy), _ = self.matrix.tolist()
+        k1, k2, p1, p2, k3 = self.distortion.tolist()
+        lens = np.array([fx, fy, cx, cy, k1, k2])
+        return HandEyeGuess(self.pose, self.board, lens, (p1, p2, k3))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square distance of all corners [pixels]."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def is_suspect(self) -> bool:
+        """Whether the worst view contradicts the others: leave it out, or take it again."""
+        return bool(self.predicted[self.worst - 1] > _SUSPECT * np.median(self.predicted))
+
+    def __str__(self) -> str:
+        """The camera with its standard deviations, and how well the views agree."""
+        place = "  ".join(
+            f"{axis} {1e3 * value:.2f} ± {1e3 * sigma:.2f}"
+            for axis, value, sigma in zip("xyz", self.pose.xyz, self.sigma, strict=True)
+        )
+        a, b, c = np.degrees(self.pose.abc)
+        worst = f"view {self.worst}: {self.predicted[self.worst - 1]:.2f} pixels"
+        fx, fy, cx, cy = self.matrix[0, 0], self.matrix[1, 1], self.matrix[0, 2], self.matrix[1, 2]
+        rows = {
+            "camera": f"{place} mm in the {self.frame}",
+            "orientation": f"a {a:.2f}  b {b:.2f}  c {c:.2f} deg "
+            f"± {math.degrees(float(np.linalg.norm(self.sigma_angle))):.3f} deg",
+            "lens": f"focal lengths {fx:.1f} {fy:.1f}, centre {cx:.1f} {cy:.1f} pixels",
+            "residuals": f"{self.rms:.2f} pixels",
+            "held out": f"{_rms(self.predicted):.2f} pixels, {1e3 * _rms(self.predicted_m):.2f} mm: each view "
+            "predicted from the others",
+            "worst": worst + (", contradicts the others: take it again" if self.is_suspect else ""),
+        }
+        return lines(f"Camera on the {self.frame} from {len(self.residuals)} views", rows)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+class HandEyeModel:
+    """Where corners of a board are in pictures, for given flanges.
+
+    Args:
+        flanges: poses of the flange in the base.
+        points: on the board, one array of shape (n, 3) for each [m].
+        frame: of the camera.
+    """
+
+    def __init__(self, flanges: Sequence[Pose], points: Sequence[Array], frame: str) -> None:
+        # board to camera: inverse of the camera @ inverse of the flange @ board, or with the flange itself
+        given = [pose.inverse() if frame == "flange" else pose for pose in flanges]
+        counts = [len(one) for one in points]
+        self.places = np.repeat(np.arange(len(given)), counts)
+        self._turns = np.array([one.rotation for one in given])
+        self._shifts = np.array([one.xyz for one in given])
+        self._points = np.concatenate([np.asarray(one) for one in points])
+
+    def seen(self, guess: HandEyeGuess) -> tuple[Array, Array]:
+        """Pixels of all corners, shape (n, 2), and their distances along the optical axis, shape (n,) [m]."""
+        at = self._in_camera(guess)[1]
+        return _projected(at, guess)[0], at[:, 2]
+
+    def _in_camera(self, guess: HandEyeGuess) -> tuple[Array, Array]:
+        """All corners in the axes of the camera's frame, from the camera's place, and in the camera, shape (n, 3)."""
+        at = self._points @ guess.board.rotation.T + guess.board.xyz
+        at = (
+            np.einsum("nij,nj->ni", self._turns[self.places], at)
+            + self._shifts[self.places]
+            - guess.camera.xyz
+        )
+        return at, at @ guess.camera.rotation
+
+    def jacobian(self, guess: HandEyeGuess, count: int) -> Array:
+        """Derivatives of the pixels by a step of so many parameters, shape (n, 2, count)."""
+        beside, at = self._in_camera(guess)
+        into, turn = guess.camera.rotation.T, self._turns[self.places]
+        on_board = self._points @ guess.board.rotation.T
+        of_points = [
+            np.broadcast_to(-into, turn.shape),
+            into @ _crossing(beside),
+            into @ turn,
+            -into @ turn @ _crossing(on_board),
+        ]
+        by_point, by_lens = _projected(at, guess)[1:]
+        of_poses = by_point @ np.concatenate(of_points, axis=2)
+        return np.concatenate([of_poses, by_lens], axis=2)[:, :, :count]
+
+
+def _crossing(vectors: Array) -> Array:
+    """Matrices that multiply a vector as the cross product with these from the left does, shape (n, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+
+
+def _projected(at: Array, guess: HandEyeGuess) -> tuple[Array, Array, Array]:
+    """Pixels of points in the camera, shape (n, 2), and their derivatives by the points and by the lens.
+
+    The lens is OpenCV's: radial distortion k1 k2 k3 and tangential p1 p2 (Brown, 1966).
+    """
+    depth = at[:, 2]
+    x, y = at[:, 0] / depth, at[:, 1] / depth
+    fx, fy, cx, cy, k1, k2 = guess.lens
+    p1, p2, k3 = guess.rest
+    r = x * x + y * y
+    radial, slope = 1.0 + r * (k1 + r * (k2 + r * k3)), k1 + r * (2.0 * k2 + r * 3.0 * k3)
+    u = x * radial + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x)
+    v = y * radial + p1 * (r + 2.0 * y * y) + 2.0 * p2 * x * y
+    du_dx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
+    dv_dy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
+    mixed = 2.0 * (x * y * slope + p1 * x + p2 * y)
+    rows = [
+        [fx * du_dx, fx * mixed, -fx * (du_dx * x + mixed * y)],
+        [fy * mixed, fy * dv_dy, -fy * (mixed * x + dv_dy * y)],
+    ]
+    by_point = np.moveaxis(np.array(rows) / depth, 2, 0)
+    none, one = np.zeros_like(x), np.ones_like(x)
+    of_lens = [
+        [u, none, one, none, fx * x * r, fx * x * r * r],
+        [none, v, none, one, fy * y * r, fy * y * r * r],
+    ]
+    return np.column_stack([fx * u + cx, fy * v + cy]), by_point, np.moveaxis(np.array(of_lens), 2, 0)
+
+
+def estimate_hand_eye(
+    views: Sequence[HandEyeView],
+    *,
+    frame: Literal["flange", "base"] = "flange",
+    matrix: npt.ArrayLike | None = None,
+    distortion: npt.ArrayLike = _NO_DISTORTION,
+    refine: bool | None = None,
+) -> HandEyeEstimate:
+    """Compute where a camera is from views of a board that stands still, or that the flange carries.
+
+    Turn the flange by 20 to 40 degrees about different axes from view to view, and let the board fill the pictures.
+
+    Args:
+        views: four or more, six to refine the lens; twelve are good.
+        frame: "flange": the camera moves with the arm; "base": it is beside the arm, and the board is on the flange.
+        matrix: intrinsic matrix, shape (3, 3) [pixels]; None: from the views.
+        distortion: k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
+        refine: estimate focal lengths, centre, k1 and k2, too; None: if there is no matrix.
+
+    Raises:
+        ShapeError: too few views, or wrong types.
+        LimitError: a value outside its range.
+        CommandRejected: the arm did not turn, or about one axis only; the views do not determine the camera.
+        MissingExtra: OpenCV or SciPy is not installed.
+    """
+    word(frame, "frame", FRAMES)
+    rest = finite_entries(numbers(distortion, "distortion"), "distortion")
+    if rest.shape != (5,):
+        raise ShapeError(
+            f"distortion must have five numbers, k1 k2 p1 p2 k3, got the shape {rest.shape}",
+            parameter="distortion",
+            value=distortion,
+        )
+    is_refined = matrix is None if refine is None else flag(refine, "refine")
+    given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
+    _check_turns([one.flange for one in given])
+    lens = first_matrix(given) if matrix is None else intrinsic(matrix)
+    seen = [_board_pose(one.sighting, lens, rest) for one in given]
+    camera = _closed_form([one.flange if frame == "flange" else one.flange.inverse() for one in given], seen)
+    first = given[0].flange if frame == "flange" else given[0].flange.inverse()
+    guess = HandEyeGuess(
+        camera,
+        first @ camera @ seen[0],
+        np.array([lens[0, 0], lens[1, 1], lens[0, 2], lens[1, 2], rest[0], rest[1]]),
+        (float(rest[2]), float(rest[3]), float(rest[4])),
+    )
+    model = HandEyeModel([one.flange for one in given], [one.sighting.points for one in given], frame)
+    pixels = np.concatenate([one.sighting.pixels for one in given])
+    count = _POSES + (_LENS if is_refined else 0)
+    for loss in ("huber", "linear"):  # a wrong corner spoils the first steps otherwise
+        guess = _solved(model, pixels, guess, count, loss)
+    return _judged(model, pixels, guess, count, frame)
+
+
+def _checked(views: Sequence[HandEyeView], fewest: int) -> list[HandEyeView]:
+    if isinstance(views, HandEyeView) or not isinstance(views, Sequence):
+        raise ShapeError(
+            f"views must be a sequence of views, got {shown(views)}", parameter="views", value=views
+        )
+    for index, one in enumerate(views):
+        instance(one, HandEyeView, f"views[{index}]")
+    if len(views) < fewest:
+        raise ShapeError(
+            f"views must be at least {fewest}, got {len(views)}",
+            parameter="views",
+            value=len(views),
+            hint="take pictures in which the board is seen from more directions",
+        )
+    return list(views)
+
+
+def _check_turns(flanges: Sequence[Pose]) -> None:
+    """Refuse flanges that turn too little to know the camera along some direction.
+
+    Raises:
+        CommandRejected: they do.
+    """
+    turns = np.array([(flanges[0].inverse() @ one).rotvec for one in flanges])
+    _, strengths, axes = np.linalg.svd(turns - turns.mean(axis=0), full_matrices=True)
+    rms = strengths / math.sqrt(len(flanges))
+    if rms[0] < _TURNED:
+        raise CommandRejected(
+            f"the flange turns by {math.degrees(rms[0]):.1f} deg between the views, and "
+            f"{math.degrees(_TURNED):.0f} deg are needed: is the arm moving?",
+            parameter="views",
+            value=float(rms[0]),
+            hint="turn it by 20 to 40 degrees about different axes",
+        )
+    if rms[1] < _TURNED:
+        axis = ", ".join(f"{one:.2f}" for one in axes[0])
+        raise CommandRejected(
+            f"the flange turns about one axis only, ({axis}) of the flange: along it the camera is not known",
+            parameter="views",
+            value=float(rms[1]),
+            hint="turn it about another axis as well, by 20 to 40 degrees",
+        )
+
+
+def first_matrix(views: Sequence[HandEyeView]) -> Array:
+    """Intrinsic matrix from the views alone (Zhang, 2000, by OpenCV)."""
+    cv: Any = require("cv2", extra="vision")
+    points = [one.sighting.points.astype(np.float32) for one in views]
+    pixels = [one.sighting.pixels.astype(np.float32).reshape(-1, 1, 2) for one in views]
+    size = views[0].sighting.size
+    flags = cv.CALIB_FIX_K3 | cv.CALIB_ZERO_TANGENT_DIST
+    return np.asarray(cv.calibrateCamera(points, pixels, size, None, None, flags=flags)[1], float)
+
+
+def board_pose(sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = _NO_DISTORTION) -> Pose:
+    """Pose of a board in the camera, from one picture (perspective-n-point, by OpenCV).
+
+    Raises:
+        MissingExtra: OpenCV is not installed.
+    """
+    return _board_pose(sighting, matrix, np.asarray(distortion, float))
+
+
+def _board_pose(sighting: Sighting, matrix: Array, distortion: Array) -> Pose:
+    cv: Any = require("cv2", extra="vision")
+    points, pixels = sighting.points.copy(), sighting.pixels.copy()
+    _, turn, shift = cv.solvePnP(points, pixels, matrix, distortion, flags=cv.SOLVEPNP_IPPE)
+    _, turn, shift = cv.solvePnP(points, pixels, matrix, distortion, turn, shift, True, cv.SOLVEPNP_ITERATIVE)
+    return Pose.from_rotvec(np.ravel(shift), np.ravel(turn))
+
+
+def _closed_form(flanges: Sequence[Pose], boards: Sequence[Pose]) -> Pose:
+    """The camera that solves A X = X B best, rotation first; A and B are moves of flange and board."""
+    pairs = [
+        (flanges[i].inverse() @ flanges[j], boards[i] @ boards[j].inverse())
+        for i in range(len(flanges))
+        for j in range(i + 1, len(flanges))
+    ]
+    mixed = np.add.reduce([np.outer(b.rotvec, a.rotvec) for a, b in pairs])
+    u, _, vt = np.linalg.svd(mixed)
+    turn = vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
+    left = np.concatenate([a.rotation - np.eye(3) for a, _ in pairs])
+    right = np.concatenate([turn @ b.xyz - a.xyz for a, b in pairs])
+    shift = np.linalg.lstsq(left, right, rcond=None)[0]
+    return Pose.from_matrix(np.column_stack([turn, shift]))
+
+
+def _solved(model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int, loss: str) -> HandEyeGuess:
+    """The parameters with the least distances in the pictures."""
+    optimize: Any = require("scipy.optimize", extra="vision")
+
+    def off(step: Array) -> Array:
+        return np.ravel(model.seen(guess.moved(step))[0] - pixels)
+
+    def slope(step: Array) -> Array:
+        return model.jacobian(guess.moved(step), count).reshape(-1, count)
+
+    scale = np.array([*[0.01] * _POSES, *[10.0] * 4, *[0.1] * 2])[:count]
+    found = optimize.least_squares(
+        off, np.zeros(count), slope, x_scale=scale, loss=loss, f_scale=_ROBUST, max_nfev=40
+    )
+    return guess.moved(found.x)
+
+
+def _judged(
+    model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int, frame: str
+) -> HandEyeEstimate:
+    """The estimate with the results of a jackknife over the views.
+
+    Raises:
+        CommandRejected: the views do not determine the camera.
+    """
+    seen, depth = model.seen(guess)
+    off, slopes = seen - pixels, model.jacobian(guess, count)
+    n, places = int(model.places[-1]) + 1, model.places
+    each = [slopes[places == view].reshape(-1, count) for view in range(n)]
+    whole = np.add.reduce([one.T @ one for one in each])
+    shifts, residuals, predicted, on_board = [], [], [], []
+    for view, slope in enumerate(each):
+        here = np.ravel(off[places == view])
+        rest = whole - slope.T @ slope
+        shift = np.linalg.lstsq(rest, slope.T @ here, rcond=1e-14)[0]
+        distances = (here + slope @ shift).reshape(-1, 2)
+        shifts.append(shift)
+        residuals.append(math.sqrt(np.mean(np.square(here)) * 2.0))
+        predicted.append(math.sqrt(np.mean(np.square(distances)) * 2.0))
+        metres = distances * (depth[places == view] / guess.lens[0])[:, None]
+        on_board.append(math.sqrt(np.mean(np.square(metres)) * 2.0))
+    apart = np.array(shifts) - np.mean(shifts, axis=0)
+    sigma = student(n - 1) * np.sqrt((n - 1) / n * np.square(apart).sum(axis=0))
+    if not np.isfinite(sigma).all() or sigma[:3].max() > _LOST or sigma[3:6].max() > _LOST_ANGLE:
+        raise CommandRejected(
+            f"the views do not determine the camera: its standard deviation would be {1e3 * sigma[:3].max():.1f} mm "
+            f"and {math.degrees(sigma[3:6].max()):.2f} deg, and {1e3 * _LOST:g} mm and "
+            f"{math.degrees(_LOST_ANGLE):g} deg are allowed",
+            parameter="views",
+            value=float(sigma[:3].max()),
+            allowed=f"at most {_LOST:g} m",
+            hint="take more views, from more directions, with the board larger in the pictures",
+        )
+    fx, fy, cx, cy, k1, k2 = guess.lens
+    return HandEyeEstimate(
+        guess.camera,
+        frame,
+        guess.board,
+        frozen(np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])),
+        frozen((k1, k2, *guess.rest)),
+        frozen(sigma[:3]),
+        frozen(sigma[3:6]),
+        frozen(residuals),
+        frozen(predicted),
+        frozen(on_board),
+        1 + int(np.argmax(predicted)),
+    )

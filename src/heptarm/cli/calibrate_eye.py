@@ -1,0 +1,205 @@
+"""`heptarm calibrate eye` and `heptarm calibrate board`: measure where a camera is, and print the board for it."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Parameter
+
+from heptarm import calibration
+from heptarm.calibration.hand_eye_motion import SPEED, VIEWS
+from heptarm.cli.options import Access, Json, Overwrite
+from heptarm.cli.output import confirm as ask_person
+from heptarm.cli.output import emit
+from heptarm.cli.record import (
+    CameraFrame,
+    CameraPlace,
+    CameraScene,
+    CameraSize,
+    CameraTarget,
+    camera_settings,
+    numbers_of,
+)
+from heptarm.errors import CommandRejected, require
+from heptarm.values.camera import Camera
+from heptarm.values.files import refuse_existing, unwritable
+
+_ACCESS = Access()
+#: The value of `--camera` for a simulated camera.
+_SIMULATED = "sim"
+
+Kind = Annotated[
+    Literal["charuco", "apriltag"],
+    Parameter(help="charuco: a chessboard with markers; apriltag: a grid of AprilTags 36h11."),
+]
+Columns = Annotated[int, Parameter(help="Squares, or tags, from left to right.")]
+Rows = Annotated[int, Parameter(help="From top to bottom.")]
+Square = Annotated[float, Parameter(help="Side of a square, or distance from tag to tag, measured [m].")]
+
+
+def board(
+    out: Annotated[Path, Parameter(help="File to write, .pdf or .png.")] = Path("board.pdf"),
+    /,
+    *,
+    kind: Kind = "charuco",
+    columns: Columns = 7,
+    rows: Rows = 5,
+    square: Square = 0.03,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> int:
+    """Write a calibration board to print in its true size.
+
+    Print it without scaling, glue it onto something flat, and measure the squares.
+
+    For example:
+
+        heptarm calibrate board board.pdf
+
+        heptarm calibrate board tags.pdf --kind apriltag --columns 4 --rows 3 --square 0.05
+    """
+    made = calibration.Board(columns, rows, square, kind)
+    file = made.save(out, overwrite=overwrite)
+    if as_json:
+        emit({"file": str(file), "size_m": list(made.size), "marker_m": made.marker})
+    else:
+        width, height = made.size
+        print(f"{made}, {1e3 * width:g} by {1e3 * height:g} mm: {file}")
+        print("print it without scaling, and measure the squares")
+    return 0
+
+
+def eye(
+    *,
+    camera: Annotated[
+        str,
+        Parameter(
+            help="Number of a camera of this computer, or the address of a stream, as OpenCV opens it; sim: a "
+            "simulated one, with the options --camera-place and so on."
+        ),
+    ],
+    frame: Annotated[
+        Literal["flange", "base"],
+        Parameter(
+            help="flange: the camera is on the flange; base: beside the arm, and the board on the flange."
+        ),
+    ] = "flange",
+    kind: Kind = "charuco",
+    columns: Columns = 7,
+    rows: Rows = 5,
+    square: Square = 0.03,
+    lens: Annotated[
+        str, Parameter(help="FX,FY,CX,CY of the camera [pixels]. Default: measured with its place.")
+    ] = "",
+    views: Annotated[int, Parameter(help="Number of postures from which pictures are taken.")] = VIEWS,
+    speed: Annotated[float, Parameter(help="Fraction of the full speed, (0, 1].")] = SPEED,
+    camera_place: CameraPlace = None,
+    camera_target: CameraTarget = None,
+    camera_frame: CameraFrame = None,
+    camera_size: CameraSize = None,
+    camera_scene: CameraScene = None,
+    out: Annotated[
+        Path | None, Parameter(name=("--out", "-o"), help="Also write the result to this file, JSON.")
+    ] = None,
+    overwrite: Overwrite = False,
+    access: Access = _ACCESS,
+) -> int:
+    """Measure where a camera is, on the flange or beside the arm, with a board that it sees.
+
+    Begin where the camera sees the whole board from the front. The arm turns a little, chooses postures that see the
+    board, and returns; what moves is shown first.
+
+    For example:
+
+        heptarm calibrate eye --camera 0 --target lab1
+
+        heptarm calibrate eye --camera 0 --frame base --kind apriltag --columns 4 --rows 3 --square 0.05 -o eye.json
+    """
+    made = calibration.Board(columns, rows, square, kind)
+    settings = camera_settings(
+        size=camera_size, place=camera_place, target=camera_target, frame=camera_frame, scene=camera_scene
+    )
+    if settings and camera != _SIMULATED:
+        raise CommandRejected(
+            "the options --camera-... are of a simulated camera",
+            parameter="camera",
+            value=camera,
+            hint="give --camera sim, or leave them out",
+        )
+    if out is not None:
+        refuse_existing(out, overwrite=overwrite, name="out")
+    matrix = _matrix(lens)
+    own: dict[str, Any] = {} if camera == _SIMULATED else {"frame": frame}
+    source: Any = Camera(**settings) if camera == _SIMULATED else _opened(camera)
+    shown_on = sys.stderr if access.as_json else sys.stdout
+    with (
+        access.target.connect(control=True, state_rate=200.0) as arm,
+        closing(arm.camera(source, **own)) as pictures,
+    ):
+
+        def confirm(plan: calibration.HandEyePlan) -> bool:
+            print(plan, file=shown_on, flush=True)
+            return arm.is_virtual or access.yes or ask_person(f"Move the real {arm.robot.title} like this?")
+
+        found = calibration.hand_eye(
+            arm, pictures, made, views=views, speed=speed, matrix=matrix, confirm=confirm
+        )
+    result = {
+        "frame": found.frame,
+        "camera": found.pose.array.tolist(),
+        "sigma_m": found.sigma.tolist(),
+        "sigma_rad": found.sigma_angle.tolist(),
+        "board": found.board.array.tolist(),
+        "matrix": found.matrix.tolist(),
+        "distortion": found.distortion.tolist(),
+        "rms_pixels": found.rms,
+        "views": len(found.residuals),
+        "suspect": found.is_suspect,
+    }
+    if out is not None:
+        _write(out, result)
+    if access.as_json:
+        emit(result)
+    else:
+        print(found)
+        print(f"written to {out}" if out is not None else "nothing is changed; -o FILE writes it to a file")
+    return 0
+
+
+def _write(out: Path, result: dict[str, Any]) -> None:
+    import json
+
+    try:
+        out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise unwritable(out, error, name="out") from None
+
+
+def _matrix(text: str) -> list[list[float]] | None:
+    """Intrinsic matrix of an option's text; None: it is to be measured."""
+    if not text:
+        return None
+    fx, fy, cx, cy = numbers_of(
+        text, "lens", ",", float, form="FX,FY,CX,CY in pixels, such as 600,600,320,240"
+    )
+    return [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+
+
+def _opened(camera: str) -> Any:
+    """What reads the next picture of a camera of this computer.
+
+    Raises:
+        CommandRejected: it cannot be opened.
+    """
+    opened = require("cv2", extra="vision").VideoCapture(int(camera) if camera.isdigit() else camera)
+    if not opened.isOpened():
+        raise CommandRejected(
+            f"the camera {camera!r} cannot be opened",
+            parameter="camera",
+            value=camera,
+            hint="give its number, from 0, the address of a stream, or sim for a simulated one",
+        )
+    return opened.read

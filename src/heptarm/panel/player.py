@@ -1,0 +1,155 @@
+"""A recording on the page of the panel: the arm as it moved, by a slider or in time; its twin as a ghost."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+from heptarm.errors import CommandRejected
+from heptarm.io.plan_box import PlanOutline
+from heptarm.panel.process import RATE, PanelOptions, open_server
+from heptarm.record.recording import Recording, load
+from heptarm.values.checks import Array
+from heptarm.values.pose import Pose
+
+#: Speeds at which a recording plays: simulated seconds per second, by their names on the page.
+SPEEDS = {"1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
+#: Steps of the slider [s], and events that are listed.
+_STEP, _EVENTS = 0.01, 5
+#: Most points of the path that is drawn.
+_POINTS = 2000
+
+
+def open_player(file: Path, options: PanelOptions) -> Player:
+    """A page that plays a file; of one that `Twin.save` wrote the twin is the ghost.
+
+    Raises:
+        CommandRejected: the file is no recording, or cannot be played.
+    """
+    try:
+        recorded = load(file, arm="recorded")
+    except CommandRejected:
+        return Player(load(file), options)
+    return Player(recorded, options, ghost=load(file, arm="simulated"))
+
+
+class Player:
+    """A page that plays a recording; nothing moves by it but the drawing.
+
+    Args:
+        recording: what is played.
+        options: of the panel; those that concern control do not matter.
+        ghost: another recording over the same time line, drawn translucent; None: none.
+
+    Attributes:
+        url: with the token, to print once.
+        server: of viser.
+
+    Raises:
+        CommandRejected: a recording has no joint positions, or is of an unknown robot; or as `Panel` does.
+    """
+
+    def __init__(
+        self, recording: Recording, options: PanelOptions, *, ghost: Recording | None = None
+    ) -> None:
+        self._recording = recording
+        self._t, self._q = _positions(recording)
+        shadow = None if ghost is None else _positions(ghost)
+        server, guard = open_server(options, {})
+        from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld
+        from heptarm.sim.plant.appearance import ArmMeshes
+        from heptarm.sim.plant.scene import Scene
+
+        self.server = server
+        robot, meshes = recording.facts["robot"], ArmMeshes.of(options.meshes)
+        scene = Scene.of(options.scene) if options.scene else None
+        self._world = DrawnWorld(server, robot, scene, None, meshes, root="/arm")
+        self._marks = DrawnMarks(server, "/arm")
+        self._ghost = DrawnGhost(server, robot, meshes, "/arm")
+        self._outline = None
+        if ghost is not None and shadow is not None:
+            path = np.asarray(ghost["xyz"] if "xyz" in ghost else np.zeros((0, 3)))
+            self._outline = PlanOutline(robot, *shadow, _thinned(path), np.zeros(0))
+        if "xyz" in recording:
+            self._marks.show_trail(_thinned(recording["xyz"]))
+        self._ended = threading.Event()
+        begin, end = float(self._t[0]), float(self._t[-1])
+        self.slider = server.gui.add_slider("time [s]", begin, max(end, begin + _STEP), _STEP, begin)
+        self.is_playing = server.gui.add_checkbox("play", True)
+        self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
+        self.events = server.gui.add_markdown("")
+        server.initial_camera.position = (1.7, -1.5, 1.15)
+        server.initial_camera.look_at = (0.15, 0.0, 0.5)
+        guard.port = server.get_port()  # from now on it lets in who has the token
+        self.url = guard.url
+        self.show(begin)
+
+    def show(self, t: float) -> None:
+        """Draw both arms at a time of the recording [s]."""
+        run, q = self._recording, _at(t, self._t, self._q)
+        self._world.show(q)
+        if "pose" in run:
+            pose = _at(t, run.t, run["pose"])
+            force = _at(t, run.t, run["force"]) if "force" in run else None
+            if not np.isnan(pose).any():
+                is_felt = force is not None and not np.isnan(force).any()
+                tcp = Pose.of(pose[:3], pose[3:] / np.linalg.norm(pose[3:]))
+                self._marks.show(tcp, self._world.flange.xpos.copy(), force if is_felt else None)
+        self._ghost.show(self._outline, t)
+        past = [event for event in run.events if event.t <= t and event.kind != "signals"]
+        self.events.content = "\n".join(
+            f"- `{event.t:.2f} s` {event.text[:120]}" for event in past[-_EVENTS:]
+        )
+
+    def step(self, seconds: float) -> None:
+        """Draw one picture, so many seconds after the last one; at the end it begins again."""
+        t = float(self.slider.value)
+        if self.is_playing.value:
+            t += seconds * SPEEDS[self._speed.value]
+            t = float(self._t[0]) if t > self._t[-1] else t
+            self.slider.value = round(t, 3)
+        with self.server.atomic():
+            self.show(t)
+
+    def run(self) -> None:
+        """Play until `close` is called."""
+        before = time.monotonic()
+        while not self._ended.wait(1.0 / RATE):
+            now = time.monotonic()
+            if self.server.get_clients():
+                self.step(now - before)
+            before = now
+
+    def close(self) -> None:
+        """End the server."""
+        self._ended.set()
+        self.server.stop()
+
+
+def _positions(recording: Recording) -> tuple[Array, Array]:
+    """Times [s], shape (n,), and joint positions [rad], shape (n, 7), where they are known."""
+    if recording.robot is None or "q" not in recording:
+        known = np.zeros(0, bool)
+    else:
+        known = ~np.isnan(recording["q"]).any(axis=1)
+    if known.sum() < 2:
+        raise CommandRejected(
+            f"{recording.path.name} cannot be played: it has fewer than 2 joint positions of a known robot",
+            parameter="play",
+            value=str(recording.path),
+            hint='record the state group "joints"',
+        )
+    return recording.t[known], recording["q"][known]
+
+
+def _at(t: float, times: Array, rows: Array) -> Array:
+    """Values at a time, linear between two rows, shape (k,)."""
+    return np.array([np.interp(t, times, column) for column in rows.T])
+
+
+def _thinned(path: Array) -> Array:
+    known = path[~np.isnan(path).any(axis=1)]
+    return known[:: max(1, len(known) // _POINTS)]

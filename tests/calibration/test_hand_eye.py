@@ -1,0 +1,267 @@
+"""Hand-eye calibration: from exact and noisy corners, from rendered boards, and on a virtual cabinet that moves."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import calibration, model
+from heptarm.calibration import Board, HandEyeView, Sighting, estimate_hand_eye
+from heptarm.calibration.hand_eye_estimate import HandEyeGuess, HandEyeModel
+from heptarm.cli.calibrate_eye import board, eye
+from heptarm.cli.options import Access, CommandTarget
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.robot import robot
+from tests.drawing import cannot_draw
+from tests.long import longer
+from tests.simulators import FASTER
+
+Frame = Literal["flange", "base"]
+BOARD = Board()
+CAMERA = ha.Pose.xyz_abc(0.03, -0.05, 0.06, *ha.deg(90, 5, -3))
+PLACE = ha.Pose.xyz_abc(0.6, 0.1, 0.0, *ha.deg(20, 0, 180))
+MATRIX = np.array([[580.0, 0, 315.0], [0, 570.0, 242.0], [0, 0, 1]])
+FLAT = (0.0, 0.0, 0.0, 0.0, 0.0)
+BENT = (0.12, -0.08, 0.001, -0.002, 0.0)
+HOME = ha.deg(0, 25, 0, -90, 0, 65, 0)
+
+
+def turned(*rotvec: float) -> ha.Pose:
+    return ha.Pose.from_rotvec((0, 0, 0), rotvec)
+
+
+def views(
+    frame: Frame = "flange",
+    *,
+    count: int = 12,
+    pixels: float = 0.0,
+    arm: float = 0.0,
+    seed: int = 1,
+    bent: tuple[float, ...] = FLAT,
+    turn: Callable[[np.random.Generator], ha.Pose] | None = None,
+) -> list[HandEyeView]:
+    """Views of a camera whose lens and place are known; noise of the corners [pixels], of the arm [m, rad]."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        tilt = turned(*rng.uniform(-0.45, 0.45, 2), rng.uniform(-1, 1)) if turn is None else turn(rng)
+        seen = ha.Pose.of((0, 0, rng.uniform(0.28, 0.4)), tilt.quat) @ ha.Pose.at(*-BOARD.centre)
+        flange = (
+            PLACE @ seen.inverse() @ CAMERA.inverse()
+            if frame == "flange"
+            else CAMERA @ seen @ PLACE.inverse()
+        )
+        lens = np.array([*MATRIX[[0, 1, 0, 1], [0, 1, 2, 2]], *bent[:2]])
+        guess = HandEyeGuess(CAMERA, PLACE, lens, (bent[2], bent[3], bent[4]))
+        at = HandEyeModel([flange], [BOARD.points], frame).seen(guess)[0]
+        at = at + rng.normal(scale=pixels, size=at.shape) if pixels else at
+        off = turned(*rng.normal(scale=arm, size=3)) if arm else turned(0, 0, 0)
+        place = flange.xyz + (rng.normal(scale=arm, size=3) if arm else 0.0)
+        found.append(
+            HandEyeView(ha.Pose.of(place, (flange @ off).quat), Sighting(BOARD.points, at, (640, 480)))
+        )
+    return found
+
+
+def errors(found: calibration.HandEyeEstimate, true: ha.Pose) -> np.ndarray:
+    """Of the place [m] and the rotation [rad], in the axes of the frame, shape (6,)."""
+    return np.concatenate([found.pose.xyz - true.xyz, (found.pose @ true.inverse()).rotvec])
+
+
+# ----------------------------------------------------------------------------------------- from corners alone
+
+
+@pytest.mark.parametrize("frame", ["flange", "base"])
+@pytest.mark.parametrize("refine", [False, True])
+def test_exact_corners_give_the_exact_camera(frame: Frame, refine: bool) -> None:
+    bent = BENT[:2] + (0.0, 0.0, 0.0) if refine else BENT
+    given: dict[str, Any] = {} if refine else {"matrix": MATRIX, "distortion": BENT}
+    found = estimate_hand_eye(views(frame, bent=bent), frame=frame, **given)
+    assert np.abs(errors(found, CAMERA)).max() < 1e-7 and found.rms < 1e-5
+    np.testing.assert_allclose(found.board.matrix, PLACE.matrix, atol=1e-7)
+    np.testing.assert_allclose(found.matrix, MATRIX, atol=1e-3)
+    np.testing.assert_allclose(found.distortion, bent, atol=1e-5)
+
+
+@pytest.mark.parametrize("frame", ["flange", "base"])
+@pytest.mark.parametrize("arm", [0.0, 1e-4], ids=["corners", "corners and arm"])
+def test_the_standard_deviations_are_honest(frame: Frame, arm: float) -> None:
+    runs, inside, sizes = longer(14, 100), 0, []
+    for seed in range(runs):
+        given = views(frame, pixels=0.1, arm=arm, seed=seed)
+        found = estimate_hand_eye(given, frame=frame, matrix=MATRIX)
+        sigma = np.concatenate([found.sigma, found.sigma_angle])
+        off = errors(found, CAMERA) / sigma
+        inside += int((np.abs(off) < 2.0).sum())
+        sizes.append(np.square(off).mean())
+    assert inside >= 0.9 * 6 * runs, "the truth is within two of them in nine of ten"
+    assert np.mean(sizes) > 0.2, "and they are not far too large"
+
+
+def test_a_wrong_view_is_named_and_the_others_predict_it() -> None:
+    given = views(pixels=0.05)
+    wrong = given[4]
+    given[4] = HandEyeView(wrong.flange.shifted(0.004), wrong.sighting)
+    found = estimate_hand_eye(given, matrix=MATRIX)
+    assert found.worst == 5 and found.is_suspect
+    assert 3e-3 < found.predicted_m[4] < 8e-3 and found.predicted[4] > found.residuals[4]
+    assert "view 5" in str(found) and "contradicts the others" in str(found)
+    good = estimate_hand_eye(views(pixels=0.05), matrix=MATRIX)
+    assert not good.is_suspect and good.predicted_m.max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("turn", "words"),
+    [
+        (lambda rng: turned(0.3, 0.2, 0.1), r"turns by 0\.0 deg .* is the arm moving\?"),
+        (lambda rng: turned(0.0, rng.uniform(-0.5, 0.5), 0.0), "about one axis only"),
+    ],
+)
+def test_an_arm_that_does_not_turn_is_refused(turn: Callable[[Any], ha.Pose], words: str) -> None:
+    with pytest.raises(CommandRejected, match=words):
+        estimate_hand_eye(views(turn=turn), matrix=MATRIX)
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    given = views()
+    rng = np.random.default_rng(0)
+    for bad, more, error, words in (
+        (given[:3], {}, ShapeError, "views must be at least 4, got 3"),
+        (given[:5], {"matrix": None}, ShapeError, "views must be at least 6, got 5"),
+        (given[0], {}, ShapeError, "views must be a sequence"),
+        ([*given, None], {}, ShapeError, r"views\[12\] must be a HandEyeView"),
+        (given, {"frame": "tool"}, ShapeError, "frame must be"),
+        (given, {"matrix": np.zeros((3, 3))}, LimitError, "focal lengths above 0"),
+        (given, {"distortion": (0, 0)}, ShapeError, "distortion must have five numbers"),
+        (
+            [HandEyeView(one.flange @ turned(*rng.normal(scale=0.3, size=3)), one.sighting) for one in given],
+            {},
+            CommandRejected,
+            "the views do not determine the camera",
+        ),
+    ):
+        with pytest.raises(error, match=words):
+            estimate_hand_eye(bad, **({"matrix": MATRIX} | more))  # type: ignore[arg-type]
+    with pytest.raises(ShapeError, match=r"sighting must be a Sighting.*board\.find"):
+        HandEyeView(PLACE, None)  # type: ignore[arg-type]
+
+
+# ------------------------------------------------------------------------------------------------- boards
+
+
+@pytest.mark.parametrize(
+    "board", [Board(), Board(4, 3, 0.05, kind="apriltag"), Board(1, 1, 0.1, kind="apriltag")]
+)
+def test_a_board_is_found_in_its_own_picture(board: Board) -> None:
+    printed = np.pad(board.picture(pixels=60), 60, constant_values=255)
+    found = board.find(printed)
+    assert found is not None and len(found) == len(board.points)
+    scale = 60 / board.square
+    np.testing.assert_allclose(found.pixels, found.points[:, :2] * scale + 60 - 0.5, atol=0.6)
+    np.testing.assert_allclose(
+        np.diff(found.pixels, axis=0).mean(), np.diff(found.points[:, :2] * scale, axis=0).mean(), atol=0.1
+    )
+    assert board.find(np.full((200, 300, 3), 200, np.uint8)) is None
+    assert board.find(np.ascontiguousarray(printed[:, ::-1])) is None, "a mirrored board is none"
+
+
+def test_a_board_is_printed_in_its_true_size(tmp_path: Path) -> None:
+    from PIL import Image
+
+    file = BOARD.save(tmp_path / "board.png")
+    with Image.open(file) as image:
+        dots = image.info["dpi"][0]
+        np.testing.assert_allclose(
+            np.array(image.size) / dots * 0.0254, np.array(BOARD.size) + 0.03, rtol=1e-3
+        )
+    assert BOARD.save(tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
+    for name, error, words in (
+        ("board.png", CommandRejected, "exists"),
+        ("board.gif", ShapeError, r"must end in \.pdf or \.png"),
+        ("no/board.png", CommandRejected, "cannot be written"),
+    ):
+        with pytest.raises(error, match=words):
+            BOARD.save(tmp_path / name)
+    with pytest.raises(LimitError, match="at most 250 markers"):
+        Board(30, 30)
+    assert str(BOARD) == "charuco board, 7 by 5 squares of 30 mm, markers of 22.2 mm"
+
+
+# -------------------------------------------------------------------------------------- with pictures, and an arm
+
+
+def scene(folder: Path, camera: ha.Camera, board: Board, frame: Frame) -> str:
+    """A board that a camera sees from the front where the arm begins; its scene as an argument of a target."""
+    flange = ha.Pose.from_matrix(model.forward(robot("iiwa14"), HOME))
+    seen = ha.Pose.at(0, 0, 0.33) @ turned(0.0, 0.0, 0.3) @ ha.Pose.at(*-board.centre)
+    at = flange @ camera.pose @ seen if frame == "flange" else flange.inverse() @ camera.pose @ seen
+    return str(board.save_scene(folder / "board.xml", at=at, on_flange=frame == "base"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frame", ["flange", pytest.param("base", marks=pytest.mark.long)])
+def test_the_arm_measures_its_camera(frame: Frame, tmp_path: Path) -> None:
+    if why := cannot_draw():
+        pytest.skip(why)
+    if frame == "flange":
+        place, target = (0.06, -0.03, 0.04), (0.05, 0.0, 0.4)
+    else:
+        place, target = (0.9, -0.2, 0.4), (0.5, 0.0, 0.4)
+    camera = ha.Camera(
+        place, target, fov=0.8, size=(400, 300), frame=frame, rate=10, noise=2.0, blur=0.6, shadows=False
+    )
+    options = f"speed={FASTER:g}&scene={scene(tmp_path, camera, BOARD, frame)}"
+    with (
+        ha.connect(f"sim://iiwa14?{options}", watchdog=5.0, timeout=30.0) as arm,
+        arm.camera(camera) as stream,
+    ):
+        arm.move(ha.ptp(HOME))
+        shown: list[str] = []
+        with pytest.raises(CommandRejected, match="not confirmed: nothing else was moved"):
+            calibration.hand_eye(arm, stream, BOARD, confirm=lambda plan: bool(shown.append(str(plan))))
+        assert "Look at the board from about here" in shown[0] and "A7" in shown[0]
+        with pytest.raises(CommandRejected, match="does not see the board from here: .* the apriltag board"):
+            calibration.hand_eye(arm, stream, Board(kind="apriltag"))
+        found = calibration.hand_eye(arm, stream, BOARD, views=10, speed=1.0)
+        np.testing.assert_allclose(arm.state.q_cmd, HOME, atol=1e-6)
+        if frame == "base":  # the command on the same cabinet
+            _command_measures_the_same(arm, camera, tmp_path)
+    off = errors(found, camera.pose)
+    assert np.linalg.norm(off[:3]) < 0.5e-3 and np.linalg.norm(off[3:]) < math.radians(0.08)
+    assert len(found.residuals) >= 9 and found.rms < 0.3 and not found.is_suspect
+
+
+def _command_measures_the_same(arm: ha.Arm, camera: ha.Camera, folder: Path) -> None:
+    arm.release_control()
+    cabinet = arm.connection.cabinet
+    assert cabinet is not None
+    target = CommandTarget(text=f"sim://{cabinet.host}:{cabinet.port}")
+    given: dict[str, Any] = {
+        f"camera_{name}": ",".join(map(str, getattr(camera, name))) for name in ("place", "target")
+    }
+    given |= {"camera_frame": "base", "camera_scene": str(folder / "board.xml"), "camera_size": "640x480"}
+    eye(camera="sim", speed=1.0, views=9, out=folder / "eye.json", access=Access(target=target), **given)
+    result = json.loads((folder / "eye.json").read_text())
+    assert result["frame"] == "base" and not result["suspect"]
+    np.testing.assert_allclose(result["camera"][:3], camera.pose.xyz, atol=1e-3)
+
+
+def test_the_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert board(tmp_path / "tags.pdf", kind="apriltag", columns=4, rows=3, square=0.05) == 0
+    assert "4 by 3 AprilTags of 50 mm, markers of 37.5 mm, 200 by 150 mm" in capsys.readouterr().out
+    for given, words in (
+        ({"camera": "/dev/nowhere.avi"}, "cannot be opened"),
+        ({"camera": "0", "camera_place": "1,0,1"}, "are of a simulated camera"),
+        ({"camera": "sim", "camera_place": "1,0"}, "camera-place must be X,Y,Z in metres"),
+        ({"camera": "sim", "lens": "600"}, "lens must be FX,FY,CX,CY in pixels"),
+        ({"camera": "sim", "out": tmp_path / "tags.pdf"}, "exists"),
+    ):
+        with pytest.raises(CommandRejected, match=words):
+            eye(**given)

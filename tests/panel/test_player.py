@@ -1,0 +1,73 @@
+"""A recording on the page: by the slider, in time, with its twin as a ghost."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.model.kinematics import forward
+from heptarm.panel.player import Player, open_player
+from heptarm.panel.process import PanelOptions
+from heptarm.record.mcap_file import merge
+from heptarm.record.recorded import RecordedEvent
+from heptarm.record.recording import Recording
+from heptarm.values.robot import robot
+
+pytest.importorskip("viser")
+
+HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
+
+
+def recording(offset: float = 0.0) -> Recording:
+    """Two seconds of a moving arm."""
+    t = np.linspace(0.0, 2.0, 201)
+    q = HOME + offset + 0.2 * np.sin(t)[:, None]
+    note = RecordedEvent(1.0, "note", "note", "half way", {"text": "half way"})
+    facts = {"robot": "iiwa14", "title": "LBR iiwa 14 R820"}
+    return Recording(Path("run.mcap"), facts, {"t": t, "q": q}, (), (note,), complete=True)
+
+
+@contextlib.contextmanager
+def played(file: Path) -> Iterator[Player]:
+    """The page of a file."""
+    player = open_player(file, PanelOptions(port=0))
+    try:
+        yield player
+    finally:
+        player.close()
+
+
+def test_a_twin_plays_with_its_ghost(tmp_path: Path) -> None:
+    file = merge(tmp_path / "both.mcap", {"recorded": recording(), "simulated": recording(0.1)})
+    with played(file) as player:
+        for t in (0.5, 1.5):
+            player.slider.value = t
+            player.is_playing.value = False
+            player.step(1.0)
+            q = HOME + 0.2 * np.sin(t)
+            assert player._world.flange.xpos == pytest.approx(forward(robot("iiwa14"), q)[:3, 3], abs=1e-5)
+            assert ("half way" in player.events.content) is (t > 1.0)
+            assert player._ghost._data.qpos[:7] == pytest.approx(q + 0.1, abs=1e-5)
+        player.is_playing.value = True
+        player.step(0.25)
+        assert player.slider.value == pytest.approx(1.75)
+        player.step(0.5)
+        assert player.slider.value == 0.0, "at its end it begins again"
+        assert "token" in player.url
+
+
+def test_what_cannot_be_played(tmp_path: Path) -> None:
+    for broken in (
+        replace(recording(), facts={"robot": "iiwa99"}),
+        replace(recording(), signals={"t": np.zeros(0), "q": np.zeros((0, 7))}),
+    ):
+        with pytest.raises(ha.CommandRejected, match="cannot be played"):
+            Player(broken, PanelOptions(port=0))
+    with pytest.raises(ha.CommandRejected, match="cannot be read"):
+        open_player(tmp_path / "none.mcap", PanelOptions(port=0))

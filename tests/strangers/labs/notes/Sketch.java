@@ -1,0 +1,1 @@
+This is not Java. Workbench does not compile it, because its folder is in no class path.

@@ -1,0 +1,255 @@
+"""Applications of our own in the habits of other labs, on one virtual cabinet, driven by clients."""
+
+from __future__ import annotations
+
+import base64
+import math
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from heptarm import _resources
+from heptarm.sim.runtime import application, moved
+from tests.cli.running import run
+from tests.long import longer
+
+pytestmark = pytest.mark.computing  # a compiler, and a program whose clock is the simulator's
+LABS = Path(__file__).parent / "labs"
+APPLICATIONS = (
+    *("Motions", "BrakeCheck", "TaughtLine", "DataEditor", "BitOrders"),
+    *("Bridge", "TouchSweep", "LcmLikeBridge", "OldServer"),
+)
+#: Largest deviation of a joint from its target [rad].
+MILLIRADIAN = 1e-3
+#: Simulated seconds per second: a servo motion waits for the next target of its client, so time must not fly.
+SPEED = "10"
+MAGIC = 0x4C433032
+PATIENCE = 240.0
+
+LCM_TARGETS = ((0.1, 0.5, 0.1, -1.2, 0.1, 0.9, 0.1), (-0.15, 0.45, 0.0, -1.4, 0.0, 1.0, -0.2))
+OLD_TARGETS = ((0.02, 0.42, 0.0, -1.28, 0.0, 1.02, 0.02), (0.05, 0.45, 0.02, -1.25, 0.02, 1.05, 0.05))
+#: Where each application leaves the arm.
+ENDS = {
+    "Motions": (0.0, math.radians(30), 0.0, math.radians(-70), 0.0, math.radians(80), 0.0),
+    "BrakeCheck": (0.1, 0.4, 0.0, -1.2, 0.0, 0.8, 0.0),
+    "DataEditor": (0.2, 0.5, 0.1, -1.5, 0.0, 0.9, 0.0),
+    "BitOrders": (0.3, 0.3, 0.0, -1.2, 0.0, 0.9, 0.2),
+    "Bridge": (-0.2, 0.5, 0.1, -1.2, 0.1, 1.1, -0.1),
+    "TouchSweep": (0.3, 0.4, 0.2, -1.3, 0.1, 1.0, 0.4),
+    "LcmLikeBridge": LCM_TARGETS[-1],
+    "OldServer": OLD_TARGETS[-1],
+}
+#: What else they report.
+SAID = (
+    "Motions true",
+    "BrakeCheck true",
+    "TaughtLine /Table/P1 P1 /Table/P2 P2 pick left tray true true place true true true true",
+    "DataEditor true true true true true",
+    "BitOrders Done:BOOLEAN:1:false Step:UNSIGNED_INTEGER:4 2 true",
+    "Bridge true",
+    "TouchSweep true true true",
+)
+
+
+class Report:
+    """The file that the applications write."""
+
+    def __init__(self, file: Path, process: subprocess.Popen[str]) -> None:
+        self._file, self._process = file, process
+
+    def lines(self) -> list[str]:
+        return self._file.read_text().splitlines() if self._file.exists() else []
+
+    def until(self, beginning: str) -> str:
+        """The rest of the line with this beginning; waits for it."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline and self._process.poll() is None:
+            found = next((one for one in self.lines() if one.startswith(beginning)), None)
+            if found is not None:
+                return found.removeprefix(beginning)
+            time.sleep(0.02)
+        raise AssertionError(f"no line {beginning!r}: {self.lines()}")
+
+
+def near(found: tuple[float, ...], target: tuple[float, ...]) -> bool:
+    return max(abs(a - b) for a, b in zip(found, target, strict=True)) < MILLIRADIAN
+
+
+def drive_by_datagrams(report: Report) -> None:
+    port = int(report.until("LcmLikeBridge port ").split()[0])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pc:
+        pc.settimeout(PATIENCE)
+        pc.sendto(b"not for it", ("127.0.0.1", port))
+        for sequence, target in enumerate(LCM_TARGETS):
+            pc.sendto(struct.pack(">ii7d", MAGIC, sequence, *target), ("127.0.0.1", port))
+            magic, answered, *joints = struct.unpack(">ii7d", pc.recv(256))
+            assert (magic, answered) == (MAGIC, sequence)
+            assert near(tuple(joints), target)
+        pc.sendto(struct.pack(">ii", MAGIC, -1), ("127.0.0.1", port))
+
+
+def drive_by_lines(report: Report) -> None:
+    port = int(report.until("OldServer port "))
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as pc, pc.makefile("rwb") as stream:
+
+        def ask(words: str) -> bytes:
+            stream.write(base64.b64encode(words.encode()) + b"\n")
+            stream.flush()
+            return stream.readline()
+
+        assert ask("dance").split() == [b"unknown"]
+        for target in OLD_TARGETS:
+            assert ask("joints " + " ".join(map(str, target))).split() == [b"ok"]
+        ask("end")
+
+
+def listen(pc: socket.socket, heard: list[tuple[float, ...]]) -> Callable[[Report], None]:
+    def until_it_ends(report: Report) -> None:
+        report.until("Bridge -")
+        pc.settimeout(0.0)
+        while True:
+            try:
+                words = pc.recv(1024).decode().split()
+            except BlockingIOError:
+                return
+            assert words[0] == "joint_states"
+            heard.append(tuple(map(float, words[1:])))
+
+    return until_it_ends
+
+
+def test_applications_of_other_labs_run_and_are_driven_to_a_milliradian(tmp_path: Path) -> None:
+    out, file = tmp_path / "classes", tmp_path / "report.txt"
+    compiled = application.survey(LABS, out)
+    assert compiled.failed == ()
+    medley = next(one for one in compiled.applications if one.main == "labs.Medley")
+    assert {f"labs.{name}" for name in APPLICATIONS} < {one.main for one in compiled.applications}
+    heard: list[tuple[float, ...]] = []
+    failures: list[BaseException] = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pc:
+        pc.bind(("127.0.0.1", 0))
+        data = {
+            "lab.file": str(file),
+            "lab.applications": " ".join(APPLICATIONS),
+            "lab.port": str(pc.getsockname()[1]),
+        }
+        project = tmp_path / "RoboticsAPI.data.xml"
+        port = f'<processData dataType="java.lang.Integer" id="lab.port" value="{data["lab.port"]}"/>'
+        assert medley.project is not None
+        project.write_text(
+            medley.project.read_text().replace("<processDataContainer>", f"<processDataContainer>{port}")
+        )
+        command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--application", "labs.Medley"]
+        command += ["--classpath", str(out), "--speed", SPEED, "--project", str(project)]
+        command += ["--station", str(medley.station)]
+        for name, value in data.items():
+            command += ["--data", f"{name}={value}"]
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ) as cabinet:
+            report = Report(file, cabinet)
+
+            def guarded(drive: Callable[[Report], None]) -> None:
+                try:
+                    drive(report)
+                except BaseException as error:  # shown by the test, whose other threads go on
+                    failures.append(error)
+                    cabinet.kill()
+
+            drivers = (drive_by_datagrams, drive_by_lines, listen(pc, heard))
+            threads = [threading.Thread(target=guarded, args=(one,)) for one in drivers]
+            late = threading.Timer(2 * PATIENCE, cabinet.kill)
+            for thread in (*threads, late):
+                thread.start()
+            log = cabinet.communicate()[0]
+            late.cancel()
+            for thread in threads:
+                thread.join()
+    assert failures == [], log
+    assert cabinet.returncode == 0, log
+    lines = report.lines()
+    assert [one for one in lines if one.startswith("ended ")] == [f"ended {one} null" for one in APPLICATIONS]
+    for said in SAID:
+        assert said in lines
+    for name, target in ENDS.items():
+        found = next(
+            one.split()[1:] for one in reversed(lines) if one.startswith(f"{name} ") and len(one.split()) == 8
+        )
+        assert near(tuple(map(float, found)), target), name
+    assert len(heard) > 1
+    assert near(heard[-1], ENDS["Bridge"])
+
+
+def test_a_folder_of_projects_is_surveyed_class_by_class(tmp_path: Path) -> None:
+    sources = tmp_path / "lab" / "one" / "src" / "app"
+    sources.mkdir(parents=True)
+    begin = "package app; import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;\n"
+    good = "public class Good extends RoboticsAPIApplication { public void run() { } }"
+    (sources / "Good.java").write_text(begin + good)
+    bad = (
+        "import com.google.flatbuffers.Table; public class Inertia extends Table { FlatBufferBuilder builder; "
+        "com.kuka.roboticsAPI.deviceModel.LBR lbr; void run() { lbr.dance(); } }"
+    )
+    (sources / "Inertia.java").write_text(f"package app; {bad}")
+    throws = good.replace("Good", "Throws").replace(
+        "{ }", '{ throw new IllegalStateException("no gripper"); }'
+    )
+    (sources / "Throws.java").write_text(begin + throws)
+    found = run("check", "--projects", str(tmp_path / "lab"), "--run", str(longer(0, 60)))
+    assert found.returncode == 1
+    if longer(False, True):  # two cabinets
+        assert "ended    lab/one: app.Good" in found.stdout
+        assert "fails    lab/one: app.Throws  java.lang.IllegalStateException: no gripper" in found.stdout
+    else:
+        assert "compiles lab/one: app.Good" in found.stdout
+    assert "fails    lab/one: app.Inertia  package com.google.flatbuffers does not exist" in found.stdout
+    assert "name the jar of com.google.flatbuffers with --jar" in found.stdout
+    assert "method dance() of com.kuka.roboticsAPI.deviceModel.LBR" in found.stdout
+    assert (
+        "FlatBufferBuilder" not in found.stdout
+    )  # what follows from the missing jar, and is none of Sunrise's
+    assert "0 of 1 projects compile wholly; 2 of 3 classes" in found.stdout
+
+
+def test_names_of_older_releases_are_read_as_those_of_today() -> None:
+    old = (
+        "package lab;\n"
+        "import com.kuka.roboticsAPI.motionModel.*; // SmartServoLIN is not used\n"
+        "import com.kuka.connectivity.fri.FRISession;\n"
+        "import sun.misc.BASE64Encoder;\n"
+        "import com.kuka.connectivity.fri.example.FRIIOGroup;\n"
+        "class A { SmartServo s; PTP p; com.kuka.roboticsAPI.motionModel.DirectServo d; BASE64Encoder e; }\n"
+    )
+    new = moved.renamed(old, frozenset(), lambda text: text.replace("// SmartServoLIN is not used", ""))
+    motions = "com.kuka.connectivity.motionModel"
+    assert new.splitlines() == [
+        "package lab;",
+        f"import com.kuka.roboticsAPI.motionModel.*; import {motions}.smartServo.SmartServo; "
+        f"import {motions}.directServo.DirectServo; // SmartServoLIN is not used",
+        "import com.kuka.connectivity.fastRobotInterface.FRISession;",
+        "import heptarm.doubles.jre.BASE64Encoder;",
+        "import com.kuka.connectivity.fri.example.FRIIOGroup;",
+        f"class A {{ SmartServo s; PTP p; {motions}.directServo.DirectServo d; BASE64Encoder e; }}",
+    ]
+    own = frozenset({"sun.misc.BASE64Encoder", "com.kuka.connectivity.fri.FRISession"})
+    kept = moved.renamed(old, own, lambda text: text)
+    assert "import sun.misc.BASE64Encoder;" in kept
+    assert "import com.kuka.connectivity.fri.FRISession;" in kept
+
+
+def test_the_doubles_have_each_class_that_moved() -> None:
+    offered = set()
+    for jar in _resources.jars():
+        with zipfile.ZipFile(jar) as file:
+            offered |= set(file.namelist())
+    for _, package, names in moved.MOVED:
+        for name in names.split():
+            assert f"{package.replace('.', '/')}/{name}.class" in offered

@@ -1,0 +1,1 @@
+"""Tests of the twin: recordings that the virtual cabinet repeats."""
