@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any
@@ -26,22 +25,28 @@ HERE, THERE = np.radians([-40, 50, 0, -80, 0, 50, 0]), np.radians([40, 50, 0, -8
 
 
 class Client:
-    """Calls a function at the first feedback of a moving arm."""
+    """Lets the arm creep until it has begun to move, then calls a function, and lets it go on at full speed."""
 
-    def __init__(self, at_first: Callable[[], None]) -> None:
-        self._at_first, self.states = at_first, list[str]()
-        self.is_cancelled = threading.Event()
+    def __init__(self, context: NodeContext, *, at_first: Callable[[Client], None]) -> None:
+        self._arm, self._at_first = context.arm, at_first
+        self.states, self._is_first, self._is_cancelled = list[str](), True, False
+        self._arm.set_override(0.05)
 
     def publish_feedback(self, fields: Mapping[str, Any]) -> None:
         """Take feedback."""
         self.states.append(fields["state"])
-        if fields.get("progress", 0.0) > 0.05 and self._at_first is not None:
-            first, self._at_first = self._at_first, lambda: None
-            first()
+        if self._is_first and fields.get("progress", 0.0) > 0.001:
+            self._is_first = False
+            self._at_first(self)
+            self._arm.set_override(1.0)
+
+    def cancel(self) -> None:
+        """Request to cancel the goal."""
+        self._is_cancelled = True
 
     def is_cancel_requested(self) -> bool:
         """Whether the goal is to be cancelled."""
-        return self.is_cancelled.is_set()
+        return self._is_cancelled
 
 
 @pytest.fixture
@@ -65,7 +70,7 @@ def goal(**fields: Any) -> Any:
 
 def test_the_arm_goes_around_points_that_come_into_its_way(context: NodeContext) -> None:
     middle = forward(context.arm.robot, np.radians([15, 50, 0, -80, 0, 50, 0]))[:3, 3]
-    client = Client(lambda: scene.points(context, cloud([middle])))
+    client = Client(context, at_first=lambda _: scene.points(context, cloud([middle])))
     result = plan_and_execute(context, goal())(client)
     assert result.outcome is GoalOutcome.SUCCEEDED and "around what came into the way" in result.text
     assert {"planning", "moving"} == set(client.states) and result.fields["residual"] < 0.01
@@ -74,13 +79,11 @@ def test_the_arm_goes_around_points_that_come_into_its_way(context: NodeContext)
 
 def test_where_there_is_no_way_any_more_or_the_goal_is_cancelled_the_arm_rests(context: NodeContext) -> None:
     there = forward(context.arm.robot, THERE)[:3, 3]
-    client = Client(lambda: scene.points(context, cloud([there])))
+    client = Client(context, at_first=lambda _: scene.points(context, cloud([there])))
     result = plan_and_execute(context, goal())(client)
     assert result.outcome is GoalOutcome.ABORTED and result.fields["reason"] == "goal", result
     scene.points(context, cloud(np.zeros((0, 3))))
-    client = Client(lambda: None)
-    client._at_first = client.is_cancelled.set
+    client = Client(context, at_first=Client.cancel)
     result = plan_and_execute(context, goal())(client)
     assert result.outcome is GoalOutcome.CANCELED, result
-    rest = context.arm.wait_for_rest(timeout=60.0)
-    assert abs(rest.q - THERE).max() > 0.1
+    assert abs(context.arm.wait_for_rest(timeout=60.0).q - THERE).max() > 0.1

@@ -43,7 +43,7 @@ _MOST_FORCES, _MOST_PLACES = 1000, 1500
 _STEP = 0.002
 #: Name of the place where a path to the handle ends.
 _HANDLE = "the handle"
-#: Joint positions that a search reaches after it has found a path, for faster ones: they take it half a second.
+#: Joint positions that a search reaches after it has found a path, for faster ones; about half a second.
 _IMPROVE = 300
 #: For so long a ghost stays at the end of its plan [s].
 _PAUSE = 1.0

@@ -65,7 +65,7 @@ def plan_and_execute(context: NodeContext, goal: Any) -> GoalWork:
         driver = context.driver
         follow = partial(
             context.arm.follow,
-            replace(path, world=context.world.model),
+            path,
             speed=_speed(context, goal),
             until=driver.guard if until is None else until,
             then=then,
@@ -96,10 +96,9 @@ def _moved(
         client.publish_feedback({"state": "moving", "progress": done[-1]})
 
     error = wait_for_task(task, client, report)
-    if isinstance(error, NoPath):
-        return replace(_not_found(error, client), fields={**_fields(path), "reason": error.reason})
     if error is not None:
-        return replace(result_of_failed_task(task, client, error), fields=_fields(path))
+        why = {"reason": error.reason} if isinstance(error, NoPath) else {}
+        return replace(result_of_failed_task(task, client, error), fields={**_fields(path), **why})
     found: FollowedPath = task.result()
     result = ended(found.result, cancelled=client.is_cancel_requested())
     last = found.detours[-1].path if found.detours else path

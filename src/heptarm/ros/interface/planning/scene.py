@@ -244,6 +244,8 @@ def cloud_of(message: Any) -> Array:
     Raises:
         ShapeError: it has no coordinates, or not as many bytes as it should.
     """
+    if not message.width * message.height:
+        return frozen(np.zeros((0, 3)))  # some drivers leave out the fields, too
     order, fields = ">" if message.is_bigendian else "<", {one.name: one for one in message.fields}
     kinds = [_FLOATS.get(fields[name].datatype) if name in fields else None for name in "xyz"]
     if None in kinds:
@@ -328,8 +330,8 @@ def _frame_of(context: NodeContext, header: Any) -> Pose:
 
 def scene_fields(context: NodeContext) -> dict[str, Any]:
     """Fields of a moveit_msgs/PlanningScene: the bodies that were added, and the state of the arm."""
-    bodies = context.world.bodies
-    bodies = {name: body for name, body in bodies.items() if body.cloud is None}  # it has no such message
+    added = context.world.bodies
+    bodies = {name: body for name, body in added.items() if body.cloud is None}  # clouds have no such message
     loose = [_object(context, name, body, context.base) for name, body in bodies.items() if not body.is_held]
     flange = context.driver.configuration.links[0]
     held = []

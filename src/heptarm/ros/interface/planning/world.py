@@ -119,7 +119,7 @@ class NodeWorld:
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._model: CollisionModel | None = None
         self._bodies: Mapping[str, SceneBody] = MappingProxyType({})
 
@@ -132,7 +132,14 @@ class NodeWorld:
             MissingExtra: the models of bodies are not installed.
         """
         with self._lock:
-            return self._made()
+            if self._model is None:
+                values = self._driver.configuration.values
+                self._model = CollisionModel(
+                    self._driver.arm.robot.name,
+                    scene=values["planning.scene"],
+                    margin=values["planning.margin"],
+                )
+            return self._model
 
     @property
     def bodies(self) -> Mapping[str, SceneBody]:
@@ -145,7 +152,8 @@ class NodeWorld:
         Raises:
             HeptarmError: as `model`.
         """
-        return WorldDraft(self.model.carrying(None), self._bodies)
+        with self._lock:
+            return WorldDraft(self.model.carrying(None), self._bodies)
 
     @contextlib.contextmanager
     def changing(self) -> Iterator[WorldDraft]:
@@ -155,15 +163,7 @@ class NodeWorld:
             HeptarmError: as `model`.
         """
         with self._lock:
-            draft = WorldDraft(self._made().carrying(None), self._bodies)
+            draft = self.draft()
             yield draft
-            self._made().become(draft.model)
+            self.model.become(draft.model)
             self._bodies = MappingProxyType(draft.bodies)
-
-    def _made(self) -> CollisionModel:
-        if self._model is None:
-            values = self._driver.configuration.values
-            self._model = CollisionModel(
-                self._driver.arm.robot.name, scene=values["planning.scene"], margin=values["planning.margin"]
-            )
-        return self._model
