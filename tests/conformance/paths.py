@@ -90,11 +90,11 @@ def case_a_path_is_found_around_a_wall_and_moved_along(probe: Probe, stage: Stag
     home(probe)
 
 
-def case_a_path_goes_around_points_that_come_into_its_way(probe: Probe, stage: Stage) -> None:
+def case_a_path_goes_around_points_that_appear_on_it(probe: Probe, stage: Stage) -> None:
     home(probe)
     assert not world(probe)
     goal = probe.make("heptarm_msgs/PathGoal", position=THERE)
-    done(probe.call("set_override", "SetNumber", value=0.1))  # until the arm has seen what comes into its way
+    done(probe.call("set_override", "SetNumber", value=0.1))  # until the points are there
     sent = probe.send("plan_and_execute", "PlanAndExecute", goals=[goal], timeout=SEARCH, speed=0.3)
     until(lambda: any(one.progress > 0.02 for one in sent.reported), "the arm does not move")
     x, y, z = forward(robot("iiwa14"), [np.radians(35.0), *HOME[1:]])[:3, 3]

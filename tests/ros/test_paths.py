@@ -68,7 +68,7 @@ def goal(**fields: Any) -> Any:
     return SimpleNamespace(**given | fields)
 
 
-def test_the_arm_goes_around_points_that_come_into_its_way(context: NodeContext) -> None:
+def test_the_arm_goes_around_points_that_appear_on_its_path(context: NodeContext) -> None:
     middle = forward(context.arm.robot, np.radians([15, 50, 0, -80, 0, 50, 0]))[:3, 3]
     client = Client(context, at_first=lambda _: scene.points(context, cloud([middle])))
     result = plan_and_execute(context, goal())(client)
