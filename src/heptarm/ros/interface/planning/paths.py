@@ -95,10 +95,10 @@ def _moved(
     def report() -> None:
         client.publish_feedback({"state": "moving", "progress": done[-1]})
 
-    error = wait_for_task(task, client, report)
-    if error is not None:
-        why = {"reason": error.reason} if isinstance(error, NoPath) else {}
-        return replace(result_of_failed_task(task, client, error), fields={**_fields(path), **why})
+    failure = wait_for_task(task, client, report)
+    if failure is not None:
+        why = {"reason": failure.reason} if isinstance(failure, NoPath) else {}
+        return replace(result_of_failed_task(task, client, failure), fields={**_fields(path), **why})
     found: FollowedPath = task.result()
     result = ended(found.result, cancelled=client.is_cancel_requested())
     last = found.detours[-1].path if found.detours else path
