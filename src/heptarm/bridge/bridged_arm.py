@@ -22,13 +22,14 @@ from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
-from heptarm.values.result import Cause
+from heptarm.values.result import Cause, Result
 from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.bridge")
 
-#: Time between two times that the newest target is sent, and the watchdog of these targets [s].
-_AGAIN, _WATCHDOG = 0.1, 1.0
+#: Time between two times that the newest target is sent, and the watchdog of these targets, the longest that there is:
+#: it ends the motion of a bridge that hangs; the loss of its connection ends that of one that dies [s].
+_AGAIN, _WATCHDOG = 0.1, 2.0
 #: Targets per second that programs send [Hz]: trajectories to a target take a period and 5 ms.
 _RATE = 50.0
 #: Longest wait for the end of a motion that brakes, and time between two looks for an interruption [s].
@@ -65,26 +66,25 @@ class BridgedArm:
         self._handle = self.arm.start(motion, mode=mode, until=until, when="replace")
         return self._handle
 
-    def finish(self, handle: MotionHandle, *, interrupted: Callable[[], bool]) -> None:
+    def finish(self, handle: MotionHandle, *, interrupted: Callable[[], bool]) -> Result:
         """Wait for the end of a motion; end it as soon as it is interrupted.
 
         Args:
             handle: of the motion.
-            interrupted: looks whether the program stops it; may raise, which ends it as well.
+            interrupted: looks whether the program stops it, or has gone.
+
+        Returns:
+            How it ended.
 
         Raises:
-            HeptarmError: it was ended early, or what `interrupted` raises.
+            HeptarmError: it was ended early.
         """
         ended = threading.Event()
         handle.add_done_callback(lambda _: ended.set())
-        try:
-            while not ended.wait(_LOOK):
-                if interrupted():
-                    self.halt()
-        except BaseException:
-            self.halt()
-            raise
-        handle.wait()
+        while not ended.wait(_LOOK):
+            if interrupted():
+                self._end_motion()
+        return handle.wait()
 
     def follow(
         self,

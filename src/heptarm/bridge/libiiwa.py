@@ -34,6 +34,7 @@ from heptarm.errors import (
     ConnectionLost,
     HeptarmError,
     LimitError,
+    MotionAborted,
     ShapeError,
 )
 from heptarm.io import tcp
@@ -49,6 +50,8 @@ from heptarm.values.motion.line import lin
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose
+from heptarm.values.result import Cause
+from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.bridge")
 
@@ -92,6 +95,10 @@ class LibiiwaServer:
         self._tools = tuple(tools)
         self._error = NO_ERROR
         self._logged = ""
+        self._measured: tuple[int, list[float]] = (
+            -1,
+            [],
+        )  # stamp of the newest state, and its part of the answer
         self._interrupted: Callable[[], bool] = lambda: False
         # what its settings are
         self._servo = self._synchronous = False
@@ -113,13 +120,13 @@ class LibiiwaServer:
 
         Args:
             request: eight numbers.
-            interrupted: looks, during a synchronous motion, whether the program stops it; may raise, which stops it.
+            interrupted: looks, during a synchronous motion, whether the program stops it.
 
         Returns:
             The 38 numbers of the answer.
 
         Raises:
-            ConnectionLost: the cabinet cannot be reached, or what `interrupted` raises.
+            ConnectionLost: the cabinet cannot be reached.
         """
         self._interrupted = interrupted
         code, arguments = _code(request[0]), [float(value) for value in request[1:]]
@@ -158,9 +165,21 @@ class LibiiwaServer:
     def _state(self) -> list[float]:
         """The answer without its status."""
         state = self._arm.state
-        wrench = self._arm.wrench(FLANGE, axes=FLANGE, state=state)
+        if state.stamp != self._measured[0]:  # a program asks more often than the cabinet measures
+            self._measured = state.stamp, self._measurements(state)
         safety = state.groups.safety
         fired = self._bridged.has_fired()
+        return [
+            *self._measured[1],
+            float(self._error),
+            float(fired),
+            float(safety is not None and safety.ready_to_move),
+            float(self._bridged.moves(state)),
+        ]
+
+    def _measurements(self, state: State) -> list[float]:
+        """Joints, pose of the motion frame, force and torque at the flange in its axes."""
+        wrench = self._arm.wrench(FLANGE, axes=FLANGE, state=state)
         return [
             *state.q.tolist(),
             *np.nan_to_num(state.dq).tolist(),
@@ -169,10 +188,6 @@ class LibiiwaServer:
             *state.pose.abc.tolist(),
             *wrench.force.tolist(),
             *wrench.torque.tolist(),
-            float(self._error),
-            float(fired),
-            float(safety is not None and safety.ready_to_move),
-            float(self._bridged.moves(state)),
         ]
 
     # ---------------------------------------------------------------------------------- motions
@@ -230,15 +245,20 @@ class LibiiwaServer:
     def _start(self, motion: Motion) -> None:
         handle = self._bridged.start(motion, mode=self._control_mode(), until=self._until())
         if self._synchronous:
-            self._bridged.finish(handle, interrupted=self._interrupted)
+            result = self._bridged.finish(handle, interrupted=self._interrupted)
+            if result.cause not in (Cause.FINISHED, Cause.CONDITION):
+                raise MotionAborted(
+                    f"the motion has not reached its target: {result.cause.value}", result=result
+                )
         else:
             handle.add_done_callback(self._on_end)
 
     def _on_end(self, handle: MotionHandle) -> None:
         """Keep the failure of an asynchronous motion."""
-        if handle.error is not None:
+        error = handle.error
+        if error is not None and getattr(error, "cause", None) is not Cause.STOPPED:
             self._error = ASYNCHRONOUS_ERROR
-            self._log(f"the motion has failed: {handle.error}")
+            self._log(f"the motion has failed: {error}")
 
     def _stream_settings(self, kind: str) -> dict[str, Any]:
         limits = (
@@ -265,8 +285,8 @@ class LibiiwaServer:
         self._joint[name] = within(arguments[0], name, 0.0, 1.0, above=True)
 
     def _set_path_limit(self, name: str, arguments: list[float]) -> None:
-        value = within(arguments[0] / 1000.0, name, 0.0, np.finfo(float).max, above=True)
-        self._path[name] = min(value, _PATH_LIMITS[name])
+        most = _PATH_LIMITS[name]
+        self._path[name] = within(min(arguments[0] / 1000.0, most), name, 0.0, most, above=True)
 
     def _set_force_condition(self, arguments: list[float]) -> None:
         self._forces = tuple(
@@ -580,8 +600,12 @@ def _converse(peer: Peer, server: LibiiwaServer, over: threading.Event) -> str:
     precision = 0
 
     def interrupted() -> bool:
-        with_more = peer.receive(wait=False)
-        return with_more and _code(struct.unpack_from("!" + _PRECISIONS[precision], peer.waiting)[0]) == _STOP
+        try:
+            peer.receive(wait=False)
+        except ConnectionLost:
+            return True
+        letter, waiting = _PRECISIONS[precision], peer.waiting
+        return len(waiting) >= precision and _code(struct.unpack_from(f"!{letter}", waiting)[0]) == _STOP
 
     while not over.is_set():
         try:
