@@ -18,7 +18,7 @@ from heptarm.bridge.libiiwa import LibiiwaServer, serve_libiiwa
 from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
 
 #: A servo motion lives by targets in real time.
-SPEED = 2.0
+SPEED = 1.0
 PATIENCE = 60.0
 NAN = math.nan
 HOME = [0.0, math.radians(30), 0.0, -math.pi / 2, 0.0, math.radians(60), 0.0]
@@ -83,7 +83,8 @@ class Program:
 @contextmanager
 def bridge(arm: Arm, port: int) -> Iterator[list[str]]:
     """A bridge to a port, and what it reports."""
-    ended, reports = threading.Event(), []
+    ended = threading.Event()
+    reports: list[str] = []
     thread = threading.Thread(
         target=serve_libiiwa, args=(arm,), kwargs={"port": port, "on_change": reports.append, "ended": ended}
     )

@@ -16,7 +16,7 @@ from typing import Any, Literal
 from heptarm.arm.arm import Arm
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.motion.servo import Servo
-from heptarm.errors import HeptarmError, NotReady
+from heptarm.errors import HeptarmError, NotReady, StaleState
 from heptarm.values.checks import Array
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
@@ -188,6 +188,18 @@ class BridgedArm:
 
     # ------------------------------------------------------------------------------------ state
 
+    def state(self) -> State:
+        """The newest state; on a machine that is busy or a network that stutters, the next one.
+
+        Raises:
+            Timeout: none comes.
+            ConnectionLost: the connection to the cabinet has ended.
+        """
+        try:
+            return self.arm.state
+        except StaleState:
+            return self.arm.wait_until(lambda _: True, timeout=_BRAKING)
+
     def has_fired(self) -> bool:
         """Look whether a condition has ended the last motion or servo motion."""
         servo, handle = self._servo, self._handle
@@ -197,7 +209,9 @@ class BridgedArm:
         return self._fired is not None or (result is not None and result.cause is Cause.CONDITION)
 
     def moves(self, state: State) -> bool:
-        """Whether a motion or a servo motion runs, as this state or a newer command has it."""
+        """Whether a motion or a servo motion of the program runs; also while this state is older than its end."""
         servo, handle = self._servo, self._handle
-        running = (servo is not None and servo.active) or (handle is not None and not handle.done)
-        return running or (state.motion is not None and state.motion.active)
+        if (servo is not None and servo.active) or (handle is not None and not handle.done):
+            return True
+        result = None if handle is None else handle.result
+        return result is not None and result.state is not None and state.stamp < result.state.stamp

@@ -164,7 +164,7 @@ class LibiiwaServer:
 
     def _state(self) -> list[float]:
         """The answer without its status."""
-        state = self._arm.state
+        state = self._bridged.state()
         if state.stamp != self._measured[0]:  # a program asks more often than the cabinet measures
             self._measured = state.stamp, self._measurements(state)
         safety = state.groups.safety
@@ -196,7 +196,7 @@ class LibiiwaServer:
         self._bridged.stop()
 
     def _joint_position(self, arguments: list[float]) -> None:
-        here, target = self._arm.state.q_cmd, np.array(arguments)
+        here, target = self._bridged.state().q_cmd, np.array(arguments)
         target = np.where(np.isnan(target), here, target)
         robot = self._arm.robot
         near = target.clip(robot.q_min, robot.q_max)
@@ -205,7 +205,7 @@ class LibiiwaServer:
         self._move(near, lambda: ptp(near, **self._joint))  # type: ignore[arg-type]
 
     def _cartesian_pose(self, arguments: list[float]) -> None:
-        here = self._arm.state.pose_cmd
+        here = self._bridged.state().pose_cmd
         kept = [*here.xyz.tolist(), *here.abc.tolist()]
         given = [*(value / 1000.0 for value in arguments[:3]), *arguments[3:6]]
         numbers = [old if isnan(new) else new for old, new in zip(kept, given, strict=True)]
@@ -222,7 +222,7 @@ class LibiiwaServer:
     def _circular_motion(self, arguments: list[float]) -> None:
         if self._servo:
             raise CommandRejected("the servo interface has no circles", parameter="control_interface")
-        turn = self._arm.state.pose_cmd.quat
+        turn = self._bridged.state().pose_cmd.quat
         via, end = (
             Pose.of([value / 1000.0 for value in point], turn) for point in (arguments[:3], arguments[3:6])
         )
@@ -313,7 +313,8 @@ class LibiiwaServer:
             self._bridged.change(self._control_mode())
 
     def _set_additional_force(self, arguments: list[float]) -> None:
-        self._cartesian = replace(self._cartesian, additional_force=_six(arguments))
+        acting: Any = _six(arguments)
+        self._cartesian = replace(self._cartesian, additional_force=acting)
 
     def _set_max_force(self, arguments: list[float]) -> None:
         limits = _limits(_six(arguments), _NO_LIMIT)
@@ -330,7 +331,8 @@ class LibiiwaServer:
         )
 
     def _set_joint_impedance(self, name: str, arguments: list[float]) -> None:
-        self._joints = replace(self._joints, **{name: arguments})
+        values: dict[str, Any] = {name: arguments}
+        self._joints = replace(self._joints, **values)
 
     def _set_sine(self, name: str, value: Any) -> None:
         SineImpedance(**{name: value})  # refuses what is outside its range
@@ -394,7 +396,7 @@ class LibiiwaServer:
     def _set_tool(self, arguments: list[float]) -> None:
         number = _code(arguments[0])
         if number < 0:
-            if self._arm.state.tool:
+            if self._bridged.state().tool:
                 self._arm.detach_tool()
             return
         if number >= len(self._tools):
