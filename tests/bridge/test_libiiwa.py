@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from typing import Any
 
 import numpy as np
 import pytest
@@ -259,28 +260,20 @@ def test_each_command_has_its_status_and_its_error(arm: Arm) -> None:
 def test_modes_have_the_values_that_were_set(arm: Arm) -> None:
     server = LibiiwaServer(arm, tools=("no such tool",))
 
-    def mode_of(number: int) -> object:
+    def mode_of(number: int, kind: type) -> Any:
         assert server.answer(request(304, number))[0] == 1.0
-        assert server.answer(request(102, *[NAN] * 6, 0.5 * (number % 2)))[0] == 1.0
-        mode = arm.wait_until(
-            lambda state: (
-                not isinstance(state.mode, type(None)) and state.motion is not None and state.motion.active
-            ),
-            timeout=PATIENCE,
-        ).mode
-        server.answer(request(101))
+        assert server.answer(request(102, *[NAN] * 6, 0.5 - number % 2))[0] == 1.0
+        mode = arm.wait_until(lambda state: isinstance(state.mode, kind), timeout=PATIENCE).mode
+        assert server.answer(request(101))[0] == 1.0
         return mode
 
     assert server.answer(request(227, *[100.0 * k for k in range(1, 8)]))[0] == 1.0
     assert server.answer(request(221, 1000.0, 1100.0, NAN, 10.0, 20.0, 30.0, 50.0))[0] == 1.0
     assert server.answer(request(229, 4.0))[0] == 1.0
-    joints = mode_of(42)
-    assert isinstance(joints, JointImpedance) and joints.stiffness[6] == 700.0
-    cartesian = mode_of(43)
-    assert isinstance(cartesian, CartesianImpedance)
-    assert cartesian.stiffness.tolist() == [1000.0, 1100.0, 2000.0, 30.0, 20.0, 10.0]
-    sine = mode_of(44)
-    assert isinstance(sine, SineImpedance) and sine.amplitude[0] == 4.0 and sine.base.stiffness[0] == 1000.0
+    assert mode_of(42, JointImpedance).stiffness[6] == 700.0
+    assert mode_of(43, CartesianImpedance).stiffness.tolist() == [1000.0, 1100.0, 2000.0, 30.0, 20.0, 10.0]
+    sine = mode_of(44, SineImpedance)
+    assert sine.amplitude[0] == 4.0 and sine.base.stiffness[0] == 1000.0
     answer = server.answer(request(400, 0))
     assert (answer[0], answer[34]) == (0.0, CONFIGURATION), "no tool has this name"
 
