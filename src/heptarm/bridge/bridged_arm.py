@@ -108,7 +108,8 @@ class BridgedArm:
                 self._open(kind, settings)
             servo: Any = self._servo
             servo.set(target)
-            self._again = lambda: servo.set(target)
+            # velocities end soon after the last one: nobody knows how far they may go
+            self._again = None if kind == "velocity" else lambda: servo.set(target)
 
     def _open(
         self, kind: Literal["joint", "pose", "lin", "velocity"], settings: Callable[[], dict[str, Any]]

@@ -56,14 +56,17 @@ class Peer:
         del self._received[:size]
         return taken
 
-    def take_line(self) -> bytes | None:
-        """Take a line, without its line feed; None: it is not there yet."""
-        end = self._received.find(b"\n")
-        if end < 0:
-            return None
-        line = self.take(end + 1)
-        assert line is not None
-        return line[:-1]
+    def next_line(self) -> str | None:
+        """The next line of ASCII, without its end; None: it is not there yet."""
+        line, end, _ = self._received.partition(b"\n")
+        return line.decode("ascii", errors="replace").strip() if end else None
+
+    def take_line(self) -> str | None:
+        """Take the next line."""
+        line = self.next_line()
+        if line is not None:
+            del self._received[: self._received.index(b"\n") + 1]
+        return line
 
     def send(self, data: bytes) -> None:
         """Send an answer in one piece.

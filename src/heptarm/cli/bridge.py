@@ -7,6 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from heptarm.bridge.kst import PORT as KST_PORT
+from heptarm.bridge.kst import serve_kst
 from heptarm.bridge.libiiwa import PORT as LIBIIWA_PORT
 from heptarm.bridge.libiiwa import serve_libiiwa
 from heptarm.cli.options import NO_TARGET, CommandTarget
@@ -51,4 +53,35 @@ def libiiwa(
             flush=True,
         )
         serve_libiiwa(arm, host=host, port=port, tools=tool, on_change=lambda text: print(text, flush=True))
+    return 0
+
+
+def kst(
+    *,
+    host: Annotated[
+        str,
+        Parameter(help="Address to listen on: an alias of this machine where the program has an address."),
+    ] = "127.0.0.1",
+    port: Annotated[int, Parameter(help="Port; the programs connect to 30001.")] = KST_PORT,
+    speed: Ceiling = None,
+    target: CommandTarget = NO_TARGET,
+) -> int:
+    """Answer programs written for KST or iiwaPy3 as their server on a cabinet does; runs until Ctrl-C.
+
+    For example:
+
+        heptarm bridge kst --target sim://iiwa14
+
+        heptarm bridge kst --target lab1 --speed 0.5
+    """
+    within(port, "port", 0, 65535)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with target.connect() as arm:
+        if speed is not None:
+            arm.speed = speed
+        print(
+            f"KST and iiwaPy3 may connect to {host}:{port}, for {arm.robot.title}; Ctrl-C ends it and stops the arm",
+            flush=True,
+        )
+        serve_kst(arm, host=host, port=port, on_change=lambda text: print(text, flush=True))
     return 0

@@ -58,7 +58,7 @@ CALIBRATIONS = {
     "eye": "calibrate_eye:eye",
     "board": "calibrate_eye:board",
 }
-BRIDGES = {"libiiwa": "bridge:libiiwa"}
+BRIDGES = {"libiiwa": "bridge:libiiwa", "kst": "bridge:kst"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
 #: Groups that are commands themselves, and where they are.
