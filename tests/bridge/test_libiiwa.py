@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from heptarm import Arm
-from heptarm.bridge.libiiwa import LibiiwaServer, serve_libiiwa
+from heptarm.bridge.libiiwa import LibiiwaBridge, serve_libiiwa
 from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
 
 #: A servo motion lives by targets in real time.
@@ -248,7 +248,7 @@ def request(*numbers: float) -> list[float]:
 
 
 def test_each_command_has_its_status_and_its_error(arm: Arm) -> None:
-    server = LibiiwaServer(arm)
+    server = LibiiwaBridge(arm)
     for numbers, status, error in REQUESTS:
         answer = server.answer(request(*numbers))
         assert len(answer) == 38
@@ -258,7 +258,7 @@ def test_each_command_has_its_status_and_its_error(arm: Arm) -> None:
 
 
 def test_modes_have_the_values_that_were_set(arm: Arm) -> None:
-    server = LibiiwaServer(arm, tools=("no such tool",))
+    server = LibiiwaBridge(arm, tools=("no such tool",))
 
     def mode_of(number: int, kind: type) -> Any:
         assert server.answer(request(304, number))[0] == 1.0

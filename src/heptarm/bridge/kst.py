@@ -61,7 +61,7 @@ _INPUTS = MappingProxyType(
 Stream = Literal["joint", "pose", "velocity"]
 
 
-class KstServer:
+class KstBridge:
     """Answers the lines of KST and iiwaPy3.
 
     Args:
@@ -255,10 +255,10 @@ class KstServer:
         )
 
 
-_Command = Callable[[KstServer, list[float]], None]
+_Command = Callable[[KstBridge, list[float]], None]
 
 
-def _target(kind: Stream, report: Callable[[KstServer], None]) -> _Command:
+def _target(kind: Stream, report: Callable[[KstBridge], None]) -> _Command:
     return lambda server, values: server._target(kind, values, lambda: report(server))
 
 
@@ -266,15 +266,15 @@ def _begin(kind: Stream) -> _Command:
     return lambda server, values: server._begin(kind, Position())
 
 
-def _motion(motion: Callable[[KstServer], Motion]) -> _Command:
+def _motion(motion: Callable[[KstBridge], Motion]) -> _Command:
     return lambda server, values: server._move(lambda: motion(server))
 
 
-def _conditional(motion: Callable[[KstServer], Motion]) -> _Command:
+def _conditional(motion: Callable[[KstBridge], Motion]) -> _Command:
     return lambda server, values: server._move(lambda: motion(server), _window(values))
 
 
-def _report(report: Callable[[KstServer], None]) -> _Command:
+def _report(report: Callable[[KstBridge], None]) -> _Command:
     return lambda server, values: report(server)
 
 
@@ -320,13 +320,13 @@ def _window(values: list[float]) -> Condition:
     return reduce(or_, windows)
 
 
-_FEEDBACK: Mapping[str, Callable[[KstServer], None]] = MappingProxyType(
+_FEEDBACK: Mapping[str, Callable[[KstBridge], None]] = MappingProxyType(
     {
-        "ExT": KstServer._report_external,
-        "MT": KstServer._report_torques,
-        "JP": KstServer._report_joints,
-        "EEfP": KstServer._report_pose,
-        "EEfFrelEEF": KstServer._report_force,
+        "ExT": KstBridge._report_external,
+        "MT": KstBridge._report_torques,
+        "JP": KstBridge._report_joints,
+        "EEfP": KstBridge._report_pose,
+        "EEfFrelEEF": KstBridge._report_force,
     }
 )
 _STREAMS: tuple[tuple[str, Stream], ...] = (("jp", "joint"), ("DcSeCar", "pose"), ("velJDC", "velocity"))
@@ -339,42 +339,42 @@ _COMMANDS: Mapping[str, _Command] = MappingProxyType(
             for word, kind in _STREAMS
             for suffix, report in _FEEDBACK.items()
         },
-        "jp_": _target("joint", KstServer._done),
+        "jp_": _target("joint", KstBridge._done),
         "jf_": _target("joint", lambda server: None),
         "DcSeCar_": _target("pose", lambda server: None),
-        "DcSeCarW_": _target("pose", KstServer._done),
-        "velJDC_": _target("velocity", KstServer._done),
-        "TFtrans": KstServer._attach,
-        "jRelVel": KstServer._set_speed,
-        "cArtixanPosition_": KstServer._set_pose,
-        "cArtixanPositionCirc1_": KstServer._set_via,
-        "cArtixanPositionCirc2_": KstServer._set_end,
+        "DcSeCarW_": _target("pose", KstBridge._done),
+        "velJDC_": _target("velocity", KstBridge._done),
+        "TFtrans": KstBridge._attach,
+        "jRelVel": KstBridge._set_speed,
+        "cArtixanPosition_": KstBridge._set_pose,
+        "cArtixanPositionCirc1_": KstBridge._set_via,
+        "cArtixanPositionCirc2_": KstBridge._set_end,
         "startDirectServoJoints": _begin("joint"),
         "stDcEEf": _begin("pose"),
         "stVelDcJoint": _begin("velocity"),
-        "startSmartImpedneceJoints": KstServer._begin_impedance,
-        "startSmartImpedanceJoints": KstServer._begin_impedance,
-        "stopDirectServoJoints": KstServer._end_stream,
-        "doPTPinJS": _motion(KstServer._ptp),
-        "doPTPinCS": _motion(KstServer._line),
+        "startSmartImpedneceJoints": KstBridge._begin_impedance,
+        "startSmartImpedanceJoints": KstBridge._begin_impedance,
+        "stopDirectServoJoints": KstBridge._end_stream,
+        "doPTPinJS": _motion(KstBridge._ptp),
+        "doPTPinCS": _motion(KstBridge._line),
         "doPTPinCSRelBase": _motion(lambda server: server._relative("base")),
         "doPTPinCSRelEEF": _motion(lambda server: server._relative("tool")),
-        "doPTPinCSCircle1": _motion(KstServer._circle),
-        "doPTP!inJS": _conditional(KstServer._ptp),
-        "doPTP!inCS": _conditional(KstServer._line),
+        "doPTPinCSCircle1": _motion(KstBridge._circle),
+        "doPTP!inJS": _conditional(KstBridge._ptp),
+        "doPTP!inCS": _conditional(KstBridge._line),
         "doPTP!inCSRelBase": _conditional(lambda server: server._relative("base")),
         "doPTP!inCSRelEEF": _conditional(lambda server: server._relative("tool")),
-        "doPTP!CSCircle1": _conditional(KstServer._circle),
-        "getJointsPositions": _report(KstServer._report_joints),
-        "Torques_ext_J": _report(KstServer._report_external),
-        "Torques_m_J": _report(KstServer._report_torques),
-        "Eef_pos": _report(KstServer._report_pose),
-        "Eef_force": _report(KstServer._report_force),
-        "Eef_moment": _report(KstServer._report_moment),
+        "doPTP!CSCircle1": _conditional(KstBridge._circle),
+        "getJointsPositions": _report(KstBridge._report_joints),
+        "Torques_ext_J": _report(KstBridge._report_external),
+        "Torques_m_J": _report(KstBridge._report_torques),
+        "Eef_pos": _report(KstBridge._report_pose),
+        "Eef_force": _report(KstBridge._report_force),
+        "Eef_moment": _report(KstBridge._report_moment),
         "blueOn": _lamp("blue"),
         "blueOff": _lamp("off"),
-        "handGuiding": KstServer._guide,
-        "preciseHandGuiding": KstServer._guide,
+        "handGuiding": KstBridge._guide,
+        "preciseHandGuiding": KstBridge._guide,
         **{f"pin{pin}{word}": _output(pin, word == "on") for pin in _OUTPUTS for word in ("on", "off")},
         **{f"getPin{pin}": _input(pin) for pin in _INPUTS},
     }
@@ -452,7 +452,7 @@ def _converse(arm: Arm, peer: Peer, over: threading.Event) -> str:
             server.answer(line)
         return bool(gone) or over.is_set() or line == "end"
 
-    server = KstServer(arm, send=send, interrupted=interrupted)
+    server = KstBridge(arm, send=send, interrupted=interrupted)
     try:
         while not gone and not over.is_set():
             receive(wait=True)

@@ -81,7 +81,7 @@ _PRECISIONS = MappingProxyType({4: "f", 8: "d"})
 _REST, _RETRY = 0.05, 0.5
 
 
-class LibiiwaServer:
+class LibiiwaBridge:
     """Answers requests of libiiwa.
 
     Args:
@@ -410,7 +410,7 @@ class LibiiwaServer:
         self._arm.attach_tool(self._tools[number])
 
 
-_Command = Callable[[LibiiwaServer, list[float]], None]
+_Command = Callable[[LibiiwaBridge, list[float]], None]
 
 
 def _joint_limit(name: str) -> _Command:
@@ -509,22 +509,22 @@ _SETTINGS = ("motion_type", "control_interface", "execution_type")
 _RESETS = (101, 211, 212, 301, 302, 303, 304, 305, 400)
 _COMMANDS: Mapping[int, _Command] = MappingProxyType(
     {
-        _STOP: LibiiwaServer._command_stop,
-        102: LibiiwaServer._joint_position,
-        103: LibiiwaServer._cartesian_pose,
-        104: LibiiwaServer._circular_motion,
+        _STOP: LibiiwaBridge._command_stop,
+        102: LibiiwaBridge._joint_position,
+        103: LibiiwaBridge._cartesian_pose,
+        104: LibiiwaBridge._circular_motion,
         201: _joint_limit("speed"),
         202: _joint_limit("acceleration"),
         203: _joint_limit("jerk"),
         204: _path_limit("speed_mps"),
         205: _path_limit("acceleration_mps2"),
         206: _path_limit("jerk_mps3"),
-        211: LibiiwaServer._set_force_condition,
-        212: LibiiwaServer._set_torque_condition,
+        211: LibiiwaBridge._set_force_condition,
+        212: LibiiwaBridge._set_torque_condition,
         221: _impedance("stiffness"),
         222: _impedance("damping"),
-        223: LibiiwaServer._set_additional_force,
-        224: LibiiwaServer._set_max_force,
+        223: LibiiwaBridge._set_additional_force,
+        224: LibiiwaBridge._set_max_force,
         225: _motion_limit("max_velocity"),
         226: _motion_limit("max_deviation"),
         227: _joint_impedance("stiffness"),
@@ -539,17 +539,17 @@ _COMMANDS: Mapping[int, _Command] = MappingProxyType(
         236: _sine("rise_time", _time(0.0)),
         237: _sine("hold_time", _time(nan)),
         238: _sine("fall_time", _time(0.0)),
-        239: LibiiwaServer._set_stay_active,
-        240: LibiiwaServer._set_constant_force,
-        241: LibiiwaServer._set_sine_pattern,
-        242: LibiiwaServer._set_lissajous,
-        243: LibiiwaServer._set_spiral,
-        301: LibiiwaServer._set_communication,
-        302: LibiiwaServer._set_interface,
-        303: LibiiwaServer._set_type,
-        304: LibiiwaServer._set_mode,
-        305: LibiiwaServer._set_execution,
-        400: LibiiwaServer._set_tool,
+        239: LibiiwaBridge._set_stay_active,
+        240: LibiiwaBridge._set_constant_force,
+        241: LibiiwaBridge._set_sine_pattern,
+        242: LibiiwaBridge._set_lissajous,
+        243: LibiiwaBridge._set_spiral,
+        301: LibiiwaBridge._set_communication,
+        302: LibiiwaBridge._set_interface,
+        303: LibiiwaBridge._set_type,
+        304: LibiiwaBridge._set_mode,
+        305: LibiiwaBridge._set_execution,
+        400: LibiiwaBridge._set_tool,
     }
 )
 
@@ -587,7 +587,7 @@ def serve_libiiwa(
             over.wait(_RETRY)
             continue
         on_change(f"a program at {peer.name} controls the arm")
-        server = LibiiwaServer(arm, tools=tools)
+        server = LibiiwaBridge(arm, tools=tools)
         try:
             gone = _converse(peer, server, over)
         finally:
@@ -597,7 +597,7 @@ def serve_libiiwa(
         on_change(f"the program has gone, the arm is stopped ({gone})")
 
 
-def _converse(peer: Peer, server: LibiiwaServer, over: threading.Event) -> str:
+def _converse(peer: Peer, server: LibiiwaBridge, over: threading.Event) -> str:
     """Answer requests until the program has gone; returns why."""
     precision = 0
 
