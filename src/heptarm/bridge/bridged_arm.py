@@ -159,7 +159,7 @@ class BridgedArm:
         self._handle = self._fired = None
 
     def stop(self) -> None:
-        """Stop the arm, whoever moves it.
+        """Stop the arm, whatever client moves it.
 
         Raises:
             ConnectionLost: the cabinet cannot be reached.

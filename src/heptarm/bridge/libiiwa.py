@@ -5,7 +5,7 @@ of single or double precision, which the size of the first request shows. Length
 rotations have KUKA's order A, B, C, about z, y and x. The program asks, the bridge answers; it never sends unasked.
 
 Where libiiwa's application accepts a value and does something else, ends or hangs, this refuses the value: the status
-is 0 and the last error tells why. That error lasts until the next command that succeeds.
+is 0 and the last error is the reason. That error lasts until the next command that succeeds.
 """
 
 from __future__ import annotations
@@ -378,7 +378,7 @@ class LibiiwaBridge:
         )
 
     def _set_communication(self, arguments: list[float]) -> None:
-        _choice(arguments, {11: "on demand"}, "communication_mode")
+        _choice(arguments, {11: "when asked"}, "communication_mode")
 
     def _set_interface(self, arguments: list[float]) -> None:
         self._servo = _choice(arguments, {31: "standard", 32: "servo"}, "control_interface") == "servo"
