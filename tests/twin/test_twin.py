@@ -183,7 +183,6 @@ def test_set_points_stand_for_what_is_not_in_the_file(recorded: Recording) -> No
 def test_a_deviation_has_a_band() -> None:
     t: Array = np.arange(100, dtype=np.float64) * 0.004
     q: Array = HOME + 0.1 * np.sin(t)[:, None]
-    q = HOME + 0.1 * np.sin(t)[:, None]
     run = Recording(Path("run.mcap"), {"robot": "iiwa14"}, {"t": t, "q": q}, (), (), complete=True)
     bands = {"q": 0.005, **dict.fromkeys(("q_cmd", "dq", "xyz", "tau", "tau_ext", "force", "torque"), 1.0)}
     spiked, later = q.copy(), q.copy()
