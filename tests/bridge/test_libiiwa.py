@@ -98,11 +98,6 @@ def bridge(arm: Arm, port: int) -> Iterator[list[str]]:
         assert not thread.is_alive()
 
 
-@pytest.fixture(params=["f", "d"])
-def precision(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
 @contextmanager
 def connected(arm: Arm, letter: str = "f") -> Iterator[Program]:
     program = Program(letter)
@@ -126,6 +121,7 @@ def wait_for(holds: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.parametrize("precision", ["f", pytest.param("d", marks=pytest.mark.long)])
 def test_motions_of_the_standard_interface_end_at_their_targets(arm: Arm, precision: str) -> None:
     with connected(arm, precision) as program:
         program.command(102, *NEAR)
@@ -306,10 +302,14 @@ def test_a_stop_ends_a_synchronous_motion(arm: Arm) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings", [(), ((305, 52),), ((302, 32),)], ids=["standard", "synchronous", "servo"]
+    ("settings", "precision"),
+    [((), "f"), (((305, 52),), "f"), (((302, 32),), "d")],
+    ids=["standard", "synchronous", "servo"],
 )
-def test_the_arm_stops_when_the_program_is_lost(arm: Arm, settings: tuple[tuple[int, int], ...]) -> None:
-    with connected(arm) as program:
+def test_the_arm_stops_when_the_program_is_lost(
+    arm: Arm, settings: tuple[tuple[int, int], ...], precision: str
+) -> None:
+    with connected(arm, precision) as program:
         program.command(201, 0.05)
         for one in settings:
             program.command(*one)
