@@ -15,8 +15,6 @@ from heptarm import Arm
 from heptarm.bridge.kst import serve_kst
 from heptarm.modes import CartesianImpedance
 
-#: A servo motion lives by targets in real time.
-SPEED = 1.0
 PATIENCE = 60.0
 HOME = [0.0, math.radians(30), 0.0, -math.pi / 2, 0.0, math.radians(60), 0.0]
 NEAR = [0.1, 0.6, 0.1, -1.5, 0.1, 0.9, 0.2]

@@ -18,8 +18,6 @@ from heptarm import Arm
 from heptarm.bridge.libiiwa import LibiiwaBridge, serve_libiiwa
 from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
 
-#: A servo motion lives by targets in real time.
-SPEED = 1.0
 PATIENCE = 60.0
 NAN = math.nan
 HOME = [0.0, math.radians(30), 0.0, -math.pi / 2, 0.0, math.radians(60), 0.0]
