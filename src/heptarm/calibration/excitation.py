@@ -20,7 +20,7 @@ from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.robot import RobotModel
-from heptarm.values.text import lines
+from heptarm.values.text import extent, lines
 
 _log = logging.getLogger("heptarm.calibration")
 
@@ -72,11 +72,9 @@ class ExcitationPlan(Value):
         """What moves, how far, how fast, and for how long."""
         off = np.degrees(self.postures - self.postures[0])
         moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(7))
-        pairs = zip("xyz", self.low, self.high, strict=True)
-        box = ", ".join(f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in pairs)
         rows = {
             "moves": f"{moves} deg",
-            "flange": f"in the postures {box} m in the base; between them it moves on arcs",
+            "flange": f"in the postures {extent(self.low, self.high)} m in the base; between them it moves on arcs",
             "speed": f"{self.speeds.min():.1%} to {self.speeds.max():.0%} of each axis' maximum",
             "collisions": "none foreseen" if self.is_checked else "not checked: set arm.collision_check",
             "duration": f"{self.duration:.0f} s, {len(self.speeds)} motions",

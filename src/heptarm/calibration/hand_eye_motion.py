@@ -38,7 +38,7 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
-from heptarm.values.text import lines
+from heptarm.values.text import extent, lines
 
 _log = logging.getLogger("heptarm.calibration")
 
@@ -87,13 +87,9 @@ class HandEyePlan(Value):
         """What moves, how far and how fast."""
         off = np.degrees(self.postures - self.postures[-1])
         moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(7))
-        box = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}"
-            for axis, low, high in zip("xyz", self.low, self.high, strict=True)
-        )
         rows = {
             "moves": f"{moves} deg",
-            "flange": f"in the postures {box} m in the base",
+            "flange": f"in the postures {extent(self.low, self.high)} m in the base",
             "speed": f"at most {self.speed:.0%} of each axis' maximum",
             "postures": f"{len(self.postures) - 1}, and back",
         }

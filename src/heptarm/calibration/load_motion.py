@@ -29,7 +29,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
 from heptarm.values.robot import Body, RobotModel
 from heptarm.values.state import State
-from heptarm.values.text import lines
+from heptarm.values.text import extent, lines
 
 _log = logging.getLogger("heptarm.calibration")
 
@@ -94,13 +94,9 @@ class LoadPlan(Value):
         """What moves, how far, how fast, and for how long."""
         off = np.degrees(self.postures - self.postures[0])
         moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(3, 7))
-        box = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}"
-            for axis, low, high in zip("xyz", self.low, self.high, strict=True)
-        )
         rows = {
             "moves": f"{moves} deg; A1 to A3 stay",
-            "flange": f"in the rests {box} m in the base; between them it moves on arcs",
+            "flange": f"in the rests {extent(self.low, self.high)} m in the base; between them it moves on arcs",
             "speed": f"at most {self.speed:.0%} of each axis' maximum",
             "rests": f"{len(self.postures)} of {self.seconds:g} s",
             "duration": "" if math.isnan(self.duration) else f"{self.duration:.0f} s",

@@ -19,9 +19,8 @@ from heptarm.calibration.excitation import SPEED as FASTEST
 from heptarm.calibration.load_motion import SECONDS, SPEED
 from heptarm.calibration.tip import TOLERANCE
 from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, Model
-from heptarm.cli.output import confirm as ask_person
 from heptarm.cli.output import emit
-from heptarm.errors import CommandRejected, NotReady
+from heptarm.errors import CommandRejected
 from heptarm.io.targets import saved_target
 from heptarm.model.kinematics import forward
 from heptarm.panel.points import PointList
@@ -164,8 +163,7 @@ def load(
         print(plan, file=sys.stderr if access.as_json else sys.stdout, flush=True)
         if dry_run:
             return 0
-        if not (arm.is_virtual or access.yes or ask_person(f"Move the real {arm.robot.title} like this?")):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        access.ask_first(arm, f"Move the real {arm.robot.title} like this?")
         found = calibration.load(arm, plan=plan)
         old = arm.tools.get(save, save)
     if place:
@@ -238,10 +236,7 @@ def arm(
             print(plan, file=sys.stderr if access.as_json else sys.stdout, flush=True)
             if dry_run:
                 return 0
-            if not (
-                one.is_virtual or access.yes or ask_person(f"Move the real {one.robot.title} like this?")
-            ):
-                raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+            access.ask_first(one, f"Move the real {one.robot.title} like this?")
             run = calibration.record_excitation(one, record, plan=plan, overwrite=overwrite)
             declared = one.load
     else:

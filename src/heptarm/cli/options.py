@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from heptarm.errors import CommandRejected
+from heptarm.cli.output import confirm
+from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.robot import ROBOTS, robot
 
 if TYPE_CHECKING:
@@ -209,6 +210,15 @@ class Access:
     yes: Yes = False
     target: CommandTarget = NO_TARGET
     as_json: Json = False
+
+    def ask_first(self, arm: Arm, question: str) -> None:
+        """Ask the person beside a real arm; nobody is asked about a virtual one, or after `--yes`.
+
+        Raises:
+            NotReady: the person does not agree.
+        """
+        if not (arm.is_virtual or self.yes or confirm(question)):
+            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
 
 
 @Parameter(name="*")
