@@ -120,8 +120,8 @@ def start_of(context: NodeContext, state: Any) -> Array | None:
             MoveItCode.INVALID_ROBOT_STATE,
             hint="publish them on attached_collision_object",
         )
-    own = set(context.joints)
-    pairs = [pair for pair in zip(state.joint_state.name, state.joint_state.position) if pair[0] in own]
+    names = context.driver.configuration.own(state.joint_state.name)
+    pairs = [pair for pair in zip(names, state.joint_state.position) if pair[0] in context.joints]
     if not pairs:
         return None
     return positions(context.driver, [name for name, _ in pairs], [value for _, value in pairs])
