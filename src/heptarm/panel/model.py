@@ -21,11 +21,11 @@ from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionEr
 from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
+from heptarm.planning.search import Keep
 from heptarm.sim.collision import CollisionModel
 from heptarm.values.checks import Array, Value, within
 from heptarm.values.io import SignalValue
 from heptarm.values.motion.planned_path import Path as PlannedPath
-from heptarm.values.motion.planned_path import PathConstraint
 from heptarm.values.pose import Pose
 from heptarm.values.state import GROUP_NAMES, Safety, State
 
@@ -420,7 +420,7 @@ class PanelArm:
         *,
         places: Mapping[str, Pose],
         speed: float = 0.1,
-        keep: PathConstraint | None = None,
+        keep: Keep = (),
     ) -> None:
         """Find a path to a pose of the motion frame, around the bodies of the scene, and show it; nothing moves.
 
@@ -428,7 +428,7 @@ class PanelArm:
             goal: in the base.
             places: where free bodies of the scene are in the base, by name.
             speed: fraction of the full speed, (0, 1].
-            keep: constraint along the path; None: none.
+            keep: constraints along the path.
 
         Raises:
             NoPath: none was found; the text has the bodies in the way.

@@ -18,8 +18,9 @@ from heptarm.panel import texts
 from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import HISTORY, PanelArm, Readout
+from heptarm.planning.constraints import constraint_from_text
 from heptarm.values.frames import BASE, FLANGE, TOOL
-from heptarm.values.motion.planned_path import Upright
+from heptarm.values.motion.planned_path import OnPlane, PathConstraint, Upright
 from heptarm.values.pose import Pose
 
 #: How often a held button asks again [Hz].
@@ -302,6 +303,12 @@ class ArmPage:
         self._upright = self._gui.add_checkbox(
             "Keep the tool upright", initial_value=False, visible=False, hint="on the path around bodies"
         )
+        self._level = self._gui.add_checkbox(
+            "Keep its height", initial_value=False, visible=False, hint="likewise"
+        )
+        self._also = self._gui.add_text(
+            "Also keep", "", visible=False, hint="likewise, as in Python: OnLine((0.5, 0, 0.4), (0, 1, 0))"
+        )
         self._drive = self._gui.add_button("Drive the path", color="orange", visible=False)
         self._drive.on_click(self._runner(lambda: self.model.drive(places=self._world.places)))
         self._follows.visible = False
@@ -341,13 +348,19 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        for control in (self._gizmo, self._go, self._follows, self._plan_path, self._upright):
+        paths = (self._plan_path, self._upright, self._level, self._also)
+        for control in (self._gizmo, self._go, self._follows, *paths):
             control.visible = shown
         self._world.name_bodies(visible=shown)
         self.model.goal = None
 
     def _find_path(self) -> None:
-        keep = Upright("z") if self._upright.value else None
+        keep: list[PathConstraint] = [Upright("z")] if self._upright.value else []
+        tcp = self.model.poll().tcp
+        if self._level.value and tcp is not None:
+            keep.append(OnPlane(tcp.xyz))
+        if self._also.value.strip():
+            keep.append(constraint_from_text(self._also.value, "Also keep"))
         self.model.plan_to(self._gizmo_pose(), places=self._world.places, speed=self._fraction(), keep=keep)
 
     async def _on_gizmo(self, event: Any) -> None:
