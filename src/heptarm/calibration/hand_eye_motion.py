@@ -27,11 +27,12 @@ from heptarm.calibration.hand_eye_estimate import (
     estimate_hand_eye,
     first_matrix,
 )
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings
 from heptarm.errors import CommandRejected, MissingExtra, NoPath, OutsideWorkspace, Unreachable
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
 from heptarm.values.camera import intrinsic
-from heptarm.values.checks import Array, Value, callback, frozen, instance, integer, within
+from heptarm.values.checks import Array, Value, frozen, instance, integer, within
 from heptarm.values.clearance import PlanningWorld
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
@@ -79,21 +80,13 @@ class HandEyePlan(Value):
     @staticmethod
     def of(robot: RobotModel, purpose: str, postures: Sequence[Array], speed: float) -> HandEyePlan:
         """A plan of postures."""
-        places = np.array([forward(robot, q)[:3, 3] for q in postures])
-        low, high = frozen(places.min(axis=0)), frozen(places.max(axis=0))
-        return HandEyePlan(robot, purpose, frozen(np.array(postures)), speed, low, high)
+        return HandEyePlan(robot, purpose, frozen(np.array(postures)), speed, *flange_box(robot, postures))
 
     def __str__(self) -> str:
         """What moves, how far and how fast."""
-        off = np.degrees(self.postures - self.postures[-1])
-        moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(7))
-        box = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}"
-            for axis, low, high in zip("xyz", self.low, self.high, strict=True)
-        )
         rows = {
-            "moves": f"{moves} deg",
-            "flange": f"in the postures {box} m in the base",
+            "moves": f"{swings(self.postures, self.postures[-1])} deg",
+            "flange": f"in the postures {box_text(self.low, self.high)}",
             "speed": f"at most {self.speed:.0%} of each axis' maximum",
             "postures": f"{len(self.postures) - 1}, and back",
         }
@@ -202,7 +195,7 @@ class _Mover:
         confirm: Callable[[HandEyePlan], bool] | None,
     ) -> None:
         self._arm, self._speed, self._avoid = arm, speed, avoid
-        self._confirm = confirm if confirm is None else callback(confirm, "confirm")
+        self._confirm = confirm
 
     def visit(self, purpose: str, postures: Sequence[Array], start: Array, look: Callable[[], None]) -> None:
         """Move through postures that can be reached, look from each, and return to the start.
@@ -218,11 +211,7 @@ class _Mover:
                 hint="begin with more room around the arm, farther from the limits of its joints",
             )
         plan = HandEyePlan.of(self._arm.robot, purpose, [*postures, start], self._speed)
-        _log.info("%s", plan)
-        if self._confirm is not None and not self._confirm(plan):
-            raise CommandRejected(
-                "measuring the camera was not confirmed: nothing else was moved", parameter="confirm"
-            )
+        agree(plan, self._confirm, "measuring the camera")
         for q in postures:
             try:
                 motion = self._motion(q)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,8 +10,8 @@ from cyclopts import Parameter
 
 from heptarm import calibration
 from heptarm.calibration.hand_eye_motion import SPEED, VIEWS
+from heptarm.cli.calibrate import outcome, saved_as
 from heptarm.cli.options import Access, Json, Overwrite
-from heptarm.cli.output import confirm as ask_person
 from heptarm.cli.output import emit
 from heptarm.cli.record import (
     CameraFrame,
@@ -105,6 +104,13 @@ def eye(
         Path | None, Parameter(name=("--out", "-o"), help="Also write the result to this file, JSON.")
     ] = None,
     overwrite: Overwrite = False,
+    save: Annotated[
+        str,
+        Parameter(
+            name="--save",
+            help="Save the result as this camera of the saved target. Default: it is only printed.",
+        ),
+    ] = "",
     access: Access = _ACCESS,
 ) -> int:
     """Measure where a camera is, on the flange or beside the arm, with a board that it sees.
@@ -131,21 +137,16 @@ def eye(
         )
     if out is not None:
         refuse_existing(out, overwrite=overwrite, name="out")
+    place = saved_as(save, access.target)
     matrix = _matrix(lens)
     own: dict[str, Any] = {} if camera == _SIMULATED else {"frame": frame}
     source: Any = Camera(**settings) if camera == _SIMULATED else _opened(camera)
-    shown_on = sys.stderr if access.as_json else sys.stdout
     with (
         access.target.connect(control=True, state_rate=200.0) as arm,
         closing(arm.camera(source, **own)) as pictures,
     ):
-
-        def confirm(plan: calibration.HandEyePlan) -> bool:
-            print(plan, file=shown_on, flush=True)
-            return arm.is_virtual or access.yes or ask_person(f"Move the real {arm.robot.title} like this?")
-
         found = calibration.hand_eye(
-            arm, pictures, made, views=views, speed=speed, matrix=matrix, confirm=confirm
+            arm, pictures, made, views=views, speed=speed, matrix=matrix, confirm=access.consent(arm)
         )
     result = {
         "frame": found.frame,
@@ -158,14 +159,17 @@ def eye(
         "rms_pixels": found.rms,
         "views": len(found.residuals),
         "suspect": found.is_suspect,
+        "saved": bool(place),
     }
+    if place:
+        found.save(place, save)
     if out is not None:
         _write(out, result)
     if access.as_json:
         emit(result)
     else:
         print(found)
-        print(f"written to {out}" if out is not None else "nothing is changed; -o FILE writes it to a file")
+        print(outcome("camera", save, place) if out is None or place else f"written to {out}")
     return 0
 
 
