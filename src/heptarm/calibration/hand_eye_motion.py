@@ -105,6 +105,7 @@ def hand_eye(
     distortion: npt.ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0),
     refine: bool | None = None,
     confirm: Callable[[HandEyePlan], bool] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> HandEyeEstimate:
     """Measure where a camera is, on the flange or beside the arm. The arm moves, and returns.
 
@@ -124,6 +125,7 @@ def hand_eye(
         distortion: see `estimate_hand_eye`.
         refine: see `estimate_hand_eye`.
         confirm: called with each plan; nothing moves unless it returns true. None: it moves.
+        progress: called after each picture with the board in it with their number and that of all.
 
     Raises:
         CommandRejected: the camera does not see the board; it was not confirmed; too few postures can be reached; the
@@ -137,7 +139,7 @@ def hand_eye(
     known = (
         instance(camera, CameraStream, "camera", hint="arm.camera(...)").matrix if matrix is None else matrix
     )
-    seen = _Viewer(arm, camera, board)
+    seen = _Viewer(arm, camera, board, wanted, progress)
     start = arm.wait_for_rest().q_cmd
     seen.look()
     if not seen.views:
@@ -164,8 +166,16 @@ def hand_eye(
 class _Viewer:
     """Takes pictures of a resting arm, and keeps those in which the board is seen."""
 
-    def __init__(self, arm: ArmVerbs, camera: CameraStream, board: Board) -> None:
+    def __init__(
+        self,
+        arm: ArmVerbs,
+        camera: CameraStream,
+        board: Board,
+        wanted: int,
+        progress: Callable[[int, int], object] | None,
+    ) -> None:
         self._arm, self._camera, self._board = arm, camera, board
+        self._wanted, self._progress = wanted, progress
         self.views: list[HandEyeView] = []
 
     def look(self) -> None:
@@ -174,6 +184,8 @@ class _Viewer:
         sighting = self._board.find(picture.pixels)
         if sighting is not None:
             self.views.append(HandEyeView(picture.flange, sighting))
+            if self._progress is not None:
+                self._progress(len(self.views), self._wanted)
         _log.info("view %d: %d corners", len(self.views), 0 if sighting is None else len(sighting))
 
 

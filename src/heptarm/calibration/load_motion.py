@@ -174,6 +174,7 @@ def load(
     plan: LoadPlan | None = None,
     declared: Body | None = None,
     confirm: Callable[[LoadPlan], bool] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> IdentifiedLoad:
     """Measure mass, centre of mass and, if planned, inertia of what is on the flange. The arm moves, and returns.
 
@@ -185,6 +186,7 @@ def load(
         plan: what moves, from `load_plan`; None: its defaults.
         declared: load data that the cabinet uses; None: those of the attached tool and workpiece.
         confirm: called with the plan; nothing moves unless it returns true. None: it moves.
+        progress: called after each rest with their number and that of all.
 
     Raises:
         CommandRejected: it was not confirmed; the posture is not suited; something touched the arm; there is no load.
@@ -215,6 +217,8 @@ def load(
             moments += _moments(states, single)
         if index + 1 < len(made.postures):
             rests.append(_rest(arm, made.seconds)[0])
+        if progress is not None:
+            progress(len(rests), len(made.postures))
     return estimate_load(_thinned(rests, moments), robot=arm.robot, declared=used)
 
 

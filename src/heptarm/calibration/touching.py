@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ _TILT = math.radians(25.0)
 #: Distance of the tip from the surface at the start [m], and how much farther it is looked for.
 _NEAREST, _FARTHEST, _BEYOND = 0.002, 0.05, 0.01
 #: Part of the force from which on a state belongs to the push.
-_PUSHING = 0.25
+_PUSHING = 0.15
 #: Distance before the end of an approach up to which nothing was touched [m], and fewest states of a push.
 _BEFORE, _FEWEST_PUSHES = 0.001, 3
 #: Steps of the least squares, and when they end [m].
@@ -368,20 +368,26 @@ def touch_tcp(
             hint="make a new one with calibration.touch_plan(arm, surface)",
         )
     agree(made, confirm, "touching with the tool")
-    flanges = []
+    contacts = list[tuple[Pose, float]]()
     for q in made.postures:
         arm.move(ptp(q), speed=made.speed, mode=Position())
-        flanges.append(_contact(arm, made))
+        contacts.append(_contact(arm, made))
         if progress is not None:
-            progress(len(flanges), len(made.postures))
+            progress(len(contacts), len(made.postures))
     arm.move(ptp(made.start), speed=made.speed, mode=Position())
+    flanges, softness = zip(*contacts, strict=True)
+    sigma = math.hypot(made.surface.sigma, float(np.mean(softness)))
     return estimate_touched_tcp(
-        flanges, made.surface, guess=made.guess, tip_radius=made.tip_radius, tolerance=tolerance
+        flanges,
+        replace(made.surface, sigma=sigma),
+        guess=made.guess,
+        tip_radius=made.tip_radius,
+        tolerance=tolerance,
     )
 
 
-def _contact(arm: ArmVerbs, plan: TouchPlan) -> Pose:
-    """Pose of the flange in which the tip touches the surface without a force; the arm returns over the surface."""
+def _contact(arm: ArmVerbs, plan: TouchPlan) -> tuple[Pose, float]:
+    """Touch once, and return over the surface; see `at_no_force`."""
     with recorded(arm) as states:
         found = touch(
             arm,
@@ -395,32 +401,39 @@ def _contact(arm: ArmVerbs, plan: TouchPlan) -> Pose:
         )
     fired = found.result.fired_at
     until = states[-1].stamp if fired is None else fired.stamp
-    return at_no_force(
-        arm.robot, [one for one in states if one.stamp <= until], direction=plan.direction, force=plan.force
-    )
+    approach = [one for one in states if one.stamp <= until]
+    return at_no_force(arm.robot, approach, direction=plan.direction, force=plan.force)
 
 
-def at_no_force(robot: RobotModel, states: Sequence[State], *, direction: Array, force: float) -> Pose:
+def at_no_force(
+    robot: RobotModel, states: Sequence[State], *, direction: Array, force: float
+) -> tuple[Pose, float]:
     """Extrapolate the pose of the flange to the beginning of a contact.
+
+    A force that begins to grow with the square of the way is between what an elastic arm shows on a hard surface, a
+    linear one, and what a soft surface shows; their difference is how little that is known.
 
     Args:
         robot: the robot.
         states: of an approach until the force was reached.
         direction: of the approach in the base, shape (3,).
         force: that was reached [N].
+
+    Returns:
+        The pose of the flange, and the standard deviation of its place along the direction [m].
     """
     rows = [one for one in states if one.groups.joints is not None and one.groups.wrench is not None]
     flanges = np.array([forward(robot, one.q) for one in rows])
-    places = flanges[:, :3, 3]
-    travel = (places - places[0]) @ direction
+    travel = (flanges[:, :3, 3] - flanges[0, :3, 3]) @ direction
     push = -np.array([one.wrench.force for one in rows]) @ direction
     push -= push[travel <= max(travel[-1] - _BEFORE, travel[0])].mean()
     quiet = np.flatnonzero(push < _PUSHING * force)
-    first = int(quiet[-1]) + 1 if len(quiet) else 0
-    begin = min(first, len(rows) - 1)
-    place = places[begin]
-    if len(rows) - begin >= _FEWEST_PUSHES:
-        slope, line = np.polyfit(push[begin:], places[begin:], 1)
-        if 0.0 <= slope @ direction * push[begin] <= _BEFORE:
-            place = line
-    return Pose.from_matrix(np.column_stack([flanges[begin, :3, :3], place]))
+    begin = min(int(quiet[-1]) + 1 if len(quiet) else 0, len(rows) - 1)
+    turn, place = flanges[begin, :3, :3], flanges[begin, :3, 3]
+    if len(rows) - begin < _FEWEST_PUSHES:
+        return Pose.from_matrix(np.column_stack([turn, place])), float(travel[-1] - travel[begin - 1])
+    linear, square, cubic = (
+        float(np.polyfit(push[begin:] ** (1.0 / power), travel[begin:], 1)[1]) for power in (1, 2, 3)
+    )
+    contact = place + (square - travel[begin]) * direction
+    return Pose.from_matrix(np.column_stack([turn, contact])), 0.5 * abs(linear - cubic)
