@@ -1,4 +1,4 @@
-"""What is on the flange, hidden in a scene of the simulator: the tip of a tool, and its load; and how honest sigma is."""
+"""What is on the flange, hidden in a scene of the simulator: the tip of a tool and its load; how honest sigma is."""
 
 from __future__ import annotations
 

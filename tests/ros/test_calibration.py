@@ -1,4 +1,4 @@
-"""The action `calibrate` on a virtual cabinet with a load that it does not know, without ROS; and pictures of a topic."""
+"""The action `calibrate` on a virtual cabinet with a load that it does not know, no ROS; pictures of a topic."""
 
 from __future__ import annotations
 

@@ -82,6 +82,11 @@ class HandEyePlan(Value):
         """A plan of postures."""
         return HandEyePlan(robot, purpose, frozen(np.array(postures)), speed, *flange_box(robot, postures))
 
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motions, if they are PTP."""
+        return tuple(ptp(q) for q in self.postures)
+
     def __str__(self) -> str:
         """What moves, how far and how fast."""
         rows = {
@@ -106,6 +111,7 @@ def hand_eye(
     refine: bool | None = None,
     confirm: Callable[[HandEyePlan], bool] | None = None,
     progress: Callable[[int, int], object] | None = None,
+    on_picture: Callable[[npt.NDArray[np.uint8], Sighting | None], object] | None = None,
 ) -> HandEyeEstimate:
     """Measure where a camera is, on the flange or beside the arm. The arm moves, and returns.
 
@@ -126,6 +132,7 @@ def hand_eye(
         refine: see `estimate_hand_eye`.
         confirm: called with each plan; nothing moves unless it returns true. None: it moves.
         progress: called after each picture with the board in it with their number and that of all.
+        on_picture: called with each picture and what was found in it; None: the board is not seen.
 
     Raises:
         CommandRejected: the camera does not see the board; it was not confirmed; too few postures can be reached; the
@@ -139,7 +146,14 @@ def hand_eye(
     known = (
         instance(camera, CameraStream, "camera", hint="arm.camera(...)").matrix if matrix is None else matrix
     )
-    seen = _Viewer(arm, camera, board, wanted, progress)
+
+    def note(pixels: npt.NDArray[np.uint8], sighting: Sighting | None) -> None:
+        if on_picture is not None:
+            on_picture(pixels, sighting)
+        if progress is not None and sighting is not None:
+            progress(len(seen.views), wanted)
+
+    seen = _Viewer(arm, camera, board, note)
     start = arm.wait_for_rest().q_cmd
     seen.look()
     if not seen.views:
@@ -171,11 +185,10 @@ class _Viewer:
         arm: ArmVerbs,
         camera: CameraStream,
         board: Board,
-        wanted: int,
-        progress: Callable[[int, int], object] | None,
+        note: Callable[[npt.NDArray[np.uint8], Sighting | None], object],
     ) -> None:
         self._arm, self._camera, self._board = arm, camera, board
-        self._wanted, self._progress = wanted, progress
+        self._note = note
         self.views: list[HandEyeView] = []
 
     def look(self) -> None:
@@ -184,8 +197,7 @@ class _Viewer:
         sighting = self._board.find(picture.pixels)
         if sighting is not None:
             self.views.append(HandEyeView(picture.flange, sighting))
-            if self._progress is not None:
-                self._progress(len(self.views), self._wanted)
+        self._note(picture.pixels, sighting)
         _log.info("view %d: %d corners", len(self.views), 0 if sighting is None else len(sighting))
 
 

@@ -23,10 +23,11 @@ from heptarm.errors import CommandRejected, MissingExtra, ShapeError, StaleState
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
 from heptarm.skills.touch import touch
-from heptarm.values.checks import Array, Value, array, frozen, instance, integer, within
+from heptarm.values.checks import Array, Value, array, frozen, instance, integer, shown, within
 from heptarm.values.condition.contact import direction_of
 from heptarm.values.frames import BASE
 from heptarm.values.mode.mode import Position
+from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import RobotModel
@@ -91,6 +92,27 @@ class KnownSurface(Value):
         size = within(radius, "radius", 0.0, 1.0, above=True, unit="m")
         known = within(sigma, "sigma", 0.0, 0.1, unit="m")
         return KnownSurface(array(centre, 3, "centre"), frozen(np.zeros(3)), size, known)
+
+    @staticmethod
+    def parse(text: str) -> KnownSurface:
+        """A level plane "plane:X,Y,Z" or a sphere "sphere:X,Y,Z,RADIUS", in the base [m].
+
+        Raises:
+            CommandRejected: it is neither. LimitError: a number outside its range.
+        """
+        kind, _, rest = instance(text, str, "surface").partition(":")
+        try:
+            given = [float(part) for part in rest.split(",")]
+        except ValueError:
+            given = []
+        if (kind, len(given)) not in (("plane", 3), ("sphere", 4)):
+            raise CommandRejected(
+                f"surface must be plane:X,Y,Z or sphere:X,Y,Z,RADIUS in metres, got {shown(text)}",
+                parameter="surface",
+                value=text,
+                hint="for example plane:0.6,0,0.2",
+            )
+        return KnownSurface.plane(given) if kind == "plane" else KnownSurface.sphere(given[:3], given[3])
 
     def __str__(self) -> str:
         """Kind and place."""
@@ -197,6 +219,11 @@ class TouchPlan(Value):
     speed_mps: float
     low: Array
     high: Array
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motions between the contacts, back to the start at last."""
+        return tuple(ptp(q) for q in (*self.postures, self.start))
 
     def __str__(self) -> str:
         """What moves, what it touches, with what force, and how fast."""

@@ -21,7 +21,6 @@ from heptarm.calibration.tip import TOLERANCE
 from heptarm.calibration.touching import TOUCHES
 from heptarm.cli.options import Access, CommandTarget, Model
 from heptarm.cli.output import emit
-from heptarm.cli.record import numbers_of
 from heptarm.errors import CommandRejected
 from heptarm.io.targets import saved_target
 from heptarm.model.kinematics import forward
@@ -132,7 +131,7 @@ def tcp(
         )
     target, place = access.target, saved_as(save, access.target)
     if surface:
-        known = _surface(surface)
+        known = calibration.KnownSurface.parse(surface)
         with target.connect(control=not dry_run, state_rate=_RATE) as arm:
             plan = calibration.touch_plan(arm, known, tip_radius=tip_radius, touches=touches)
             if dry_run:
@@ -299,27 +298,6 @@ def arm(
         print(found)
         print("nothing is saved; --save FILE does" if save is None else f"saved as {save}")
     return 0
-
-
-def _surface(text: str) -> calibration.KnownSurface:
-    """The surface of an option's text.
-
-    Raises:
-        CommandRejected: it is none.
-    """
-    kind, _, rest = text.partition(":")
-    if kind == "plane":
-        return calibration.KnownSurface.plane(
-            numbers_of(rest, "surface", ",", float, form="X,Y,Z in metres after plane:")
-        )
-    if kind == "sphere":
-        *centre, radius = numbers_of(rest, "surface", ",", float, form="X,Y,Z,RADIUS in metres after sphere:")
-        return calibration.KnownSurface.sphere(centre, radius)
-    raise CommandRejected(
-        f"surface must be plane:X,Y,Z or sphere:X,Y,Z,RADIUS in metres, got {text!r}",
-        parameter="surface",
-        value=text,
-    )
 
 
 def saved_as(name: str, target: CommandTarget) -> str:

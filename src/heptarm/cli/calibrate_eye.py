@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from heptarm import calibration
+from heptarm.arm.devices.camera import opened_camera
 from heptarm.calibration.hand_eye_motion import SPEED, VIEWS
 from heptarm.cli.calibrate import outcome, saved_as
 from heptarm.cli.options import Access, Json, Overwrite
@@ -22,7 +23,7 @@ from heptarm.cli.record import (
     camera_settings,
     numbers_of,
 )
-from heptarm.errors import CommandRejected, require
+from heptarm.errors import CommandRejected
 from heptarm.values.camera import Camera
 from heptarm.values.files import refuse_existing, unwritable
 
@@ -140,7 +141,7 @@ def eye(
     place = saved_as(save, access.target)
     matrix = _matrix(lens)
     own: dict[str, Any] = {} if camera == _SIMULATED else {"frame": frame}
-    source: Any = Camera(**settings) if camera == _SIMULATED else _opened(camera)
+    source: Any = Camera(**settings) if camera == _SIMULATED else opened_camera(camera)
     with (
         access.target.connect(control=True, state_rate=200.0) as arm,
         closing(arm.camera(source, **own)) as pictures,
@@ -190,20 +191,3 @@ def _matrix(text: str) -> list[list[float]] | None:
         text, "lens", ",", float, form="FX,FY,CX,CY in pixels, such as 600,600,320,240"
     )
     return [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
-
-
-def _opened(camera: str) -> Any:
-    """What reads the next picture of a camera of this computer.
-
-    Raises:
-        CommandRejected: it cannot be opened.
-    """
-    opened = require("cv2", extra="vision").VideoCapture(int(camera) if camera.isdigit() else camera)
-    if not opened.isOpened():
-        raise CommandRejected(
-            f"the camera {camera!r} cannot be opened",
-            parameter="camera",
-            value=camera,
-            hint="give its number, from 0, the address of a stream, or sim for a simulated one",
-        )
-    return opened.read
