@@ -1,8 +1,8 @@
 """What a newcomer has: an empty home, a fresh clone of the last commit, and a clock.
 
-The scripts `first_hour.py` and `first_day.py` take their steps here. Everything is in a temporary folder: a fresh HOME, no
-inherited PYTHONPATH or virtual environment, no cache of pip. Compilers and other packages of the system are those of this
-machine. It needs the network, and nothing but Python's standard library.
+The scripts `first_hour.py` and `first_day.py` take their steps here. Everything is in a temporary folder: a fresh HOME,
+no inherited PYTHONPATH or virtual environment, no cache of pip. Compilers and other packages of the system are those of
+this machine. It needs the network, and nothing but Python's standard library.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Draw the schematic screens of the guide to a real robot: docs/_static/screen-*.svg.
 
-`screens.py` writes them; `screens.py --check` fails if one is out of date. They are drawings of ours: what is where, and
-the order in which it is touched. A number in a circle is a step of the list below the drawing.
+`screens.py` writes them; `screens.py --check` fails if one is out of date. They are drawings of ours: what is where,
+and the order in which it is touched. A number in a circle is a step of the list below the drawing.
 """
 
 from __future__ import annotations
@@ -240,7 +240,8 @@ def _row(row: Row, x: int, y: int, width: int) -> list[str]:
     base, out = y + 17, []
     if row.kind == "button":
         out.append(
-            f'<rect x="{x}" y="{y + 2}" width="{width - 34}" height="{ROW - 5}" rx="4" fill="{COLOURS[0]}" stroke="{EDGE}"/>'
+            f'<rect x="{x}" y="{y + 2}" width="{width - 34}" height="{ROW - 5}" rx="4" fill="{COLOURS[0]}" '
+            f'stroke="{EDGE}"/>'
         )
         out.append(text(x + (width - 34) / 2, base, label, size=12))
     elif row.kind == "field":

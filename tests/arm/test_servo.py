@@ -243,9 +243,9 @@ def test_the_limits_of_a_running_stream_change(arm: ha.Arm) -> None:
         arm.wait_until(lambda state: state.dq[6] > fast)
         arm.wait_until(lambda state: np.abs(state.q - goal).max() < TOUCH)
     assert sv.result is not None and sv.result.cause is ha.Cause.CANCELLED
-    with arm.servo("joint", engine="direct", watchdog=2.0) as direct:
-        with pytest.raises(ha.CommandRejected, match="cannot brake in between"):
-            direct.change(speed=0.5)
+    direct = arm.servo("joint", engine="direct", watchdog=2.0)
+    with direct, pytest.raises(ha.CommandRejected, match="cannot brake in between"):
+        direct.change(speed=0.5)
     with (
         arm.servo("velocity", watchdog=2.0) as jog,
         pytest.raises(ha.CommandRejected, match="keeps its limits"),

@@ -100,9 +100,7 @@ def install_cabinet(
         emit(data | {"key_file": str(file) if key else ""})
         return 0
     print(f"{len(files)} Java sources and the project's data are in {out}.")
-    print(
-        f"{out / ARCHIVE} has all sources in one file; the application prints their check sum {check_sum} when it starts."
-    )
+    print(f"{out / ARCHIVE} has all sources in one file; their check sum is {check_sum}.")
     print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
     if left_out:
         refused = " and ".join(f"{OPTIONS[one]} (option {one})" for one in left_out)

@@ -172,7 +172,7 @@ class JogServo(Servo):
         raise CommandRejected(
             f"a stream of velocities keeps its limits, got another {limit}",
             parameter=limit,
-            hint="set() takes the velocity that you want; for a higher limit leave the with block and begin another one",
+            hint="set() takes the velocity; for a higher limit leave the with block and begin another one",
         )
 
     def close(self) -> None:
