@@ -10,6 +10,8 @@ network, and nothing but Python's standard library.
 from __future__ import annotations
 
 import argparse
+import json
+import re
 import sys
 from collections.abc import Iterator
 from functools import partial
@@ -40,6 +42,25 @@ COMMANDS = {
     "cabinet": ("install-cabinet", "--out", "my-cabinet"),
     "commands": ("--help",),
 }
+_RUN = re.compile(r"^RUN ((?:.*\\\n)*.*)$", re.M)
+
+
+def in_a_container(newcomer: Newcomer, image: Path) -> str:
+    """What the Dockerfile does, in an empty folder instead of an image: its files, its commands, its entry point.
+
+    Packages of the system are those of this machine.
+    """
+    image.mkdir()
+    newcomer.run("git", "archive", "-o", f"{image}.tar", "HEAD")
+    newcomer.run("tar", "-xf", f"{image}.tar", "-C", image)
+    text = (image / "Dockerfile").read_text(encoding="utf-8").partition(" AS dev")[0]
+    for command in _RUN.findall(text):
+        if "apt-get" not in command:
+            newcomer.run("sh", "-c", command, cwd=image)
+    (entry,), words = (
+        json.loads(text.split(f"\n{name} ")[1].splitlines()[0]) for name in ("ENTRYPOINT", "CMD")
+    )
+    return newcomer.last(image / ".venv/bin" / entry, *words, cwd=newcomer.home)
 
 
 def steps(folder: Path) -> Iterator[Step]:
@@ -60,12 +81,14 @@ def steps(folder: Path) -> Iterator[Step]:
         yield Step(
             name, f"heptarm {' '.join(words)}", partial(newcomer.last, command, *words, cwd=newcomer.home)
         )
+    image = folder / "image"
+    yield Step("container", "Dockerfile: commands, entry point", lambda: in_a_container(newcomer, image))
 
 
 def main() -> int:
     """Take all steps and print a table; a failure ends them."""
     parser = argparse.ArgumentParser(description="Do and time a lab's first day, from the documentation.")
-    names = ", ".join(("clone", "demo", "extras", *PROGRAMS, *COMMANDS))
+    names = ", ".join(("clone", "demo", "extras", *PROGRAMS, *COMMANDS, "container"))
     parser.add_argument("--only", default="", help=f"steps, separated by commas, of {names}")
     return take(steps, parser.parse_args().only)
 
