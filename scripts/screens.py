@@ -236,7 +236,8 @@ def _pane(pane: Pane, x: float, y: float, width: float, height: float) -> list[s
 
 def _row(row: Row, x: int, y: int, width: int) -> list[str]:
     label = row.label.lstrip()
-    x += 16 * (len(row.label) - len(label))
+    indent = 16 * (len(row.label) - len(label))
+    x, width = x + indent, width - indent
     base, out = y + 17, []
     if row.kind == "button":
         out.append(
@@ -246,7 +247,7 @@ def _row(row: Row, x: int, y: int, width: int) -> list[str]:
         out.append(text(x + (width - 34) / 2, base, label, size=12))
     elif row.kind == "field":
         out.append(text(x, base, label, size=11, colour=MUTED, anchor="start"))
-        left = x + max(64, round(6.2 * len(label)))
+        left = x + max(64, round(6.2 * len(label)) + 6)
         wide = width - 30 - (left - x)
         out.append(
             f'<rect x="{left}" y="{y + 3}" width="{wide}" height="{ROW - 7}" fill="#ffffff" stroke="{EDGE}"/>'
@@ -259,7 +260,7 @@ def _row(row: Row, x: int, y: int, width: int) -> list[str]:
             out.append(f'<path d="M{x} {y + 7} h5 l2 2 h5 v9 h-12 z" fill="{COLOURS[2]}" stroke="{EDGE}"/>')
         out.append(text(x if row.kind == "text" else x + 18, base, label, size=12, anchor="start"))
     if row.step:
-        right = x + width - 16 * (len(row.label) - len(label)) - 12
+        right = x + width - 12
         out.append(f'<circle cx="{right}" cy="{y + 13}" r="10" fill="{CALLOUT}"/>')
         out.append(text(right, base, str(row.step), size=12, weight=600, colour="#ffffff"))
     return out
