@@ -19,7 +19,7 @@ import pytest
 
 from heptarm.io.plan_box import PlanBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
-from tests.cli.running import HEPTARM, objects, run, sim
+from tests.cli.running import HEPTARM, objects, refused, run, sim
 from tests.conftest import RunningCabinet
 from tests.retry import retry, starved
 
@@ -247,7 +247,7 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
 def test_refusals_are_one_sentence_and_exit_code_1(
     target: str, arguments: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
-    done = run(*arguments, "--target", target)
+    done = refused(*arguments, "--target", target)
     assert done.returncode == 1 and done.stdout == ""
     assert len(done.stderr.strip().splitlines()) == 1 and "Traceback" not in done.stderr
     for word in words:

@@ -912,7 +912,7 @@ class ArmVerbs(Sealed):
         try:
             yield
         finally:
-            self._breaks = tuple(one for one in self._breaks if one is not rule)
+            self._breaks = tuple(other for other in self._breaks if other is not rule)
 
     def _terms(
         self,

@@ -103,7 +103,7 @@ def install_cabinet(
     print(f"{out / ARCHIVE} has all sources in one file; their check sum is {check_sum}.")
     print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
     if left_out:
-        refused = " and ".join(f"{OPTIONS[one]} (option {one})" for one in left_out)
+        refused = " and ".join(f"{OPTIONS[option]} (option {option})" for option in left_out)
         print(f"They compile without the packages of these options, and refuse {refused}.")
     if not key:
         risk = "without a key, any program that reaches the cabinet's port can move the robot"

@@ -42,9 +42,9 @@ def _text(root: ET.Element) -> str:
 
 
 def _add(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
-    one = ET.SubElement(parent, tag, attributes)
-    one.text = text or None
-    return one
+    element = ET.SubElement(parent, tag, attributes)
+    element.text = text or None
+    return element
 
 
 def _pieces(shape: TreeShape) -> Iterator[TreeShape]:
@@ -176,11 +176,11 @@ def sdf(name: str, bodies: Sequence[TreeBody], meshes: str) -> str:
                 _add(inertia, key, value)
         for index, shape in enumerate(body.shapes):
             for purpose in _purposes(shape):
-                one = _add(link, purpose, name=f"{purpose}_{index}")
-                _sdf_pose(one, shape.pose)
-                _sdf_geometry(_add(one, "geometry"), shape, meshes)
+                element = _add(link, purpose, name=f"{purpose}_{index}")
+                _sdf_pose(element, shape.pose)
+                _sdf_geometry(_add(element, "geometry"), shape, meshes)
                 if purpose == "visual":
-                    material = _add(one, "material")
+                    material = _add(element, "material")
                     _add(material, "ambient", numbers(shape.colour))
                     _add(material, "diffuse", numbers(shape.colour))
         _sdf_joint(model, body)
@@ -201,10 +201,10 @@ def _sdf_geometry(geometry: ET.Element, shape: TreeShape, meshes: str) -> None:
     elif shape.kind == "ellipsoid":
         _add(_add(geometry, "ellipsoid"), "radii", numbers(shape.size))
     else:
-        one = _add(geometry, shape.kind)
-        _add(one, "radius", number(radius))
+        element = _add(geometry, shape.kind)
+        _add(element, "radius", number(radius))
         if shape.kind != "sphere":
-            _add(one, "length", number(2.0 * half))
+            _add(element, "length", number(2.0 * half))
 
 
 def _sdf_joint(model: ET.Element, body: TreeBody) -> None:
@@ -255,17 +255,19 @@ def mjcf(name: str, bodies: Sequence[TreeBody], meshes: str) -> str:
     made = {BASE: _add(root, "worldbody")}
     for body in bodies:
         if body.parent:
-            made[body.name] = one = _add(made[body.parent], "body", name=body.name, **_mjcf_place(body.pose))
+            made[body.name] = element = _add(
+                made[body.parent], "body", name=body.name, **_mjcf_place(body.pose)
+            )
             if body.mass > 0.0:
                 entries = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
                 _add(
-                    one,
+                    element,
                     "inertial",
                     pos=numbers(body.com),
                     mass=number(body.mass),
                     fullinertia=numbers(entries),
                 )
-            _mjcf_joint(one, body.joint)
+            _mjcf_joint(element, body.joint)
         for shape in body.shapes:
             _mjcf_shape(made[body.name], shape)
     return _text(root)

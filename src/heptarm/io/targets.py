@@ -142,7 +142,7 @@ def _read(name: str, table: Any) -> SavedTarget:
         raise CommandRejected(
             f"{where}: tools must be tables", parameter=name, hint=f"write [{name}.tools.NAME]"
         )
-    values[_TOOLS] = tuple(_read_tool(one, content, where) for one, content in tools.items())
+    values[_TOOLS] = tuple(_read_tool(name, content, where) for name, content in tools.items())
     if isinstance(values.get("flange"), float):  # a height may be a number
         values["flange"] = f"{values['flange']:g}"
     return check_target(SavedTarget(name, **values), where)

@@ -227,7 +227,9 @@ class PanelArm:
         before, self._stops = self._stops, safety.stops
         new = [] if before is None else [reason for reason in safety.stops if reason not in before]
         if new:
-            remedies = [one.remedy for one in self._reasons(safety) if one.what in map(str.capitalize, new)]
+            remedies = [
+                reason.remedy for reason in self._reasons(safety) if reason.what in map(str.capitalize, new)
+            ]
             self._last_stop = Advice(
                 ", ".join(new).capitalize(), remedies[0] if remedies else "", "warning", time.time()
             )
@@ -642,5 +644,5 @@ class PanelArm:
 def groups_for(offered: object) -> tuple[str, ...]:
     """The groups of a state that the panel subscribes to: all that a cabinet offers."""
     kind = type(offered)
-    names = {one.name for one in kind if one & offered}  # type: ignore[attr-defined]
+    names = {group.name for group in kind if group & offered}  # type: ignore[attr-defined]
     return tuple(name for name in GROUP_NAMES if name.upper() in names)

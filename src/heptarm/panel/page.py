@@ -341,8 +341,8 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        for one in (self._gizmo, self._go, self._follows, self._plan_path, self._upright):
-            one.visible = shown
+        for control in (self._gizmo, self._go, self._follows, self._plan_path, self._upright):
+            control.visible = shown
         self._world.name_bodies(visible=shown)
         self.model.goal = None
 
@@ -443,7 +443,7 @@ class ArmPage:
             "Attach", lambda: model.attach_tool("" if self._tool.value == _NONE else self._tool.value)
         )
         self._inputs = gui.add_html("")
-        outputs = [one for one in arm.io.signals.values() if one.is_output][: texts.MOST_SIGNALS]
+        outputs = [signal for signal in arm.io.signals.values() if signal.is_output][: texts.MOST_SIGNALS]
         for signal in outputs:
             if signal.kind == "boolean":
                 handle = gui.add_checkbox(signal.name, initial_value=False)

@@ -44,7 +44,7 @@ def scenarios() -> tuple[Scenario, ...]:
     """All of them, group by group."""
     for group in GROUPS:
         importlib.import_module(f"heptarm.testing.catalogue.{group}")
-    return tuple(sorted(REGISTRY.values(), key=lambda one: GROUPS.index(one.group)))
+    return tuple(sorted(REGISTRY.values(), key=lambda scenario: GROUPS.index(scenario.group)))
 
 
 def find(patterns: Sequence[str] = ()) -> tuple[Scenario, ...]:
@@ -59,19 +59,19 @@ def find(patterns: Sequence[str] = ()) -> tuple[Scenario, ...]:
         return every
     for pattern in patterns:
         instance(pattern, str, "patterns")
-        if not any(_fits(one, pattern) for one in every):
+        if not any(_fits(scenario, pattern) for scenario in every):
             raise CommandRejected(
                 f"no scenario {pattern!r}",
                 parameter="only",
                 value=pattern,
-                allowed=", ".join(dict.fromkeys(one.group for one in every)),
+                allowed=", ".join(dict.fromkeys(scenario.group for scenario in every)),
                 hint="name a group, a scenario, or a pattern such as motions.*",
             )
-    return tuple(one for one in every if any(_fits(one, pattern) for pattern in patterns))
+    return tuple(scenario for scenario in every if any(_fits(scenario, pattern) for pattern in patterns))
 
 
-def _fits(one: Scenario, pattern: str) -> bool:
-    return one.group == pattern or fnmatch.fnmatchcase(one.name, pattern)
+def _fits(scenario: Scenario, pattern: str) -> bool:
+    return scenario.group == pattern or fnmatch.fnmatchcase(scenario.name, pattern)
 
 
 #: At home the joints are within this [rad].
@@ -129,7 +129,7 @@ def run(
             outcomes.append(outcome)
             if on_end is not None:
                 on_end(outcome)
-        if any(one.verdict is not Verdict.LEFT_OUT and one.scenario.moves for one in outcomes):
+        if any(outcome.verdict is not Verdict.LEFT_OUT and outcome.scenario.moves for outcome in outcomes):
             tidy(arm, home=True)
     finally:
         arm.speed = before

@@ -315,7 +315,7 @@ def instance(value: object, kind: type[_Kind] | tuple[type, ...], name: str, hin
     """
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
-        wanted = " or ".join(one.__name__ for one in kinds)
+        wanted = " or ".join(kind.__name__ for kind in kinds)
         article = "an" if wanted[0] in "AEIOU" else "a"
         raise ShapeError(
             f"{name} must be {article} {wanted}, got {shown(value)}", parameter=name, value=value, hint=hint

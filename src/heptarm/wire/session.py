@@ -207,18 +207,12 @@ class Session:
         Raises:
             LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
-        data = self.pack_numbers(kind, numbers, time=time, number=number)
-        self._count_sent()
-        return data
-
-    def pack_numbers(
-        self, kind: type[OneWay], numbers: Iterable[float], *, time: int, number: int = 0
-    ) -> bytes:
-        """Pack as `send_numbers` does, without counting the message as sent."""
         pack = self._packers.get(kind)
         if pack is None:
             raise self._illegal(kind)
-        return pack(self.counts[SENT], number, time, *numbers)
+        data = pack(self.counts[SENT], number, time, *numbers)
+        self._count_sent()
+        return data
 
     def datagrams(self, session: int, token: bytes) -> Datagrams:
         """This side's end of the datagrams beside the session.

@@ -244,8 +244,8 @@ class JogServo(Servo):
         sample = self._connection.feed.newest
         state = None if sample is None else self._connection.build(sample)
         behind = lag(path, dq, state, now=now, rate=self._connection.real_time_factor)
-        held = [one for one in (behind, self._obstacle(path, dq), self._wall(path, dq)) if one]
-        least = min((*done, path.advance(dq, dt, held)), key=lambda one: one.factor)
+        held = [slowdown for slowdown in (behind, self._obstacle(path, dq), self._wall(path, dq)) if slowdown]
+        least = min((*done, path.advance(dq, dt, held)), key=lambda slowdown: slowdown.factor)
         if self._leaves(path.q):
             path.stay_at(before)
             least = Slowdown("workspace", 0.0)
@@ -396,7 +396,7 @@ class TwistServo(JogServo):
         dq, singular = resolved_twist(
             self._connection.robot, path, slowed, point, elbow=self._elbow, idle=wanted is None
         )
-        return dq, [one for one in (singular, wall) if one.reason]
+        return dq, [slowdown for slowdown in (singular, wall) if slowdown.reason]
 
     def _unbounded(self, path: VelocityPath, command: Array) -> Array:
         limits = self._twist_limits

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from math import nan
@@ -23,13 +22,11 @@ from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
 from heptarm.errors import (
     CollisionForeseen,
     CommandRejected,
-    HeptarmError,
     LocalProtocolError,
     ShapeError,
     Timeout,
     Unreachable,
 )
-from heptarm.io.tcp import WarmUpConnection
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
@@ -387,8 +384,6 @@ def documented(method: _Method) -> _Method:
 _PATIENCE = 5.0
 #: Calls of `set` whose cost is kept for the statistics.
 _COSTS = 4096
-#: Time before a tick at which its thread wakes to warm up the caches [s].
-_EARLY = 200e-6
 _DOUBLES = np.dtype(np.float64)
 #: Of a straight servo motion: time between two looks for what slows it down, the time that one takes at most [ns], and
 #: that in which it would be at its target, where nothing slows it down any more [s].
@@ -525,8 +520,6 @@ class Servo(Block):
         self._began = self._due = self._last = 0
         self._first_sent = self._last_sent = 0
         self._sent = self._late_ticks = self._clamped = 0
-        self._warm_up_socket: WarmUpConnection | None = None
-        self._last_target: tuple[type[wire.OneWay], tuple[float, ...]] | None = None
         self._costs: deque[int] = deque(maxlen=_COSTS)
 
     # ------------------------------------------------------------------------------------ life
@@ -542,7 +535,6 @@ class Servo(Block):
             raise LocalProtocolError("a servo is used once", hint="make another one with arm.servo(...)")
         self._connection.check_may_wait("the with block of arm.servo()")
         self._open(self._wait_for_start)
-        self._warm_up_socket = WarmUpConnection()
         self._began = self._due = self._last = self._clock.nanos()
         return self
 
@@ -584,8 +576,6 @@ class Servo(Block):
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
         handle = self._handle
-        if self._warm_up_socket is not None:
-            self._warm_up_socket.close()
         if handle is None or self._result is not None:
             return
         if not handle.done:
@@ -642,8 +632,6 @@ class Servo(Block):
         now = clock.nanos()
         if now < self._due:
             self._look_ahead(now)
-            clock.sleep((self._due - now) * 1e-9 - _EARLY)
-            self._warm_up()
             clock.sleep_until(self._due)
             now = clock.nanos()
         late = (now - self._due) * 1e-9
@@ -655,14 +643,6 @@ class Servo(Block):
         self._last = now
         return passed if self._active else None
 
-    def _warm_up(self) -> None:
-        """Encode and send the last target to nowhere: between two ticks the code falls out of the caches."""
-        if self._clear is not None:
-            self._clear.warm_up()
-        if self._last_target is not None and self._warm_up_socket is not None:
-            with suppress(HeptarmError):  # the link has ended: sending the next target raises
-                self._warm_up_socket.send(self._link.pack_target(*self._last_target, now=self._clock.nanos()))
-
     def _look_ahead(self, now: int) -> None:
         """Use the time until the next tick, on the clock of this machine [ns]."""
 
@@ -670,8 +650,8 @@ class Servo(Block):
         if not self._active:
             _ = self.start  # raises unless it has begun
             return
-        self._last_target = kind, (self._number, self.watchdog, *target)
-        self._link.send_target(*self._last_target, now=began, watchdog=self.watchdog)
+        numbers = (self._number, self.watchdog, *target)
+        self._link.send_target(kind, numbers, now=began, watchdog=self.watchdog)
         self._sent += 1
         self._last_sent = now = self._clock.nanos()
         self._costs.append(now - began)
@@ -870,11 +850,6 @@ class JointServo(Servo):
         if boundary.refuses and boundary.excess(q) > max(boundary.excess(last), TOLERANCE):
             raise boundary.refusal(q, "the target", parameter="q")
         return boundary.clamped(q, last)
-
-    def _warm_up(self) -> None:
-        if self._newest is not None:
-            self._clip(self._newest)
-        super()._warm_up()
 
 
 class PoseServo(Servo):

@@ -138,7 +138,7 @@ def goals_of(context: NodeContext, constraints: Sequence[Any]) -> list[Array | P
     """
     if not constraints:
         raise RequestRefused("there is no goal", MoveItCode.INVALID_GOAL_CONSTRAINTS)
-    return [_goal_of(context, one) for one in constraints]
+    return [_goal_of(context, constraint) for constraint in constraints]
 
 
 def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
@@ -150,7 +150,9 @@ def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
         )
     joints = message.joint_constraints
     if joints and not any(counts):
-        return positions(context.driver, [one.joint_name for one in joints], [one.position for one in joints])
+        return positions(
+            context.driver, [joint.joint_name for joint in joints], [joint.position for joint in joints]
+        )
     if joints or not counts[0]:
         raise RequestRefused(
             "a goal must be joint positions, or a position with or without an orientation",
@@ -168,15 +170,16 @@ def _pose_goal(context: NodeContext, place: Any, turns: Sequence[Any]) -> Pose |
     has_lever = bool(np.abs(to_tool.xyz).max() > 0.0)
     centre, radius = _ball(context, place)
     if turns:
-        one = turns[0]
-        if one.link_name not in ("", place.link_name):
+        orientation = turns[0]
+        if orientation.link_name not in ("", place.link_name):
             raise RequestRefused(
-                f"position and orientation must be of the same link, got {place.link_name!r} and {one.link_name!r}",
+                "position and orientation must be of the same link, "
+                f"got {place.link_name!r} and {orientation.link_name!r}",
                 MoveItCode.INVALID_GOAL_CONSTRAINTS,
             )
-        quat = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).quat
-        cone = min(one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, pi)
-        turn = min(one.absolute_z_axis_tolerance, pi)
+        quat = _in_base(context, orientation.header, (0.0, 0.0, 0.0), orientation.orientation).quat
+        cone = min(orientation.absolute_x_axis_tolerance, orientation.absolute_y_axis_tolerance, pi)
+        turn = min(orientation.absolute_z_axis_tolerance, pi)
     elif has_lever:
         raise RequestRefused(
             "a position with any orientation must be of the tool frame itself",
@@ -274,8 +277,12 @@ def keep_of(context: NodeContext, message: Any, start: Array) -> Upright | None:
         )
     if not message.orientation_constraints:
         return None
-    one = message.orientation_constraints[0]
-    tolerances = (one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, one.absolute_z_axis_tolerance)
+    constraint = message.orientation_constraints[0]
+    tolerances = (
+        constraint.absolute_x_axis_tolerance,
+        constraint.absolute_y_axis_tolerance,
+        constraint.absolute_z_axis_tolerance,
+    )
     free = [index for index, tolerance in enumerate(tolerances) if tolerance >= pi]
     if len(message.orientation_constraints) > 1 or len(free) != 1:
         raise RequestRefused(
@@ -283,14 +290,16 @@ def keep_of(context: NodeContext, message: Any, start: Array) -> Upright | None:
             f"{', '.join(f'{value:g}' for value in tolerances)} rad",
             MoveItCode.INVALID_GOAL_CONSTRAINTS,
         )
-    link = link_on_flange(context, one.link_name)
+    link = link_on_flange(context, constraint.link_name)
     to_tool = link.inverse() @ tool_on_flange(context)
     along = np.abs(to_tool.rotation.T[:, free[0]])
     if along.max() < np.cos(_ALONG):
         raise RequestRefused(
             "the axis that stays upright must be one of the tool frame", MoveItCode.INVALID_GOAL_CONSTRAINTS
         )
-    wanted = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).rotation[:, free[0]]
+    wanted = _in_base(context, constraint.header, (0.0, 0.0, 0.0), constraint.orientation).rotation[
+        :, free[0]
+    ]
     flange = Pose.from_matrix(forward(context.arm.robot, start))
     here = (flange @ link).rotation[:, free[0]]
     tilt = float(np.arccos(np.clip(wanted @ here, -1.0, 1.0)))

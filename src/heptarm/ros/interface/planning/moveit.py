@@ -354,7 +354,10 @@ def _cartesian(context: NodeContext, request: Any) -> Mapping[str, Any]:
         )
     link = link_on_flange(context, request.link_name)
     stamped = class_of("geometry_msgs/PoseStamped", "msg")
-    poses = [stamped_in_base(context, stamped(header=request.header, pose=one)) for one in request.waypoints]
+    poses = [
+        stamped_in_base(context, stamped(header=request.header, pose=waypoint))
+        for waypoint in request.waypoints
+    ]
     speed = (
         getattr(request, "max_velocity_scaling_factor", 0.0) or context.driver.configuration.values["speed"]
     )
