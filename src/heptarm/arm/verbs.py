@@ -1002,6 +1002,8 @@ class ArmVerbs(Sealed):
         self._tooling.check_until(parts)
         terms = StreamTerms(
             replace(message, until=ends),
+            request=request,
+            ceiling=self._speed,
             period=request.period,
             watchdog=request.watchdog_time,
             boundary=self._foresight.boundary(),

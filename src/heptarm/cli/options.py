@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -219,6 +221,16 @@ class Access:
         """
         if not (arm.is_virtual or self.yes or confirm(question)):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+
+    def consent(self, arm: Arm) -> Callable[[object], bool]:
+        """What shows a plan, and asks a person before a real robot moves like that; it raises NotReady after a no."""
+
+        def ask(plan: object) -> bool:
+            print(plan, file=sys.stderr if self.as_json else sys.stdout, flush=True)
+            self.ask_first(arm, f"Move the real {arm.robot.title} like this?")
+            return True
+
+        return ask
 
 
 @Parameter(name="*")

@@ -80,11 +80,6 @@ def listing(values: Iterable[float], unit: str = "") -> str:
     return f"{texts[0] if len(set(texts)) == 1 else ' '.join(texts)} {unit}".rstrip()
 
 
-def extent(low: Iterable[float], high: Iterable[float]) -> str:
-    """A box by its corners [m], as x 0.40 to 0.62, y and z likewise."""
-    return ", ".join(f"{axis} {least:.2f} to {most:.2f}" for axis, least, most in zip("xyz", low, high))
-
-
 def lines(title: str, rows: Mapping[str, str]) -> Listing:
     """A title and aligned rows below it; empty ones are left out."""
     shown = {name: text for name, text in rows.items() if text}

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.servo import Servo, ServoStats, StreamTerms
-from heptarm.errors import HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.model.boundary import TOLERANCE
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.model.velocity import (
@@ -166,6 +166,14 @@ class JogServo(Servo):
 
     def _check_of_targets(self) -> None:
         """None: the path brakes before bodies, so no target of it is refused."""
+
+    def _check_may_change(self, limit: str) -> None:
+        """Refuse it: `set` has the velocity of each moment."""
+        raise CommandRejected(
+            f"a stream of velocities keeps its limits, got another {limit}",
+            parameter=limit,
+            hint="set() takes the velocity; for a higher limit leave the with block and begin another one",
+        )
 
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
