@@ -94,9 +94,11 @@ def generate(source: Path, out: Path, others: Sequence[Path] = ()) -> int:
 
 def fallback(folder: Path) -> str:
     """Text of a path file by which Python finds the packages of a folder after all others, whenever installed."""
+    # one line, whose names are gone when the lambda is called
     return (
-        "import sys, importlib.machinery as m; sys.meta_path.append(type('Interfaces', (), {'find_spec': staticmethod("
-        f"lambda name, path=None, target=None: None if path else m.PathFinder.find_spec(name, [{str(folder)!r}]))}}))\n"
+        "import sys; sys.meta_path.append(type('Interfaces', (), {'find_spec': staticmethod(lambda name, path=None, "
+        "target=None: None if path else __import__('importlib.machinery').machinery.PathFinder.find_spec("
+        f"name, [{str(folder)!r}]))}}))\n"
     )
 
 

@@ -98,10 +98,10 @@ def test_interfaces_of_ours_never_hide_those_of_the_distribution(tmp_path: Path)
             (tmp_path / folder / package).mkdir(parents=True)
             (tmp_path / folder / package / "__init__.py").touch()
             (tmp_path / folder / package / "msg.py").write_text(f"whose = {folder!r}")
-    line = fallback(tmp_path / "ours")
-    program = (
-        f"{line}import control_msgs.msg, tf2_msgs.msg\nprint(control_msgs.msg.whose, tf2_msgs.msg.whose)"
-    )
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "heptarm_interfaces.pth").write_text(fallback(tmp_path / "ours"))
+    program = f"import site; site.addsitedir({str(tmp_path / 'site')!r})\n"
+    program += "import control_msgs.msg, tf2_msgs.msg; print(control_msgs.msg.whose, tf2_msgs.msg.whose)"
     done = subprocess.run(
         [sys.executable, "-S", "-c", program],
         check=True,
