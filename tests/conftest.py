@@ -46,7 +46,7 @@ _LONG_FIRST = (
 _COMPUTING = ("fri", "house", "laws", "model", "rl", "schema", "sim", "values", "wire")
 
 # no timing assertions, above all on a busy machine
-settings.register_profile("heptarm", deadline=None, max_examples=longer(40, 200))
+settings.register_profile("heptarm", deadline=None, max_examples=longer(25, 200))
 settings.load_profile("heptarm")
 # a mutant is to be noticed, not to be explained
 settings.register_profile(

@@ -86,6 +86,7 @@ def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
     assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_a_cabinet_without_power_and_back(other: Client) -> None:
     reports = collect("/diagnostics", DiagnosticArray)
     sent = other.send(long(other))
@@ -106,6 +107,7 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
     assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
     """The cabinet brakes the arm, the goal ends, and the node continues."""
     sent = other.send(step(other, time=9.0, size=6.0))
@@ -124,6 +126,7 @@ def step_anywhere(client: Client) -> TrajectoryGoal:
     return TrajectoryGoal(client.joints, (TrajectoryPoint(5.0, (0.0,) * 7),))
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_without_a_cabinet_it_waits_and_a_wrong_parameter_ends_it_with_one_line(
     ros: None, spare: Stage
 ) -> None:

@@ -81,7 +81,7 @@ def _summary(place: str) -> str:
     """First line of a command's docstring, read from its source."""
     module, function = place.split(":")
     tree = ast.parse(Path(__file__).parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
-    (found,) = (one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == function)
+    (found,) = (node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == function)
     return (ast.get_docstring(found) or "").partition("\n")[0]
 
 

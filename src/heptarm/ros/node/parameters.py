@@ -337,7 +337,9 @@ class NodeConfiguration:
         for name in values:
             if name not in table:
                 raise CommandRejected(f"unknown parameter {name!r}", parameter=name, hint=meant(name, table))
-        known = {name: one.check(values.get(name, one.default)) for name, one in table.items()}
+        known = {
+            name: parameter.check(values.get(name, parameter.default)) for name, parameter in table.items()
+        }
         made = NodeConfiguration(known, tuple(f"{known['prefix']}{name}" for name in names))
         _ = made.posture  # refused here, not with the first target
         if known["target"]:

@@ -141,7 +141,7 @@ class _Request:
         self.is_here = start is None or bool(np.abs(start - here).max() < _HERE)
         self.start = here if start is None or self.is_here else start
         self._goals = goals_of(context, message.goal_constraints)
-        self._keep = keep_of(context, message.path_constraints, self.start)
+        self._keep = keep_of(context, message.path_constraints)
         draft = context.world.draft()
         if difference is not None:
             change_scene(context, draft, difference)
@@ -348,14 +348,17 @@ def _cartesian(context: NodeContext, request: Any) -> Mapping[str, Any]:
     check_group(context, request.group_name)
     start = start_of(context, request.start_state)
     begin = context.arm.state.q_cmd if start is None else start
-    if keep_of(context, request.path_constraints, begin) is not None or not len(request.waypoints):
+    if keep_of(context, request.path_constraints) or not len(request.waypoints):
         raise RequestRefused(
             "a Cartesian path must have waypoints, and no constraints beside them",
             MoveItCode.INVALID_GOAL_CONSTRAINTS,
         )
     link = link_on_flange(context, request.link_name)
     stamped = class_of("geometry_msgs/PoseStamped", "msg")
-    poses = [stamped_in_base(context, stamped(header=request.header, pose=one)) for one in request.waypoints]
+    poses = [
+        stamped_in_base(context, stamped(header=request.header, pose=waypoint))
+        for waypoint in request.waypoints
+    ]
     speed = (
         getattr(request, "max_velocity_scaling_factor", 0.0) or context.driver.configuration.values["speed"]
     )
