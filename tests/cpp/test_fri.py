@@ -77,7 +77,7 @@ def test_an_application_of_the_shape_of_the_sdk(
                 client.kill()
 
     def late(said: str | Exception) -> str:
-        # a machine that answers too late ends the session: the client says so by its cycles
+        # a machine that answers too late ends the session: the client has counted fewer cycles
         return "answers came late" if isinstance(said, str) and f"in {CYCLES} cycles" not in said else ""
 
     said = retry(drive, late)

@@ -42,11 +42,11 @@ class StatePublisher:
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._status = node.create_publisher(Status, "~/status", latched)
         self._controllers = [
+            node.create_publisher(JointTrajectoryControllerState, "~/controller_state", 10, **mine)
+        ]
+        self._controllers += [
             node.create_publisher(JointTrajectoryControllerState, name, 10, **mine)
-            for name in (
-                "~/controller_state",
-                *PRESETS[configuration.values["names"]].controller_states(),
-            )
+            for name in PRESETS[configuration.values["names"]].controller_states()
         ]
         self._scaling = node.create_publisher(Float64, "~/speed_scaling", latched)
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)

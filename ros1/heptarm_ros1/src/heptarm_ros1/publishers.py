@@ -41,9 +41,10 @@ class StatePublisher:
             "state": publisher(RobotState, "~state"),
         }
         self._status = publisher(Status, "~status", latch=True)
-        self._controllers = [
+        self._controllers = [publisher(JointTrajectoryControllerState, "~controller_state")]
+        self._controllers += [
             publisher(JointTrajectoryControllerState, name)
-            for name in ("~controller_state", *PRESETS[configuration.values["names"]].controller_states())
+            for name in PRESETS[configuration.values["names"]].controller_states()
         ]
         self._scaling = publisher(Float64, "~speed_scaling", latch=True)
         self._diagnostics = publisher(DiagnosticArray, "/diagnostics")
