@@ -95,6 +95,7 @@ def calibration_sigma() -> Iterator[Figure]:
         "tip_by_touch": _touch,
         "load": _load,
         "hand_eye": _hand_eye,
+        "hand_eye_tags": _tags,
     }
     for name, off in kinds.items():
         inside = np.mean([off(seed) <= 2.0 for seed in range(RUNS)], axis=0)
@@ -132,7 +133,14 @@ def _load(seed: int) -> Array:
 
 
 def _hand_eye(seed: int) -> Array:
-    given = eye.views("flange", pixels=0.1, arm=1e-4, seed=seed)
-    found = calibration.estimate_hand_eye(given, matrix=eye.MATRIX)
+    return _camera(eye.views("flange", pixels=0.1, arm=1e-4, seed=seed))
+
+
+def _tags(seed: int) -> Array:
+    return _camera(eye.seen_tags(seed))
+
+
+def _camera(views: list[calibration.HandEyeView]) -> Array:
+    found = calibration.estimate_hand_eye(views, matrix=eye.MATRIX)
     sigma = np.concatenate([found.sigma, found.sigma_angle])
     return np.asarray(np.abs(eye.errors(found, eye.CAMERA)) / sigma)
