@@ -18,6 +18,7 @@ from heptarm.calibration.hand_eye_estimate import HandEyeGuess, HandEyeModel
 from heptarm.cli.calibrate_eye import board, eye
 from heptarm.cli.options import Access, CommandTarget
 from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.io.targets import SavedTarget, add_target, save_tool, saved_targets, targets_file
 from heptarm.values.robot import robot
 from tests.drawing import cannot_draw
 from tests.long import longer
@@ -103,6 +104,29 @@ def test_the_standard_deviations_are_honest(frame: Frame, arm: float) -> None:
         sizes.append(np.square(off).mean())
     assert inside >= 0.9 * 6 * runs, "the truth is within two of them in nine of ten"
     assert np.mean(sizes) > 0.2, "and they are not far too large"
+
+
+def test_a_camera_goes_into_the_entry_of_a_saved_target(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    found = estimate_hand_eye(views(), matrix=MATRIX)
+    with pytest.raises(CommandRejected, match="there is no target lab1"):
+        found.save("lab1", "wrist")
+    add_target(SavedTarget("lab1", "172.31.1.147"))
+    save_tool("lab1", ha.Tool("gripper", mass=1.2))
+    for _ in range(2):  # the second one takes the place of the first
+        made = found.save("lab1", "wrist")
+    assert saved_targets()["lab1"].cameras == (made,) and saved_targets()["lab1"].tools[0].mass == 1.2
+    assert calibration.saved_camera("lab1", "wrist") == made and made.pose == found.pose
+    with pytest.raises(CommandRejected, match="saved target 'lab1', which has wrist; got 'head'"):
+        calibration.saved_camera("lab1", "head")
+    add_target(SavedTarget("lab1", "172.31.1.148"), replace=True)
+    assert calibration.saved_camera("lab1", "wrist") == made, "a new address keeps what was measured"
+    file = targets_file()
+    file.write_text(file.read_text().replace('frame = "flange"', 'frame = "tool"'))
+    with pytest.raises(CommandRejected, match=r"camera wrist of \[lab1\] in .*: frame must be"):
+        saved_targets()
 
 
 def test_a_wrong_view_is_named_and_the_others_predict_it() -> None:

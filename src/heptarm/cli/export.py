@@ -38,7 +38,7 @@ def export(
     fitted: Annotated[
         Path | None,
         Parameter(
-            help="File of a measured arm, of heptarm calibrate arm: its friction and rotors. Default: those of the simulator."
+            help="File of heptarm calibrate arm: friction and rotors of your arm. Default: those of the simulator."
         ),
     ] = None,
     overwrite: Overwrite = False,
