@@ -138,8 +138,8 @@ def excitation(
     far = array(
         np.broadcast_to(np.asarray(reach, dtype=np.float64), 7) if np.ndim(reach) == 0 else reach, 7, "reach"
     )
-    for index, one in enumerate(far.tolist()):
-        within(one, f"reach[{index}]", 0.05, 3.0, unit="rad")
+    for index, angle in enumerate(far.tolist()):
+        within(angle, f"reach[{index}]", 0.05, 3.0, unit="rad")
     postures, speeds, duration = [np.asarray(arm.state.q_cmd)], list[float](), 0.0
     tried, goes_back = 0, False
     random = np.random.default_rng(integer(seed, "seed", 0, 2**31))
@@ -148,8 +148,8 @@ def excitation(
         posture, part = next_posture(
             model, postures[0], postures[-1], reach=far, turn=len(speeds), random=random
         )
-        goal, one = (postures[0], fastest) if goes_back else (posture, part * fastest)
-        taken = _duration(arm, postures[-1], goal, speed=one, collision_check=collision_check)
+        goal, top = (postures[0], fastest) if goes_back else (posture, part * fastest)
+        taken = _duration(arm, postures[-1], goal, speed=top, collision_check=collision_check)
         if taken is None:
             tried += 1
             if tried > _TRIES:
@@ -162,7 +162,7 @@ def excitation(
             continue
         tried = 0
         postures.append(goal)
-        speeds.append(one)
+        speeds.append(top)
         duration += taken
     is_checked = collision_check is not None or arm.collision_check is not None
     box = flange_box(model, postures)

@@ -309,11 +309,11 @@ def _chosen(
         flat = slopes.reshape(-1, parameters)
         return np.asarray(flat.T @ flat)
 
-    known = np.add.reduce([information(one.flange) for one in views]) + _PRIOR * np.eye(parameters)
+    known = np.add.reduce([information(view.flange) for view in views]) + _PRIOR * np.eye(parameters)
     each = [information(Pose.from_matrix(forward(robot, q))) for q in postures]
     chosen: list[Array] = []
     while postures and len(chosen) < count:
-        best = int(np.argmax([np.linalg.slogdet(known + one)[1] for one in each]))
+        best = int(np.argmax([np.linalg.slogdet(known + added)[1] for added in each]))
         known = known + each.pop(best)
         chosen.append(postures.pop(best))
     return chosen

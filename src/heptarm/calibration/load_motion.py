@@ -146,7 +146,7 @@ def _postures(model: RobotModel, start: Array) -> Array:
     for row, offsets in zip(result[1:], _OFFSETS[1:], strict=True):
         for axis, offset in zip(range(3, 7), deg(*offsets), strict=True):
             down, up = low[axis] - start[axis], high[axis] - start[axis]
-            fitting = [one for one in (offset, -offset) if down <= one <= up]
+            fitting = [angle for angle in (offset, -offset) if down <= angle <= up]
             row[axis] += fitting[0] if fitting else np.clip(offset, min(down, 0.0), max(up, 0.0))
     return result
 
@@ -247,7 +247,7 @@ def _rest(arm: ArmVerbs, seconds: float) -> tuple[LoadSamples, Array]:
     )
     single = tau_ext.std(axis=0)
     means = (q.mean(axis=0), tau.mean(axis=0), tau_ext.mean(axis=0), single / math.sqrt(len(rows)))
-    return LoadSamples(*(one[None] for one in means)), single
+    return LoadSamples(*(mean[None] for mean in means)), single
 
 
 def _apparent(model: RobotModel, rest: LoadSamples, used: Body | None) -> tuple[float, float]:
@@ -297,7 +297,7 @@ def _moments(states: list[State], single: Array) -> list[LoadSamples]:
             continue
         noise = single / math.sqrt(near.sum())
         row = (c[0], tau[near].mean(axis=0), tau_ext[near].mean(axis=0), noise, c[1], 2.0 * c[2])
-        found.append(LoadSamples(*(one[None] for one in row)))
+        found.append(LoadSamples(*(entry[None] for entry in row)))
     return found
 
 
@@ -305,6 +305,6 @@ def _thinned(rests: list[LoadSamples], moments: list[LoadSamples]) -> LoadSample
     """All samples as one; of very many moments some."""
     step = max(1, math.ceil(len(moments) / _MOMENTS))
     result = rests[0]
-    for one in (*rests[1:], *moments[::step]):
-        result = result.joined(one)
+    for moment in (*rests[1:], *moments[::step]):
+        result = result.joined(moment)
     return result

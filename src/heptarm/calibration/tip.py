@@ -87,7 +87,7 @@ class TcpEstimate(Value):
         rows = {
             "tip": f"x {x:.2f} ± {sx:.2f}  y {y:.2f} ± {sy:.2f}  z {z:.2f} ± {sz:.2f} mm from the flange",
             "orientation": self._orientation(),
-            "residuals": " ".join(f"{1e3 * one:.2f}" for one in self.residuals) + " mm",
+            "residuals": " ".join(f"{1e3 * residual:.2f}" for residual in self.residuals) + " mm",
             "spread": _mm(self.spread),
             "worst": worst,
         }
@@ -161,7 +161,7 @@ def tcp(
         raise CommandRejected(
             "along and aligned both give the orientation", parameter="along", hint="give one of them"
         )
-    turns, places = np.array([one.rotation for one in given]), np.array([one.xyz for one in given])
+    turns, places = np.array([pose.rotation for pose in given]), np.array([pose.xyz for pose in given])
     matrix = np.concatenate([np.concatenate([turn, -np.eye(3)], axis=1) for turn in turns])
     found = np.linalg.lstsq(matrix, -places.ravel(), rcond=None)[0]
     missed = (matrix @ found + places.ravel()).reshape(-1, 3)
@@ -239,8 +239,8 @@ def checked_poses(poses: Sequence[Pose], name: str, fewest: int = 0, hint: str =
         raise ShapeError(
             f"{name} must be a sequence of poses, got {shown(poses)}", parameter=name, value=poses
         )
-    for index, one in enumerate(poses):
-        check_pose(one, f"{name}[{index}]")
+    for index, pose in enumerate(poses):
+        check_pose(pose, f"{name}[{index}]")
     if len(poses) < fewest:
         raise ShapeError(
             f"{name} must be at least {fewest}, got {len(poses)}",
@@ -268,7 +268,7 @@ def _check_differ(matrix: Array) -> None:
     least = math.sqrt(max(float(moments[0]), 1e-12))
     if 1.0 / least > _AMPLIFICATION:
         blind = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
-        direction = ", ".join(fixed(one, 2) for one in blind)
+        direction = ", ".join(fixed(component, 2) for component in blind)
         raise CommandRejected(
             f"the poses differ too little: they amplify errors of pointing {1.0 / least:.0f} times along "
             f"({direction}) of the flange, and {_AMPLIFICATION:g} times are allowed",
@@ -351,9 +351,9 @@ def _aligned(aligned: Sequence[Pose], world: Pose) -> tuple[Array, float]:
     check_pose(world, "world")
     each = [Pose.of(np.zeros(3), (pose.inverse() @ world).quat) for pose in aligned]
     # the mean of quaternions is the eigenvector of their outer products (Markley et al., 2007)
-    quats = np.array([one.quat for one in each])
+    quats = np.array([pose.quat for pose in each])
     mean = Pose.of(np.zeros(3), np.linalg.eigh(quats.T @ quats)[1][:, -1])
-    off = np.array([mean.angle_to(one) for one in each])
+    off = np.array([mean.angle_to(pose) for pose in each])
     if len(each) == 1:
         return mean.quat, math.nan
     freedom = 3 * (len(each) - 1)
@@ -390,7 +390,7 @@ def record_poses(
         if not confirm(f"{remark}{number}: bring the tip to the fixed point"):
             raise CommandRejected(f"{number} was not confirmed: nothing is changed", parameter="confirm")
         pose = _still_pose(arm, timeout)
-        near = [index for index, one in enumerate(found) if one.angle_to(pose) < _APART]
+        near = [index for index, other in enumerate(found) if other.angle_to(pose) < _APART]
         if near:
             apart = math.degrees(found[near[0]].angle_to(pose))
             remark = f"this pose is only {apart:.1f} deg from pose {near[0] + 1}, tilt the flange more; "

@@ -143,8 +143,8 @@ def tcp(
         taught = _taught(points, robot(model))
         found = calibration.tcp(taught, tolerance=tolerance)
         saved = saved_target(place) if place else None
-        named = {one.name: one for one in saved.tools} if saved is not None else {}
-        old = named.get(save, save)
+        named = {tool.name: tool for tool in saved.tools} if saved is not None else {}
+        old: Tool | KnownTool | str = named.get(save, save)
     else:
         with target.connect(control=guide != "none") as arm, _guiding(arm, guide) as confirm:
             about = calibration.record_poses(arm, count=poses, confirm=confirm)
@@ -288,8 +288,8 @@ def arm(
     if access.as_json:
         emit(
             {
-                one.name: {"value": one.value.tolist(), "sigma": one.sigma.tolist()}
-                for one in found.arm.numbers
+                numbers.name: {"value": numbers.value.tolist(), "sigma": numbers.sigma.tolist()}
+                for numbers in found.arm.numbers
             }
             | {"ratio": found.validation.ratio.tolist(), "contradictions": list(found.arm.contradictions)}
             | {"remarks": list(found.remarks), "saved": "" if save is None else str(save)}

@@ -22,11 +22,11 @@ from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
 from heptarm.panel.wizard import Wizard, WizardSettings
+from heptarm.planning.search import Keep
 from heptarm.sim.collision import CollisionModel
 from heptarm.values.checks import Array, Value, within
 from heptarm.values.io import SignalValue
 from heptarm.values.motion.planned_path import Path as PlannedPath
-from heptarm.values.motion.planned_path import PathConstraint
 from heptarm.values.pose import Pose
 from heptarm.values.state import GROUP_NAMES, Safety, State
 
@@ -232,7 +232,9 @@ class PanelArm:
         before, self._stops = self._stops, safety.stops
         new = [] if before is None else [reason for reason in safety.stops if reason not in before]
         if new:
-            remedies = [one.remedy for one in self._reasons(safety) if one.what in map(str.capitalize, new)]
+            remedies = [
+                reason.remedy for reason in self._reasons(safety) if reason.what in map(str.capitalize, new)
+            ]
             self._last_stop = Advice(
                 ", ".join(new).capitalize(), remedies[0] if remedies else "", "warning", time.time()
             )
@@ -423,7 +425,7 @@ class PanelArm:
         *,
         places: Mapping[str, Pose],
         speed: float = 0.1,
-        keep: PathConstraint | None = None,
+        keep: Keep = (),
     ) -> None:
         """Find a path to a pose of the motion frame, around the bodies of the scene, and show it; nothing moves.
 
@@ -431,7 +433,7 @@ class PanelArm:
             goal: in the base.
             places: where free bodies of the scene are in the base, by name.
             speed: fraction of the full speed, (0, 1].
-            keep: constraint along the path; None: none.
+            keep: constraints along the path.
 
         Raises:
             NoPath: none was found; the text has the bodies in the way.
@@ -653,5 +655,5 @@ class PanelArm:
 def groups_for(offered: object) -> tuple[str, ...]:
     """The groups of a state that the panel subscribes to: all that a cabinet offers."""
     kind = type(offered)
-    names = {one.name for one in kind if one & offered}  # type: ignore[attr-defined]
+    names = {group.name for group in kind if group & offered}  # type: ignore[attr-defined]
     return tuple(name for name in GROUP_NAMES if name.upper() in names)

@@ -21,9 +21,10 @@ from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import HISTORY, PanelArm, Readout
 from heptarm.panel.wizard import KINDS, WizardSettings
+from heptarm.planning.constraints import constraint_from_text
 from heptarm.values.camera import FRAMES
 from heptarm.values.frames import BASE, FLANGE, TOOL
-from heptarm.values.motion.planned_path import Upright
+from heptarm.values.motion.planned_path import OnPlane, PathConstraint, Upright
 from heptarm.values.pose import Pose
 
 #: How often a held button asks again [Hz].
@@ -309,6 +310,12 @@ class ArmPage:
         self._upright = self._gui.add_checkbox(
             "Keep the tool upright", initial_value=False, visible=False, hint="on the path around bodies"
         )
+        self._level = self._gui.add_checkbox(
+            "Keep its height", initial_value=False, visible=False, hint="likewise"
+        )
+        self._also = self._gui.add_text(
+            "Also keep", "", visible=False, hint="likewise, as in Python: OnLine((0.5, 0, 0.4), (0, 1, 0))"
+        )
         self._drive = self._gui.add_button("Drive the path", color="orange", visible=False)
         self._drive.on_click(self._runner(lambda: self.model.drive(places=self._world.places)))
         self._follows.visible = False
@@ -348,13 +355,19 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        for one in (self._gizmo, self._go, self._follows, self._plan_path, self._upright):
-            one.visible = shown
+        paths = (self._plan_path, self._upright, self._level, self._also)
+        for control in (self._gizmo, self._go, self._follows, *paths):
+            control.visible = shown
         self._world.name_bodies(visible=shown)
         self.model.goal = None
 
     def _find_path(self) -> None:
-        keep = Upright("z") if self._upright.value else None
+        keep: list[PathConstraint] = [Upright("z")] if self._upright.value else []
+        tcp = self.model.poll().tcp
+        if self._level.value and tcp is not None:
+            keep.append(OnPlane(tcp.xyz))
+        if self._also.value.strip():
+            keep.append(constraint_from_text(self._also.value, "Also keep"))
         self.model.plan_to(self._gizmo_pose(), places=self._world.places, speed=self._fraction(), keep=keep)
 
     async def _on_gizmo(self, event: Any) -> None:
@@ -450,7 +463,7 @@ class ArmPage:
             "Attach", lambda: model.attach_tool("" if self._tool.value == _NONE else self._tool.value)
         )
         self._inputs = gui.add_html("")
-        outputs = [one for one in arm.io.signals.values() if one.is_output][: texts.MOST_SIGNALS]
+        outputs = [signal for signal in arm.io.signals.values() if signal.is_output][: texts.MOST_SIGNALS]
         for signal in outputs:
             if signal.kind == "boolean":
                 handle = gui.add_checkbox(signal.name, initial_value=False)

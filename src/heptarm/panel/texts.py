@@ -92,7 +92,7 @@ def safety(readout: Readout) -> str:
 
     They take the same place whether they are few or many: no button below moves from under somebody's finger.
     """
-    boxes = [_box(one, "warn") for one in readout.stands]
+    boxes = [_box(stand, "warn") for stand in readout.stands]
     if not readout.is_connected:
         boxes = [
             _box(Advice("The connection to the cabinet is lost", "Check the cabinet; then Recover."), "bad")

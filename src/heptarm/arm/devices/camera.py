@@ -115,8 +115,8 @@ class DrawnSource:
         if self._feed.is_over:
             raise CommandRejected("the process of the camera has ended", parameter="camera")
         return [
-            _Shot(one.sampled, one.sampled + self._latency, self._split(one.data))
-            for one in self._feed.take()
+            _Shot(sample.sampled, sample.sampled + self._latency, self._split(sample.data))
+            for sample in self._feed.take()
         ]
 
     def _split(self, data: bytes) -> dict[str, npt.NDArray[Any]]:
@@ -381,8 +381,8 @@ class CameraStream(Sealed, Iterator[Picture]):
         first = integer(after, "after", 0, 2**63 - 1)
 
         def is_new() -> bool:
-            one = self._newest
-            return one is not None and one.stamp > self._returned and one.stamp >= first
+            shot = self._newest
+            return shot is not None and shot.stamp > self._returned and shot.stamp >= first
 
         with self._changed:
             self._changed.wait_for(lambda: is_new() or self._is_over, seconds)
@@ -439,7 +439,7 @@ class CameraStream(Sealed, Iterator[Picture]):
         first = self._samples.get(_LOOK)
         batch = [] if first is None else [first, *self._samples.take(_BATCH)]
         if batch:
-            rows = state_rows([one.body for one in batch])
+            rows = state_rows([sample.body for sample in batch])
             for stamp, q in zip(rows["joints_stamp"].tolist(), rows["q"], strict=True):
                 if np.isfinite(q).all():
                     self._past.append((self._link.to_ours(stamp), stamp, q))

@@ -200,8 +200,12 @@ def _seven(message: Any, unit: str) -> Array:
 
 
 def lbr_position(context: NodeContext, message: Any) -> None:
-    """Follow the positions of a lbr_fri_idl/LBRJointPositionCommand."""
-    context.driver.follow_stream(array(list(message.joint_position), 7, "joint_position [rad]"))
+    """Follow the positions of a lbr_fri_idl/LBRJointPositionCommand: by the open FRI session, if there is one."""
+    q = array(list(message.joint_position), 7, "joint_position [rad]")
+    if context.driver.fri.active:
+        context.driver.fri.command(q=q)
+    else:
+        context.driver.follow_stream(q)
 
 
 def lbr_torque(context: NodeContext, message: Any) -> None:
