@@ -66,7 +66,7 @@ def train(
     fitted: Annotated[
         Path | None,
         Parameter(
-            help="File of heptarm calibrate arm: delay and load vary about those of your arm. Default: about assumed ones."
+            help="File of heptarm calibrate arm: delay and load vary about those of your arm. Default: assumed ones."
         ),
     ] = None,
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
