@@ -184,11 +184,12 @@ def test_what_makes_no_sense_is_refused() -> None:
     "board", [Board(), Board(4, 3, 0.05, kind="apriltag"), Board(1, 1, 0.1, kind="apriltag")]
 )
 def test_a_board_is_found_in_its_own_picture(board: Board) -> None:
-    printed = np.pad(board.picture(pixels=64), 64, constant_values=255)
+    side = 64 if board.kind == "apriltag" else 60
+    printed = np.pad(board.picture(pixels=side), side, constant_values=255)
     found = board.find(printed)
     assert found is not None and len(found) == len(board.points)
-    scale = 64 / board.square
-    np.testing.assert_allclose(found.pixels, found.points[:, :2] * scale + 64 - 0.5, atol=0.15)
+    scale = side / board.square
+    np.testing.assert_allclose(found.pixels, found.points[:, :2] * scale + side - 0.5, atol=0.15)
     np.testing.assert_allclose(
         np.diff(found.pixels, axis=0).mean(), np.diff(found.points[:, :2] * scale, axis=0).mean(), atol=0.1
     )

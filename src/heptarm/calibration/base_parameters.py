@@ -17,7 +17,7 @@ from heptarm.calibration.arm_samples import aligned_windows
 from heptarm.calibration.load_estimate import POINTS, TO_PARAMETERS
 from heptarm.errors import CommandRejected
 from heptarm.model.dynamics import GRAVITY, inverse_dynamics_rows
-from heptarm.values.checks import Array, Value, array, frozen, instance, numbers
+from heptarm.values.checks import Array, Value, array, frozen, instance, numbers, within
 from heptarm.values.robot import RobotModel
 from heptarm.values.text import lines
 
@@ -120,7 +120,11 @@ def independent_columns(model: RobotModel, *, acceleration: npt.ArrayLike = GRAV
 
 
 def base_parameters(
-    run: ArmRun, *, robot: RobotModel | str | None = None, acceleration: npt.ArrayLike = GRAVITY
+    run: ArmRun,
+    *,
+    robot: RobotModel | str | None = None,
+    delay: float = 0.0,
+    acceleration: npt.ArrayLike = GRAVITY,
 ) -> BaseParameters:
     """Identify the base parameters from the measured torques of a recording, without the masses of the links.
 
@@ -128,6 +132,7 @@ def base_parameters(
         run: a recording of motions of all axes, such as `record_excitation` makes, with nothing that touches the arm;
             what is on the flange is part of the last link.
         robot: the robot; None: that of the recording.
+        delay: of the measured states, such as `simulator` finds it [s].
         acceleration: of gravity in the base frame, shape (3,) [m/s²].
 
     Raises:
@@ -135,7 +140,8 @@ def base_parameters(
     """
     samples, named = samples_of(run, "run")
     model, fall = model_of(robot, named), array(acceleration, 3, "acceleration")
-    windows = aligned_windows(samples, model, acceleration=fall).thinned(_MOST)
+    late = within(delay, "delay", 0.0, 0.05, unit="s")
+    windows = aligned_windows(samples, model, delay=late, acceleration=fall).thinned(_MOST)
     columns = independent_columns(model, acceleration=fall)
     by = dynamics_regressor(model, windows.q, windows.dq, windows.ddq, acceleration=fall)[:, :, columns]
     count, weight = len(windows.q), 1.0 / np.maximum(windows.tau_noise, 1e-6 * model.tau_max)
