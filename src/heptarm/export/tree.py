@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -176,7 +176,9 @@ def _measured(bodies: Sequence[TreeBody], fitted: FittedArm) -> Iterator[TreeBod
             yield body
             continue
         axis = names.index(body.joint.name)
-        values = {one: float(fitted[name].value[axis]) for one, name in known.items() if name in fitted}
+        values: dict[str, Any] = {
+            one: float(fitted[name].value[axis]) for one, name in known.items() if name in fitted
+        }
         yield replace(body, joint=replace(body.joint, **values))
 
 
