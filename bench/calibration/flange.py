@@ -75,15 +75,15 @@ def load() -> Iterator[Figure]:
         target = f"sim://iiwa14?speed=5&sensors=noisy:7&scene={scene}"
         with ha.connect(target, state_rate=500.0, watchdog=5.0, timeout=60.0) as arm:
             arm.move(ha.ptp(HOME))
-            plan = calibration.load_plan(arm, excitation="short", speed=0.5)
-            found = calibration.load(arm, plan=plan)
+            found = calibration.load(arm, plan=calibration.load_plan(arm, speed=0.5))
+            moved = calibration.load(arm, plan=calibration.load_plan(arm, excitation="short", speed=0.5))
     detail = {"sigma_kg": found.sigma_mass, "sigma_mm": (1e3 * found.sigma_com).tolist()}
     yield Figure("load_mass", abs(found.mass / WEIGHT - 1.0), "fraction", limit=MASS, detail=detail)
     off = 1e3 * float(np.linalg.norm(found.com - MIDDLE))
     yield Figure("load_centre", off, "mm", limit=CENTRE, detail=detail)
     matters = inertia > 0.5 * inertia.max()
-    worst = float(np.abs(found.inertia[:3] / inertia - 1.0)[matters].max())
-    sigma = {"sigma": found.sigma_inertia.tolist(), "moments": inertia.tolist()}
+    worst = float(np.abs(moved.inertia[:3] / inertia - 1.0)[matters].max())
+    sigma = {"sigma": moved.sigma_inertia.tolist(), "moments": inertia.tolist()}
     yield Figure("load_inertia", worst, "fraction", limit=INERTIA, detail=sigma)
 
 

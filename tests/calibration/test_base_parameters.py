@@ -49,7 +49,7 @@ def test_the_regressor_has_the_torques_and_the_base_of_pinocchio(tmp_path: Path)
 
 
 def test_an_arm_is_predicted_without_its_masses() -> None:
-    found = calibration.base_parameters(computed(HIDDEN, trajectory(60.0), seed=1), robot=IIWA)
+    found = calibration.base_parameters(computed(HIDDEN, trajectory(40.0), seed=1), robot=IIWA)
     given = moments(50)
     true = inverse_dynamics_rows(IIWA, *given)
     off = found.torques(*given) - true

@@ -27,7 +27,7 @@ _DEPENDENT = 1e-8
 #: Moments that show the structure of the regressor.
 _SHOWN = 60
 #: Windows that are used, and the parts that are left out in turn for the standard deviations.
-_MOST, _PARTS = 1500, 10
+_MOST, _PARTS = 800, 10
 #: Amplification of the torques' noise above which the motions do not determine the parameters.
 _CONDITION = 1e4
 
@@ -53,13 +53,13 @@ def dynamics_regressor(
     found = np.zeros((len(moments[0]), _AXES, _AXES, _EACH))
     for link in range(_AXES):
         by_point = []
-        for point in POINTS:
+        for number, point in enumerate(POINTS):
             mass, com = np.zeros(_AXES), np.zeros((_AXES, 3))
             mass[link], com[link] = 1.0, point
             alone = replace(model.links, mass=mass, com=com, inertia=np.zeros((_AXES, 3, 3)))
-            by_point.append(
-                inverse_dynamics_rows(replace(model, links=alone), *moments, acceleration=acceleration)
-            )
+            # a name stands for its numbers: models are looked up by it
+            single = replace(model, name=f"{model.name}, point {number} of link {link + 1}", links=alone)
+            by_point.append(inverse_dynamics_rows(single, *moments, acceleration=acceleration))
         found[:, :, link] = np.einsum("pb,bnj->njp", TO_PARAMETERS, np.array(by_point))
     return found.reshape(len(moments[0]), _AXES, _AXES * _EACH)
 
