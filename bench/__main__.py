@@ -16,7 +16,7 @@ import json
 import os
 import sys
 
-from bench.calibration import cameras, identification  # noqa: F401  every import registers its benchmarks
+from bench.calibration import cameras, flange, identification  # noqa: F401  every import registers its benchmarks
 from bench.contact import force  # noqa: F401
 from bench.fri import faults, guard, hold, loop  # noqa: F401
 from bench.lab import record  # noqa: F401

@@ -26,9 +26,12 @@ from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.policy import Policy, shipped
 from heptarm.rl.report import EpisodeReport
 from heptarm.values.files import refuse_existing
+from heptarm.values.fitted_arm import load_fitted
 from heptarm.values.mode.impedance import JointImpedance
 
 if TYPE_CHECKING:
+    from heptarm.rl.task import ReachTask
+    from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import Row
 
 Seed = Annotated[int, Parameter(help="Seed of all random numbers.")]
@@ -60,6 +63,12 @@ def train(
     ] = False,
     steps: Annotated[int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature.")] = 0,
     seed: Seed = 0,
+    fitted: Annotated[
+        Path | None,
+        Parameter(
+            help="File of heptarm calibrate arm: delay and load vary about those of your arm. Default: assumed ones."
+        ),
+    ] = None,
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
     engine: Engine = "mujoco",
@@ -69,12 +78,16 @@ def train(
     """Train a policy; under torchrun, several workers train one."""
     require("torch", extra="rl")
     from heptarm.rl.task import ReachTask
-    from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import train as work
 
+    if resume and fitted is not None:
+        raise CommandRejected(
+            "a resumed training keeps its ranges, so fitted has no effect",
+            parameter="fitted",
+            hint="leave it out",
+        )
     task = ReachTask(robot, action=action, feature="kinematic" if feature else "")
-    recipe = Recipe.exact(task, seed=seed) if exact else Recipe(task, seed=seed)
-    recipe = replace(recipe, steps=steps) if steps else recipe
+    recipe = recipe_of(task, seed=seed, steps=steps, fitted=fitted, is_exact=exact)
     budget = recipe.steps
 
     def show(row: Row) -> None:
@@ -112,6 +125,24 @@ def train(
     else:
         print(f"\n{trained.steps} steps in {trained.seconds:.0f} s; policy {out}, learning curve {curve}")
     return 0
+
+
+def recipe_of(
+    task: ReachTask, *, seed: int, steps: int, fitted: Path | None, is_exact: bool = False
+) -> Recipe:
+    """The recipe of a training; `fitted`: its arms vary about this one.
+
+    Raises:
+        CommandRejected: the file of the fitted arm cannot be read.
+    """
+    from heptarm.rl.sim.randomisation import Randomisation
+    from heptarm.rl.train.recipe import Recipe
+
+    recipe = Recipe.exact(task, seed=seed) if is_exact else Recipe(task, seed=seed)
+    if fitted is not None:
+        ranges = Randomisation.of_arm(load_fitted(fitted), period=1.0 / task.rate, base=recipe.randomisation)
+        recipe = replace(recipe, randomisation=ranges)
+    return replace(recipe, steps=steps) if steps else recipe
 
 
 def _engine(name: str) -> Any:
