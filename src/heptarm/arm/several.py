@@ -32,7 +32,7 @@ from heptarm.arm.verbs import camera_feed
 from heptarm.errors import CollisionForeseen, CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
-from heptarm.values.checks import flag, instance, shown, within
+from heptarm.values.checks import choice, flag, instance, shown, within
 from heptarm.values.clearance import WorldOfArms
 from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
@@ -107,15 +107,7 @@ class Arms(Sealed):
         Raises:
             CommandRejected: there is none; the text lists them.
         """
-        if name not in self._arms:
-            known = ", ".join(self._arms)
-            raise CommandRejected(
-                f"name must be one of {known}, got {shown(name)}",
-                parameter="name",
-                value=name,
-                allowed=known,
-            )
-        return self._arms[name]
+        return choice(name, "name", self._arms)
 
     def __repr__(self) -> str:
         """Short form."""

@@ -21,8 +21,9 @@ import numpy.typing as npt
 from heptarm.calibration.board import Sighting
 from heptarm.calibration.tip import student
 from heptarm.errors import CommandRejected, ShapeError, require
-from heptarm.values.camera import intrinsic
-from heptarm.values.checks import Array, Value, finite_entries, flag, frozen, instance, numbers, shown, word
+from heptarm.io.targets import save_camera, saved_targets
+from heptarm.values.camera import MountedCamera, intrinsic, lens_distortion
+from heptarm.values.checks import Array, Value, flag, frozen, instance, shown, word
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.text import lines
 
@@ -161,6 +162,40 @@ class HandEyeEstimate(Value):
         }
         return lines(f"Camera on the {self.frame} from {len(self.residuals)} views", rows)
 
+    def save(self, target: str, name: str) -> MountedCamera:
+        """Save the camera with a saved target, from which `saved_camera` reads it.
+
+        Raises:
+            CommandRejected: there is no such target; nothing is changed.
+        """
+        made = MountedCamera(name, self.frame, self.pose, self.matrix, self.distortion)
+        save_camera(target, made)
+        return made
+
+
+def saved_camera(target: str, name: str) -> MountedCamera:
+    """A camera that was measured and saved: for the arguments `pose`, `frame` and `matrix` of `Arm.camera`.
+
+    Args:
+        target: name of a saved target.
+        name: of the camera.
+
+    Raises:
+        CommandRejected: there is no such target, or it has no such camera.
+    """
+    found = saved_targets().get(target)
+    known = {} if found is None else {one.name: one for one in found.cameras}
+    if name not in known:
+        listed = ", ".join(known) or "none"
+        raise CommandRejected(
+            f"name must be that of a camera of the saved target {shown(target)}, which has {listed}; got {shown(name)}",
+            parameter="name",
+            value=name,
+            allowed=listed,
+            hint="heptarm calibrate eye --save NAME --target TARGET",
+        )
+    return known[name]
+
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
@@ -277,13 +312,7 @@ def estimate_hand_eye(
         MissingExtra: OpenCV or SciPy is not installed.
     """
     word(frame, "frame", FRAMES)
-    rest = finite_entries(numbers(distortion, "distortion"), "distortion")
-    if rest.shape != (5,):
-        raise ShapeError(
-            f"distortion must have five numbers, k1 k2 p1 p2 k3, got the shape {rest.shape}",
-            parameter="distortion",
-            value=distortion,
-        )
+    rest = lens_distortion(distortion)
     is_refined = matrix is None if refine is None else flag(refine, "refine")
     given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
     _check_turns([view.flange for view in given])

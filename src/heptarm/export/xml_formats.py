@@ -59,6 +59,11 @@ def _pieces(shape: TreeShape) -> Iterator[TreeShape]:
         yield TreeShape(kind, shape.size, pose, shape.colour, shape.collides, shape.is_drawn)
 
 
+def _joint_type(joint: TreeJoint) -> str:
+    """What URDF and SDF call a joint with one axis."""
+    return "prismatic" if joint.kind == "slide" else "revolute" if isfinite(joint.low) else "continuous"
+
+
 def _purposes(shape: TreeShape) -> list[str]:
     return ["visual"] * shape.is_drawn + ["collision"] * shape.collides
 
@@ -130,11 +135,10 @@ def _urdf_joint(root: ET.Element, body: TreeBody) -> None:
         child, pose = f"{body.name}_axis", body.pose @ Pose.of(joint.anchor)
         _add(root, "link", name=child)
         _urdf_link(root, f"{body.name}_joint", "fixed", child, body.name, Pose.of(-joint.anchor))
-    is_limited = isfinite(joint.low)
-    kind = "prismatic" if joint.kind == "slide" else "revolute" if is_limited else "continuous"
+    kind = _joint_type(joint)
     made = _urdf_link(root, joint.name, kind, body.parent, child, pose)
     _add(made, "axis", xyz=numbers(joint.axis))
-    limits = {"lower": joint.low, "upper": joint.high} if is_limited or kind == "prismatic" else {}
+    limits = {"lower": joint.low, "upper": joint.high} if kind != "continuous" else {}
     limits |= {"velocity": joint.speed, "effort": joint.effort}
     _add(made, "limit", **{key: number(np.clip(value, -_MUCH, _MUCH)) for key, value in limits.items()})
     _add(made, "dynamics", damping=number(joint.damping))
@@ -216,8 +220,7 @@ def _sdf_joint(model: ET.Element, body: TreeBody) -> None:
         _add(fixed, "parent", body.parent or "world")
         _add(fixed, "child", body.name)
         return
-    kind = "prismatic" if joint.kind == "slide" else "revolute" if isfinite(joint.low) else "continuous"
-    made = _add(model, "joint", name=joint.name, type=kind)
+    made = _add(model, "joint", name=joint.name, type=_joint_type(joint))
     if joint.anchor.any():
         _sdf_pose(made, Pose.of(joint.anchor))
     _add(made, "parent", body.parent)

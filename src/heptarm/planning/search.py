@@ -22,7 +22,7 @@ from heptarm._library import library
 from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
-from heptarm.values.checks import Array, array, frozen, integer, shown, within
+from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
 from heptarm.values.clearance import Clearance, PlanningWorld
 from heptarm.values.motion.planned_path import Path, PathConstraint, Region, SearchStats
 from heptarm.values.motion.ptp import Ptp
@@ -52,8 +52,6 @@ _REFINEMENTS = 12
 _SAMPLES = 16
 #: Name of a search that needed no trees.
 _STRAIGHT = "straight"
-#: A tolerance that is exceeded by this fraction is kept.
-_ROUNDING = 1e-9
 #: Clearances up to this are reported [m].
 _REPORTED = 0.2
 
@@ -74,6 +72,7 @@ def find_path(
     states: int = STATES,
     improve: int = 0,
     seed: int = 0,
+    known: Path | None = None,
     stop: Callable[[], bool] | None = None,
     progress: Callable[[int, float], object] | None = None,
 ) -> Path:
@@ -95,6 +94,8 @@ def find_path(
         improve: joint positions that it reaches after that in search of shorter paths, 0 to 1,000,000: of all that it
             finds before `timeout`, the fastest one is the result.
         seed: of its random numbers, 0 to 2^32 - 1.
+        known: a path to the same goal that begins nearby. Where the lines to it and along its points are free, it is
+            made shorter from this start on, and nothing is searched. None: there is none.
         stop: called again and again; the search ends when it returns true.
         progress: called again and again with the joint positions reached so far, and how near start and goal came
             [rad].
@@ -129,7 +130,8 @@ def find_path(
     search = _Search(world, begin, tcp, constraints_of(keep), limits, random)
     search.check_start()
     goals = search.goals(goal)
-    points, planner = search.connected(goals)
+    joined = None if known is None else search.joined(known, _each(goal))
+    points, planner = search.connected(goals) if joined is None else joined
     spline = search.smoothed(search.shortened(points), fraction)
     if planner != _STRAIGHT and more:
         limits.states = limits.reached + more
@@ -143,7 +145,7 @@ def find_path(
         clearance=search.nearest_on(spline.curve),
         stats=stats,
         goal=tuple(_each(goal)),
-        keep=tuple(constraints_of(keep)),
+        keep=search.kept,
         world=world,
     )
 
@@ -318,6 +320,11 @@ class _Search:
         self._keep = Constraints(keep, world.robot, tcp, start) if keep else None
         self._step = _STEP if self._keep is None else self._keep.step
 
+    @property
+    def kept(self) -> tuple[PathConstraint, ...]:
+        """The constraints, as they hold from this start on."""
+        return () if self._keep is None else self._keep.keep
+
     # -------------------------------------------------------------------------- start and goals
 
     def check_start(self) -> None:
@@ -351,7 +358,7 @@ class _Search:
         if self._keep is not None:
             deviations = self._keep.deviations(rows)
             least = float(deviations.min())
-            if least > 1.0 + _ROUNDING:
+            if least > self._keep.most:
                 raise NoPath(
                     f"goal contradicts keep: {self._keep.described(rows[deviations.argmin()])}",
                     reason="constraint",
@@ -405,6 +412,28 @@ class _Search:
         return found[((found >= self._robot.q_min) & (found <= self._robot.q_max)).all(axis=1)]
 
     # ------------------------------------------------------------------------------------ search
+
+    def joined(self, known: Path, goal: Sequence[Array | Pose | Region]) -> tuple[list[Array], str] | None:
+        """As `connected`, through the points of a path that was found before; None: a line between them is not free.
+
+        Raises:
+            ShapeError: it is no path to this goal.
+        """
+        instance(known, Path, "known")
+        if len(known.goal) != len(goal) or not all(map(_is_same, known.goal, goal)):
+            raise ShapeError(
+                "known must be a path to the same goal, got one to another goal",
+                parameter="known",
+                hint="leave it out",
+            )
+        points = [self._start]
+        for one in (known.start, *(point.q for point in known.points)):
+            line = self._line(points[-1], one)
+            if line is None:
+                return None
+            points += line
+        self._budget.reached += len(points)
+        return points, known.stats.planner
 
     def connected(self, goals: Array) -> tuple[list[Array], str]:
         """Joint positions from the start to a goal, free on the straight lines between them; and the planner."""
@@ -607,7 +636,7 @@ class _Search:
         """Pieces between two points on which a curve is not free; the first ones, empty: it is free."""
         outside = ((curve < self._robot.q_min) | (curve > self._robot.q_max)).any(axis=1)
         if self._keep is not None:
-            outside |= self._keep.deviations(curve) > 1.0 + _ROUNDING
+            outside |= self._keep.deviations(curve) > self._keep.most
         if outside.any():
             return np.unique(np.maximum(np.flatnonzero(outside) - 1, 0) // _SAMPLES)
         touch = self._world.first_on(curve)
@@ -689,6 +718,12 @@ def _each(goal: object) -> list[Array | Pose | Region]:
         value=goal,
         hint="for example heptarm.deg(0, 30, 0, -90, 0, 60, 0)",
     )
+
+
+def _is_same(one: Array | Pose | Region, other: Array | Pose | Region) -> bool:
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return isinstance(one, np.ndarray) and isinstance(other, np.ndarray) and np.array_equal(one, other)
+    return one == other
 
 
 def _apart(points: list[Array]) -> Array:

@@ -18,7 +18,7 @@ from heptarm.record.plot.signals import compare
 from heptarm.record.recorded import RecordedMotion
 from heptarm.record.recording import Recording
 from heptarm.record.samples import labels
-from heptarm.values.checks import Array, Value, flag, shown, within
+from heptarm.values.checks import Array, Value, choice, flag, shown, within
 from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.text import aligned, fixed, lines
 
@@ -134,16 +134,7 @@ class Twin(Value):
         Raises:
             CommandRejected: it was not compared; the text lists those that were.
         """
-        for deviation in self.deviations:
-            if deviation.signal == signal:
-                return deviation
-        known = ", ".join(deviation.signal for deviation in self.deviations)
-        raise CommandRejected(
-            f"signal must be one of {known}, got {shown(signal)}",
-            parameter="signal",
-            value=signal,
-            allowed=known,
-        )
+        return choice(signal, "signal", {deviation.signal: deviation for deviation in self.deviations})
 
     @property
     def parts(self) -> float:

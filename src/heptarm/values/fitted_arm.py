@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.checks import Array, Value, array, frozen, instance, shown, within, word
+from heptarm.values.checks import Array, Value, array, choice, frozen, instance, within, word
 from heptarm.values.files import path_of, read_text, refuse_existing, unwritable
 from heptarm.values.robot import Body, Friction, RobotModel, robot
 from heptarm.values.text import lines
@@ -179,13 +179,7 @@ class FittedArm(Value):
         Raises:
             CommandRejected: it is not known; the text lists those that are.
         """
-        for numbers in self.numbers:
-            if numbers.name == name:
-                return numbers
-        known = ", ".join(numbers.name for numbers in self.numbers)
-        raise CommandRejected(
-            f"name must be one of {known}, got {shown(name)}", parameter="name", value=name, allowed=known
-        )
+        return choice(name, "name", {numbers.name: numbers for numbers in self.numbers})
 
     def value(self, name: str, otherwise: Array | float) -> Array:
         """The values of a quantity; `otherwise` where it is not known."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout, require
 from heptarm.io.clock import Clock
 from heptarm.model.kinematics import forward
 from heptarm.record.camera import CameraFeed
@@ -212,6 +212,28 @@ class CalledSource:
                 return
             moment = self._clock.nanos() - self._latency
             self._shots.append(_Shot(moment, 0, {"pixels": pixels}))
+
+
+def opened_camera(text: str) -> PictureSource:
+    """What reads the next picture of a camera of this computer, or of a stream.
+
+    Args:
+        text: its number, or the address of a stream, as OpenCV opens it.
+
+    Raises:
+        CommandRejected: it cannot be opened.
+        MissingExtra: OpenCV is not installed.
+    """
+    opened = require("cv2", extra="vision").VideoCapture(int(text) if text.isdigit() else text)
+    if not opened.isOpened():
+        raise CommandRejected(
+            f"the camera {text!r} cannot be opened",
+            parameter="camera",
+            value=text,
+            hint="give its number, from 0, the address of a stream, or sim for a simulated one",
+        )
+    read: PictureSource = opened.read
+    return read
 
 
 def _pixels(given: object) -> npt.NDArray[np.uint8]:

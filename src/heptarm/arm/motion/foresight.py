@@ -153,6 +153,7 @@ class Foresight:
         states: int,
         improve: int,
         seed: int,
+        known: Path | None = None,
         stop: Callable[[], bool] | None,
         progress: Callable[[int, float], object] | None,
     ) -> Path:
@@ -184,6 +185,7 @@ class Foresight:
             states=states,
             improve=improve,
             seed=seed,
+            known=known,
             stop=stop,
             progress=progress,
         )

@@ -49,7 +49,7 @@ def velocities(driver: Driver, names: Sequence[str], values: Sequence[float]) ->
 
 def _ordered(driver: Driver, names: Sequence[str], values: Sequence[float], others: Array) -> Array:
     joints = driver.configuration.joints
-    order = list(names) or list(joints)
+    order = list(driver.configuration.own(names) or joints)
     if len(order) != len(values) or len(set(order)) != len(order):
         raise ShapeError(
             f"each of the joints {order} must have one number and appear once, got {len(values)} numbers"

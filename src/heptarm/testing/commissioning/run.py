@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import datetime
-import fnmatch
-import importlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, ModeConflict, NotReady
+from heptarm.errors import ConnectionLost, HeptarmError, ModeConflict, NotReady
 from heptarm.testing.commissioning.person import PATIENCE, PROVES, Person, PersonTask
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.step import STEPS, CommissioningStep
 from heptarm.testing.measure import Unfit
+from heptarm.testing.scenario import defined, selected
 from heptarm.testing.stage import HOME, REAL_SPEED, has_operator
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.state import OperationMode
@@ -29,9 +28,7 @@ _APPROACH = 120.0
 
 def steps() -> tuple[CommissioningStep, ...]:
     """All steps, group by group."""
-    for group in GROUPS:
-        importlib.import_module(f"heptarm.testing.commissioning.{group}")
-    return tuple(sorted(STEPS.values(), key=lambda step: GROUPS.index(step.group)))
+    return defined(STEPS, "heptarm.testing.commissioning", GROUPS)
 
 
 def find_steps(patterns: Sequence[str] = ()) -> tuple[CommissioningStep, ...]:
@@ -40,21 +37,7 @@ def find_steps(patterns: Sequence[str] = ()) -> tuple[CommissioningStep, ...]:
     Raises:
         CommandRejected: a pattern that fits none.
     """
-    every = steps()
-    for pattern in patterns:
-        if not any(_fits(step, pattern) for step in every):
-            raise CommandRejected(
-                f"no step {pattern!r} in the commissioning run",
-                parameter="only",
-                value=pattern,
-                allowed=", ".join(GROUPS),
-                hint="name a group, a step, or a pattern such as fri.*",
-            )
-    return tuple(step for step in every if not patterns or any(_fits(step, pattern) for pattern in patterns))
-
-
-def _fits(step: CommissioningStep, pattern: str) -> bool:
-    return step.group == pattern or fnmatch.fnmatchcase(step.name, pattern)
+    return selected(steps(), patterns, what="step")
 
 
 def commission(

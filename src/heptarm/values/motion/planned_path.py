@@ -49,7 +49,7 @@ class Path(JointSpline):
         clearance: the nearest two bodies on it; None: none are nearer than 0.2 m.
         stats: what the search took.
         goal: what it was searched for: joint positions, poses or regions, of which it reaches one.
-        keep: constraints along it.
+        keep: constraints along it; an `Upright` has its direction, so that a path which goes on keeps the same one.
         world: the model of bodies that it keeps clear of, and against which it is checked again before it is sent.
     """
 
@@ -84,25 +84,30 @@ class Path(JointSpline):
         return f"{self.duration:.2f} s, {points}, {room}, {took}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Upright(Value):
     """A constraint along a path: an axis of the tool frame keeps its direction, as that of a full glass.
 
     Attributes:
         axis: "x", "y" or "z" of the tool frame.
-        within: largest angle between its direction and the one at the start [rad], 0.01 to pi.
+        within: largest angle between the axis and its direction [rad], 0.01 to pi.
+        direction: of the axis, in the base, shape (3,); its length does not matter. None: the one that the axis has
+            where the path begins, which is written down in `Path.keep`.
 
     Raises:
-        ShapeError: no such axis.
-        LimitError: an angle outside its range.
+        ShapeError: no such axis, or another shape.
+        LimitError: an angle outside its range, or a direction of length 0.
     """
 
     axis: Literal["x", "y", "z"] = "z"
     within: float = 0.1
+    direction: npt.ArrayLike | None = None
 
     def __post_init__(self) -> None:
         word(self.axis, "axis", tuple(_AXES))
         object.__setattr__(self, "within", within(self.within, "within", 0.01, pi, unit="rad"))
+        if self.direction is not None:
+            object.__setattr__(self, "direction", unit_vector(self.direction, "direction"))
 
     @property
     def column(self) -> int:
