@@ -8,6 +8,7 @@ import re
 from typing import Any
 
 from sphinx.application import Sphinx
+from sphinx.ext.napoleon import GoogleDocstring
 
 from heptarm import __version__
 
@@ -80,6 +81,21 @@ def _begin_with_a_table(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] = source[0][: heading.start()] + table + source[0][heading.start() :]
 
 
+def _keep(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Keep the docstring of a property from napoleon, which takes what precedes its first colon for a type."""
+    if what == "property":
+        _properties[name] = list(lines)
+
+
+def _restore(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Read the docstring of a property like that of a method."""
+    if what == "property":
+        lines[:] = GoogleDocstring(_properties[name], app.config, app, "method", name, obj, options).lines()
+
+
+_properties: dict[str, list[str]] = {}
+
+
 def _preview(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object) -> None:
     """What a page shows of itself where a link to it is posted."""
     title = re.sub(r"<[^>]*>", "", str(context.get("title", project)))
@@ -112,3 +128,5 @@ def setup(app: Sphinx) -> None:
     app.connect("html-page-context", _aim_at_the_documented_name)
     app.connect("html-page-context", _preview)
     app.connect("source-read", _begin_with_a_table)
+    app.connect("autodoc-process-docstring", _keep, priority=400)
+    app.connect("autodoc-process-docstring", _restore, priority=600)

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 KEPT = ("PATH", "LANG", "TERM", "http_proxy", "https_proxy", "no_proxy", "PIP_INDEX_URL", "SSL_CERT_FILE")
 #: Longest duration of a step [s].
 PATIENCE = 900.0
-#: A block of Python that a reader types; one whose fence says `no-run` is none.
+#: A block of Python that a reader types; one whose fence states `no-run` is none.
 BLOCK = re.compile(r"^```python(?![^\n]*no-run)[^\n]*\n(.*?)^```", re.S | re.M)
 
 

@@ -36,11 +36,11 @@ class Row(NamedTuple):
 
 
 class Pane(NamedTuple):
-    """A part of a screen: its title, its lines, and its share of the width."""
+    """A part of a screen: its title, its lines, and its fraction of the width."""
 
     title: str
     rows: tuple[Row, ...]
-    share: float = 1.0
+    fraction: float = 1.0
 
 
 class Screen(NamedTuple):
@@ -214,10 +214,10 @@ def drawing(screen: Screen) -> str:
         f'<path d="M1 {HEAD} H{WIDTH - 1}" stroke="{EDGE}"/>',
         text(GAP, 20, screen.title, size=13, weight=600, anchor="start"),
     ]
-    unit = (WIDTH - GAP * (len(screen.panes) + 1)) / sum(pane.share for pane in screen.panes)
+    unit = (WIDTH - GAP * (len(screen.panes) + 1)) / sum(pane.fraction for pane in screen.panes)
     x = float(GAP)
     for pane in screen.panes:
-        width = unit * pane.share
+        width = unit * pane.fraction
         out += _pane(pane, x, HEAD + GAP, width, height - HEAD - 2 * GAP)
         x += width + GAP
     return "\n".join([*out, "</svg>", ""])

@@ -709,8 +709,8 @@ class Servo(Block):
             self._check_may_change(next(iter(settings)))
             self._connection.check_may_wait("change() of the limits of a servo motion")
         message = None if mode is None else mode_message(instance(mode, MODES, "mode"))
-        _ = self.start  # raises unless it has begun
         terms = self._terms.changed(settings if mode is None else settings | {"mode": mode})
+        _ = self.start  # raises unless it has begun
         if message is not None:
             self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
         self._terms, self._message = terms, terms.message
