@@ -1,0 +1,284 @@
+"""Many simulated arms in the peg-in-hole task: the arm's full dynamics, a Cartesian impedance inside the engine, contacts.
+
+The impedance is six MuJoCo actuators between two sites, the peg's tip and the presumed hole: their lengths are the pose,
+their controls the set-point, so that no law runs in Python between two decisions. Gravity counts as compensated.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from mujoco import batch
+
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
+from heptarm.rl.peg import PegInHole
+from heptarm.rl.sim.batch import Index, Step
+from heptarm.rl.sim.randomisation import NONE, Randomisation
+from heptarm.sim.plant.sensor_errors import GAIN, TORQUE_NOISE
+from heptarm.sim.plant.world import specification
+from heptarm.values.checks import Array
+
+#: Steps of the engine in a second: its contacts need 2.5 ms or less.
+_FREQUENCY = 400.0
+#: The presumed hole in the base: z down into it; the middle of the shipped scene's.
+PLACE = np.array([0.6, 0.1, 0.24])
+DOWN = np.diag([-1.0, 1.0, -1.0])
+#: Peg, gripper and hole of the scene `peg-in-hole` [m, kg].
+_RADIUS, _SHAFT, _TIP = 0.01, 0.05, 0.225
+_WALL, _WIDTH, _DEEP = 0.015, 0.0165, 0.02
+_GRIPPER_MASS, _PEG_MASS = 1.0, 0.19
+#: Friction of steel on steel, and the range of training.
+FRICTION = (0.1, 0.3)
+#: Apparent mass and inertia at the tip, for the damping of the impedance [kg, kg m²], and its ratio.
+_MASS, _INERTIA, _RATIO = 5.0, 0.2, 0.7
+#: Spring and damper that hold the elbow [Nm/rad, Nms/rad].
+_ELBOW = (0.5, 2.0)
+
+
+def build(task: PegInHole) -> Any:
+    """The engine's model of a task, an `mujoco.MjModel`; its six controls are the set-point [m, rad]."""
+    spec = specification(task.robot)
+    for servo in list(spec.actuators):
+        spec.delete(servo)
+    for geom in spec.geoms:  # the arm itself touches nothing
+        geom.contype = geom.conaffinity = 0
+    steel = {"solref": [0.005, 1.0], "friction": [0.2, 0.002, 0.0001]}
+    hole = spec.worldbody.add_body(name="hole", mocap=True)
+    middle = _RADIUS + 0.5 * task.clearance + _WALL
+    for angle in np.arange(8) * np.pi / 4:
+        hole.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=[_WALL, _WIDTH, _DEEP],
+            pos=[middle * np.cos(angle), middle * np.sin(angle), _DEEP],
+            quat=[np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)],
+            contype=2,
+            conaffinity=1,
+            **steel,
+        )
+    flange = spec.site("flange")
+    link, base = flange.parent, np.array(flange.pos)
+    link.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.03, 0.055, 0.03],
+        pos=base + [0.0, 0.0, 0.05],
+        mass=_GRIPPER_MASS,
+        contype=0,
+        conaffinity=0,
+    )
+    link.add_geom(
+        name="peg",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[_RADIUS, 0.5 * _SHAFT, 0.0],
+        pos=base + [0.0, 0.0, _TIP - 0.5 * _SHAFT],
+        mass=_PEG_MASS,
+        contype=1,
+        conaffinity=2,
+        **steel,
+    )
+    link.add_site(name="tip", pos=base + [0.0, 0.0, _TIP])
+    spec.worldbody.add_site(name="presumed", pos=PLACE, quat=_quaternion(DOWN))
+    stiff = np.repeat([task.stiffness, task.turn_stiffness], 3)
+    damp = 2.0 * _RATIO * np.sqrt(stiff * np.repeat([_MASS, _INERTIA], 3))
+    for axis in range(6):
+        spring = spec.add_actuator(
+            name=f"spring {axis}", trntype=mujoco.mjtTrn.mjTRN_SITE, target="tip", refsite="presumed"
+        )
+        spring.gear = np.eye(6)[axis]
+        spring.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
+        spring.dynprm[0] = 1.0 / 20.0
+        spring.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+        spring.gainprm[0] = stiff[axis]
+        spring.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        spring.biasprm[:3] = [0.0, -stiff[axis], -damp[axis]]
+    for joint, rest in zip(spec.joints, home(task), strict=True):
+        joint.stiffness, joint.springref = [_ELBOW[0], 0.0, 0.0], rest
+        joint.damping = [_ELBOW[1], 0.0, 0.0]
+    option = spec.option
+    option.timestep = 1.0 / _FREQUENCY
+    option.gravity = [0.0, 0.0, 0.0]
+    option.cone, option.impratio = mujoco.mjtCone.mjCONE_PYRAMIDAL, 1.0
+    return spec.compile()
+
+
+def home(task: PegInHole) -> Array:
+    """Joint positions with the tip at the presumed rim, shape (7,) [rad]."""
+    return _joints(task, np.zeros((1, 6)))[0]
+
+
+def _joints(task: PegInHole, poses: Array) -> Array:
+    """Joint positions for poses of the tip without rotation, shape (n, 6) to (n, 7)."""
+    flanges = np.tile(np.eye(4), (len(poses), 1, 1))
+    flanges[:, :3, :3] = DOWN
+    flanges[:, :3, 3] = PLACE + (poses[:, :3] - [0.0, 0.0, _TIP]) @ DOWN.T
+    return solve_batch(task.model, flanges)
+
+
+def _quaternion(matrix: Array) -> Array:
+    found = np.empty(4)
+    mujoco.mju_mat2Quat(found, matrix.ravel())
+    return found
+
+
+class BatchPeg:
+    """The task on many simulated arms; episodes that end restart by themselves. Same methods as `BatchReach`.
+
+    Args:
+        task: the task.
+        envs: number of arms.
+        randomisation: latency and bandwidth; what else differs is the task's.
+        seed: of everything drawn.
+        threads: of the simulation.
+        starts: "staggered" or "together".
+
+    Raises:
+        CommandRejected: a randomisation that this task has not.
+    """
+
+    def __init__(
+        self,
+        task: PegInHole,
+        *,
+        envs: int = 256,
+        randomisation: Randomisation = NONE,
+        seed: int | np.random.SeedSequence = 0,
+        threads: int = 2,
+        starts: str = "staggered",
+        engine: Any = None,
+    ) -> None:
+        if randomisation.payload[1] > 0 or randomisation.velocity_noise or np.isfinite(randomisation.stiffness[1]):
+            raise CommandRejected("only latency and bandwidth differ in this task", parameter="randomisation")
+        self.task, self.envs, self.randomisation = task, envs, randomisation
+        self._random = np.random.default_rng(seed)
+        model = build(task)
+        self._batch = batch.Batch(model, nsim=envs, nthread=threads)
+        bind = self._batch.bind
+        self._state = {n: bind(n) for n in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")}
+        self._length, self._contact = bind("actuator_length"), bind("qfrc_constraint")
+        self._filter, self._friction = self._batch.expand("actuator_dynprm"), self._batch.expand("geom_friction")
+        self._substeps = round(_FREQUENCY / task.rate)
+        self._all = np.arange(envs)
+        self._staggered = starts == "staggered"
+        self._noise = TORQUE_NOISE * task.model.tau_max
+        self.hole, self.command, self.pose = (np.zeros((envs, 6)) for _ in range(3))
+        self.wrench, self.true_wrench = np.zeros((envs, 6)), np.zeros((envs, 6))
+        self._gain = np.ones((envs, 7))
+        self.age, self._latency = np.zeros(envs, dtype=np.int64), np.zeros(envs, dtype=np.int64)
+        self._late = np.zeros((randomisation.latency[1] + 1, envs, 6))
+        self._frames = np.zeros((task.history, envs, task.observation_size // task.history))
+        self.reset()
+
+    @property
+    def q(self) -> Array:
+        """Measured positions, shape (envs, 7) [rad]."""
+        return np.asarray(self._state["qpos"])
+
+    def reset(self, holes: npt.ArrayLike | None = None, *, seed: int | None = None) -> Array:
+        """Start an episode of every arm; `holes` of shape (envs, 6) instead of drawn ones. The observations."""
+        if seed is not None:
+            self._random = np.random.default_rng(seed)
+        self._begin(self._all, None if holes is None else np.asarray(holes, dtype=np.float64))
+        if self._staggered:
+            self.age[:] = self._random.integers(0, self.task.steps, self.envs)
+        return self.observe()
+
+    def _begin(self, which: Index, holes: Array | None = None) -> None:
+        count, task, random, state = len(which), self.task, self._random, self._state
+        hole = task.holes(random, count) if holes is None else holes
+        pose = task.starts(random, count)
+        self.hole[which], self.command[which], self.pose[which] = hole, pose, pose
+        self._late[:, which] = pose
+        self.age[which] = 0
+        self._latency[which] = self.randomisation.draw_latency(random, count)
+        self._filter[which, :, 0] = 1.0 / self.randomisation.draw_bandwidth(random, count)[:, None]
+        self._friction[which, :, 0] = random.uniform(*FRICTION, (count, 1))
+        self._gain[which] = random.uniform(1.0 - GAIN, 1.0 + GAIN, (count, 7))
+        state["qpos"][which] = _joints(task, pose)
+        for name in ("qvel", "qacc_warmstart"):
+            state[name][which] = 0.0
+        state["act"][which] = state["ctrl"][which] = pose
+        state["mocap_pos"][which, 0] = PLACE + hole[:, :3] @ DOWN.T
+        turn = np.empty(4)
+        base = _quaternion(DOWN)
+        for row, one in zip(which.tolist(), hole, strict=True):
+            angle = float(np.linalg.norm(one[3:]))
+            mujoco.mju_axisAngle2Quat(turn, one[3:] / max(angle, 1e-12), angle)
+            mujoco.mju_mulQuat(turn, base, turn)
+            state["mocap_quat"][row, 0] = turn
+        self.wrench[which] = self.true_wrench[which] = 0.0
+        self._frames[:, which] = task.frame(pose, pose, np.zeros((count, 6)))
+
+    def observe(self) -> Array:
+        """The current observations, shape (envs, n)."""
+        return np.concatenate(list(self._frames), axis=-1)
+
+    def _sense(self) -> None:
+        """Pose and wrench of the tip; the wrench from joint torques, with the errors of their sensors."""
+        self.pose[:] = self._length
+        torque = np.asarray(self._contact)
+        noise = self._noise * self._random.standard_normal(torque.shape)
+        q = self.q
+        jacobian = jacobian_batch(self.task.model, q)
+        arm = forward_batch(self.task.model, q)[:, :3, 2] * _TIP
+        # velocity of the tip: v + w x arm
+        jacobian[:, :3] += np.cross(np.swapaxes(jacobian[:, 3:], 1, 2), arm[:, None]).swapaxes(1, 2)
+        inverse = np.linalg.solve(jacobian @ jacobian.swapaxes(1, 2), jacobian)
+        both = np.stack([torque, self._gain * torque + noise], axis=-1)
+        found = (inverse @ both).reshape(self.envs, 2, 3, 2)
+        found = np.einsum("ij,nkjl->nkil", DOWN.T, found).reshape(self.envs, 6, 2)
+        self.true_wrench[:], self.wrench[:] = found[..., 0], found[..., 1]
+
+    def step(self, action: npt.ArrayLike) -> Step:
+        """One decision of every arm, `action` of shape (envs, 5), clipped to +-1.
+
+        Raises:
+            ShapeError: another shape, or not finite.
+        """
+        task = self.task
+        given = np.asarray(action, dtype=np.float64)
+        if given.shape != (self.envs, task.action_size) or not np.isfinite(given).all():
+            raise ShapeError(
+                f"action must have shape {(self.envs, task.action_size)} and be finite, got shape {given.shape}",
+                parameter="action",
+            )
+        self.command = task.advance(self.command, self.pose, given)
+        if len(self._late) > 1:
+            self._late[1:] = self._late[:-1]
+        self._late[0] = self.command
+        self._state["ctrl"][:] = self._late[self._latency, self._all]
+        self._batch.step(nstep=self._substeps)
+        self._sense()
+        self._frames[1:] = self._frames[:-1].copy()
+        self._frames[0] = task.frame(self.pose, self.command, self.wrench)
+        reward, missing = task.reward(self.pose, self.hole, self.true_wrench), task.missing(self.pose, self.hole)
+        tip = self.pose[:, :3].copy()
+        self.age += 1
+        observation = self.observe()
+        done = self.age >= task.steps
+        final = observation[done]
+        if done.any():
+            which = np.flatnonzero(done)
+            self._begin(which)
+            observation[done] = self.observe()[done]
+        return Step(observation, reward, tip, missing, done, final)
+
+    # ------------------------------------------------------------------------------ interrupted training
+
+    def _changing(self) -> dict[str, Any]:
+        own = ("hole", "command", "pose", "wrench", "age", "_latency", "_late", "_frames", "_gain", "_filter", "_friction")
+        return {**self._state, **{name: getattr(self, name) for name in own}}
+
+    def save(self) -> dict[str, Any]:
+        """The complete state, to resume later: arrays and one text."""
+        kept = {name: np.array(rows) for name, rows in self._changing().items()}
+        return {**kept, "random": json.dumps(self._random.bit_generator.state)}
+
+    def load(self, entries: dict[str, Any]) -> None:
+        """Restore what `save` returned."""
+        for name, rows in self._changing().items():
+            rows[:] = entries[name]
+        self._random.bit_generator.state = json.loads(entries["random"])
