@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import Task, task_from_dict
 from heptarm.values.checks import flag
 from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
@@ -40,7 +40,7 @@ class Policy:
 
     def __init__(
         self,
-        task: ReachTask,
+        task: Task,
         *,
         layers: list[tuple[npt.ArrayLike, npt.ArrayLike]],
         mean: npt.ArrayLike,
@@ -74,7 +74,7 @@ class Policy:
         """The action, without noise.
 
         Args:
-            observation: shape (..., n), of `ReachTask.observe`.
+            observation: shape (..., n), of the task.
 
         Returns:
             Shape (..., actions), within +-1.
@@ -137,7 +137,7 @@ class Policy:
                 (entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)
             ]
             return cls(
-                ReachTask.from_dict(about["task"]),
+                task_from_dict(about["task"]),
                 layers=layers,
                 mean=entries["mean"],
                 std=entries["std"],

@@ -31,6 +31,8 @@ class Step:
         distance: from there to the target, shape (envs,) [m].
         done: which episodes ended, all of them by their length, shape (envs,).
         final: what those saw last, shape (done.sum(), n).
+        force: on the tip at the end of the decision, without errors of sensors, shape (envs,) [N]; 0 where a task has
+            no contacts.
     """
 
     observation: Array
@@ -39,6 +41,7 @@ class Step:
     distance: Array
     done: npt.NDArray[np.bool_]
     final: Array
+    force: Array | float = 0.0
 
 
 class Engine:

@@ -255,7 +255,7 @@ class BatchPeg:
         self._frames[1:] = self._frames[:-1].copy()
         self._frames[0] = task.frame(self.pose, self.command, self.wrench)
         reward, missing = task.reward(self.pose, self.hole, self.true_wrench), task.missing(self.pose, self.hole)
-        tip = self.pose[:, :3].copy()
+        tip, force = self.pose[:, :3].copy(), np.linalg.norm(self.true_wrench[:, :3], axis=1)
         self.age += 1
         observation = self.observe()
         done = self.age >= task.steps
@@ -264,7 +264,7 @@ class BatchPeg:
             which = np.flatnonzero(done)
             self._begin(which)
             observation[done] = self.observe()[done]
-        return Step(observation, reward, tip, missing, done, final)
+        return Step(observation, reward, tip, missing, done, final, force)
 
     # ------------------------------------------------------------------------------ interrupted training
 

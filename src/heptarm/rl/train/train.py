@@ -13,7 +13,8 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
 from heptarm.rl.policy import Policy
-from heptarm.rl.sim.batch import BatchReach, Engine
+from heptarm.rl.sim.batch import Engine
+from heptarm.rl.sim.simulate import simulate
 from heptarm.values.checks import flag
 from heptarm.values.files import refuse_existing
 
@@ -132,7 +133,7 @@ class Training:
             team.mean if team.size > 1 else None,
             threads=threads if team.device.type == "cpu" else 1,
         )
-        self.arms = BatchReach(
+        self.arms = simulate(
             task,
             envs=settings.envs,
             randomisation=recipe.randomisation,
