@@ -36,6 +36,8 @@ _POSE = np.array([3e-3, 3e-3, 10e-3, 0.035, 0.035])
 _WRENCH = np.array([10.0, 10.0, 10.0, 0.2, 0.2])
 #: Coordinates that a policy acts on: x, y, z and the turns about x and y, of six.
 AXES = np.arange(5)
+#: Force with which the teacher presses onto the rim while it looks for the hole [N].
+PRESS = 7.0
 _UNITS = {"rate": "Hz", "clearance": "m", "depth": "m", "radius": "m", "step": "m", "turn": "rad", "force": "N"}
 
 
@@ -172,6 +174,29 @@ class PegInHole:
         high = np.array([side, side, self.depth + self.height + self.leash, angle, angle, 0.0])
         result: Array = np.minimum(np.maximum(wanted, low), high)
         return result
+
+    def teach(self, command: Array, pose: Array, hole: Array) -> Array:
+        """The action of one who knows the true hole, shape (..., 5): align while pressing gently, then push.
+
+        A policy can be taught by it what to do about what it feels: no arm knows the hole.
+
+        Args:
+            command: the last set-point, shape (..., 6) [m, rad].
+            pose: of the tip, likewise.
+            hole: the true one, likewise.
+        """
+        height = self.offset(pose, hole)[..., 2]
+        deep = np.maximum(height, 0.0)[..., None]
+        goal = hole[..., :2] + deep * np.stack([hole[..., 4], -hole[..., 3]], axis=-1)
+        away, turn = goal - pose[..., :2], hole[..., 3:5] - pose[..., 3:5]
+        action = np.empty((*pose.shape[:-1], 5))
+        action[..., :2] = (goal + away - command[..., :2]) / (1.5 * self.step)
+        action[..., 3:] = (hole[..., 3:5] + 0.5 * turn - command[..., 3:5]) / (1.5 * self.turn)
+        aside, turned = np.linalg.norm(away, axis=-1), np.linalg.norm(turn, axis=-1)
+        is_aligned = (aside < 0.6 * self.clearance) & (turned < 0.015) | (height > 1e-3)
+        pressed = (pose[..., 2] + PRESS / self.stiffness - command[..., 2]) / self.step
+        action[..., 2] = np.where(is_aligned, 1.0, np.minimum(pressed, 1.0))
+        return np.clip(action, -1.0, 1.0)
 
     def offset(self, pose: Array, hole: Array) -> Array:
         """The tip in the frame of the true hole, shape (..., 3) [m]; rotations are small.
