@@ -5,7 +5,7 @@ observes, what its actions do, what is rewarded, what counts as success, and wha
 
 * **Scene.** That of the shipped scene `peg-in-hole`: a peg of 20 mm in the gripper, a hole that is wider by `clearance`.
 * **Reset.** The tip is some millimetres above the place where the hole should be; the hole itself is drawn around it.
-* **Observation.** Of the last decisions each: pose of the tip and of its set-point in the frame of the presumed hole, and
+* **Observation.** Of some of the last decisions each: pose of the tip and of its set-point in the frame of the presumed hole, and
   the wrench at the tip in its axes, from joint torques, zeroed when the episode begins. A peg that is pressed onto the
   rim is supported on one side: the moment shows where the hole is, which is why no spiral is needed.
 * **Action.** A step of the set-point of a Cartesian impedance: x, y, z and turns about x and y. A round peg needs no turn
@@ -52,7 +52,7 @@ class PegInHole:
         clearance: diameter of the hole less that of the peg [m].
         rate: decisions a second [Hz].
         steps: decisions an episode.
-        history: how many of the last decisions an observation shows.
+        history: ages of the frames that an observation shows [decisions]; what is older than the episode is its start.
         depth: how deep the peg is to go [m].
         radius: missing depth that counts as success [m].
         place: half width of the error of the presumed place, across the hole [m].
@@ -80,8 +80,8 @@ class PegInHole:
     _: KW_ONLY
     clearance: float = 0.5e-3
     rate: float = 20.0
-    steps: int = 80
-    history: int = 3
+    steps: int = 100
+    history: tuple[int, ...] = (0, 1, 3, 7, 15)
     depth: float = 0.03
     radius: float = 1.5e-3
     place: float = 3e-3
@@ -100,8 +100,8 @@ class PegInHole:
         self.model  # noqa: B018  raises for an unknown robot
         for name, unit in _UNITS.items():
             object.__setattr__(self, name, within(getattr(self, name), name, 0.0, _LARGE, above=True, unit=unit))
-        for name in ("steps", "history"):
-            integer(getattr(self, name), name, 1, 1_000_000)
+        integer(self.steps, "steps", 1, 1_000_000)
+        object.__setattr__(self, "history", tuple(integer(one, "history", 0, 1000) for one in self.history))
         object.__setattr__(self, "above", tuple(float(one) for one in self.above))
 
     @property
@@ -110,9 +110,14 @@ class PegInHole:
         return robot(self.robot)
 
     @property
+    def frame_size(self) -> int:
+        """Size of what a decision shows."""
+        return _FRAME
+
+    @property
     def observation_size(self) -> int:
         """Size of an observation."""
-        return _FRAME * self.history
+        return _FRAME * len(self.history)
 
     @property
     def action_size(self) -> int:

@@ -186,7 +186,7 @@ class BatchPeg:
         self._gain = np.ones((envs, 7))
         self.age, self._latency = np.zeros(envs, dtype=np.int64), np.zeros(envs, dtype=np.int64)
         self._late = np.zeros((randomisation.latency[1] + 1, envs, 6))
-        self._frames = np.zeros((task.history, envs, task.observation_size // task.history))
+        self._frames = np.zeros((max(task.history) + 1, envs, task.frame_size))
         self.reset()
 
     @property
@@ -231,7 +231,7 @@ class BatchPeg:
 
     def observe(self) -> Array:
         """The current observations, shape (envs, n)."""
-        return np.concatenate(list(self._frames), axis=-1)
+        return np.concatenate([self._frames[age] for age in self.task.history], axis=-1)
 
     def _sense(self, torque: Array) -> None:
         """Pose and wrench of the tip; the wrench from external joint torques, with the errors of their sensors."""
