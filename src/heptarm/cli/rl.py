@@ -48,8 +48,10 @@ AnyPolicy = Annotated[
 
 
 def train(
+    task: Annotated[Literal["reach", "peg-in-hole"], Parameter(help="What is learned.")] = "reach",
+    /,
     *,
-    out: PolicyFile = Path("reach.npz"),
+    out: Annotated[Path | None, Parameter(help="File of the policy, .npz. Default: TASK.npz.")] = None,
     robot: Model = "iiwa14",
     action: Annotated[Literal["joint", "cartesian"], Parameter(help="What the policy decides.")] = "joint",
     feature: Annotated[
@@ -58,7 +60,9 @@ def train(
     exact: Annotated[
         bool, Parameter(negative="", help="Exactly the paper's reward: no costs for robustness.")
     ] = False,
-    steps: Annotated[int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature.")] = 0,
+    steps: Annotated[
+        int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.3 for peg-in-hole.")
+    ] = 0,
     seed: Seed = 0,
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
@@ -68,14 +72,26 @@ def train(
 ) -> int:
     """Train a policy; under torchrun, several workers train one."""
     require("torch", extra="rl")
+    from heptarm.rl.peg import PegInHole
     from heptarm.rl.task import ReachTask
     from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import train as work
 
-    task = ReachTask(robot, action=action, feature="kinematic" if feature else "")
-    recipe = Recipe.exact(task, seed=seed) if exact else Recipe(task, seed=seed)
+    if task == "peg-in-hole":
+        if (action, feature, exact, engine) != ("joint", False, False, "mujoco"):
+            raise CommandRejected(
+                "--action, --feature, --exact and --engine are of the reach task, not of peg-in-hole",
+                parameter="task",
+                value=task,
+                hint="leave them out",
+            )
+        recipe = Recipe.of(PegInHole(robot), seed=seed)
+    else:
+        reach = ReachTask(robot, action=action, feature="kinematic" if feature else "")
+        recipe = Recipe.exact(reach, seed=seed) if exact else Recipe.of(reach, seed=seed)
+    out = out or Path(f"{task}.npz")
     recipe = replace(recipe, steps=steps) if steps else recipe
-    budget = recipe.steps
+    budget, left = recipe.steps, "missing" if task == "peg-in-hole" else "away"
 
     def show(row: Row) -> None:
         if as_json:
@@ -87,7 +103,7 @@ def train(
         bar = "#" * round(30 * done)
         print(
             f"\r[{bar:<30}] {row.steps / 1e6:5.2f} M steps  {row.seconds:5.0f} s  "
-            f"{1e3 * row.distance:6.1f} mm at the end of noisy episodes",
+            f"{1e3 * row.distance:6.1f} mm {left} at the end of noisy episodes",
             end="",
             file=sys.stderr,
             flush=True,

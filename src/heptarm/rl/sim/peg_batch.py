@@ -233,6 +233,10 @@ class BatchPeg:
         """The current observations, shape (envs, n)."""
         return np.concatenate([self._frames[age] for age in self.task.history], axis=-1)
 
+    def teach(self) -> Array:
+        """What one who knows the true holes would do, shape (envs, 5)."""
+        return self.task.teach(self.command, self.pose, self.hole)
+
     def _sense(self, torque: Array) -> None:
         """Pose and wrench of the tip; the wrench from external joint torques, with the errors of their sensors."""
         self.pose[:] = self._length

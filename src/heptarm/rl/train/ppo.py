@@ -306,6 +306,42 @@ class Learner:
             "spread": float(agent.spread.detach().exp().mean()),
         }
 
+    def imitate(self, samples: Samples, taught: Tensor, shuffle: torch.Generator) -> dict[str, float]:
+        """One update towards a teacher's actions where the policy itself came to (DAgger, Ross et al. 2011).
+
+        The value learns what the policy earned, so that it is ready when rewards take over.
+
+        Args:
+            samples: what was experienced since the last update.
+            taught: what the teacher would have done there, shape (horizon, envs, actions).
+            shuffle: draws the order of the samples.
+
+        Returns:
+            As of `update`; "loss" is the mean square from the teacher's actions.
+        """
+        s, agent = self.settings, self.agent
+        seen, goal = samples.seen.flatten(0, 1), (samples.advantage + samples.value).flatten()
+        aim = taught.flatten(0, 1)
+        losses = []
+        agent.spread.grad = None
+        self.optimiser.param_groups[0]["lr"] = s.learning_rate
+        for _ in range(s.epochs):
+            for rows in torch.randperm(len(goal), generator=shuffle).split(len(goal) // s.minibatches):
+                x = seen[rows.to(seen.device)]
+                self._value_gradients(x, goal[rows])
+                loss = ((agent.policy(x) - aim[rows]) ** 2).mean()
+                _differentiate(loss, list(agent.policy.parameters()))
+                losses.append(float(self._shared(loss.detach())))
+                self._average_gradients()
+                nn.utils.clip_grad_norm_(self._trained, s.max_grad_norm)
+                self.optimiser.step()
+        return {
+            "kl": 0.0,
+            "loss": sum(losses) / len(losses),
+            "rate": s.learning_rate,
+            "spread": float(agent.spread.detach().exp().mean()),
+        }
+
     @contextmanager
     def _beside(self) -> Iterator[Callable[..., Callable[[], float]]]:
         """What begins a function, in a second thread if there is one; the function returned waits for its result."""

@@ -15,7 +15,7 @@ from heptarm.rl.train import ppo
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
 #: Likewise of the peg-in-hole task.
-_PEG_STEPS = 1_000_000
+_PEG_STEPS = 1_300_000
 #: Names of settings in checkpoints that were made before the settings had the names of the literature.
 _OLDER = {
     "rate": "learning_rate",
@@ -27,10 +27,19 @@ _OLDER = {
     "gradient": "max_grad_norm",
     "entropy": "entropy_coef",
 }
-#: Robots and algorithm of the peg-in-hole task: an episode earns about as much as one of reaching, its reward comes later.
+#: Robots, environment steps with the teacher, and algorithm of the peg-in-hole task. The noise is small from the beginning: the
+#: teacher has shown what to try.
 PEG = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
+PEG_TAUGHT = 300_000
 PEG_SETTINGS = ppo.PpoSettings(
-    envs=256, horizon=16, gamma=0.97, hidden=(128, 128), reward_scale=0.3, spread_end=-1.6, action_cost=5e-3
+    envs=256,
+    horizon=16,
+    gamma=0.97,
+    hidden=(128, 128),
+    learning_rate=5e-4,
+    reward_scale=0.3,
+    spread=-1.4,
+    spread_end=-2.0,
 )
 
 
@@ -43,6 +52,8 @@ class Recipe:
     Attributes:
         task: the task.
         steps: environment steps, of all workers; rounded up to whole updates; 0: `STEPS`.
+        taught: of these steps so many, at the beginning, imitate the task's teacher; then rewards take over. Only tasks
+            with a teacher, see `PegInHole.teach`.
         seed: of networks, simulation and shuffling.
         randomisation: what differs between the simulated robots.
         settings: numbers of the algorithm.
@@ -51,6 +62,7 @@ class Recipe:
     task: Task = field(default_factory=ReachTask)
     _: KW_ONLY
     steps: int = 0
+    taught: int = 0
     seed: int = 0
     randomisation: Randomisation = STRONG
     settings: ppo.PpoSettings = field(default_factory=ppo.PpoSettings)
@@ -61,6 +73,10 @@ class Recipe:
             object.__setattr__(self, "steps", enough)
         if self.steps < 1:
             raise LimitError(f"steps must be at least 1, got {self.steps}", code=2, parameter="steps")
+        if self.taught and not isinstance(self.task, PegInHole):
+            raise LimitError(
+                f"taught must be 0 for a task without a teacher, got {self.taught}", code=2, parameter="taught"
+            )
         if self.seed < 0:
             raise LimitError(f"seed must be 0 or more, got {self.seed}", code=2, parameter="seed")
 
@@ -74,7 +90,7 @@ class Recipe:
     def of(cls, task: Task, *, seed: int = 0) -> Recipe:
         """The settings that suit a task."""
         if isinstance(task, PegInHole):
-            return cls(task, seed=seed, randomisation=PEG, settings=PEG_SETTINGS)
+            return cls(task, taught=PEG_TAUGHT, seed=seed, randomisation=PEG, settings=PEG_SETTINGS)
         return cls(task, seed=seed)
 
     def as_dict(self) -> dict[str, Any]:

@@ -153,21 +153,26 @@ class Training:
     def update(self) -> Row:
         """Simulate a horizon and learn from it."""
         begun = time.perf_counter()
-        samples, facts = self._experience()
-        settings = self.recipe.settings
+        recipe, settings = self.recipe, self.recipe.settings
+        is_taught = self.steps < recipe.taught
+        samples, facts, taught = self._experience(is_taught=is_taught)
         self.steps += settings.horizon * settings.envs * self.team.size
-        facts |= self.learner.update(samples, self.random, self.steps / self.recipe.steps)
+        if is_taught:
+            facts |= self.learner.imitate(samples, taught, self.random)
+        else:
+            progress = (self.steps - recipe.taught) / max(1, recipe.steps - recipe.taught)
+            facts |= self.learner.update(samples, self.random, progress)
         self.seconds += time.perf_counter() - begun
         row = Row(steps=self.steps, seconds=self.seconds, **facts)
         self.history.append(row)
         return row
 
-    def _experience(self) -> tuple[ppo.Samples, dict[str, float]]:
+    def _experience(self, *, is_taught: bool) -> tuple[ppo.Samples, dict[str, float], Any]:
         arms, agent, s, device = self.arms, self.agent, self.recipe.settings, self.team.device
         task = self.recipe.task
         shape = (s.horizon, s.envs)
         noise = torch.randn((*shape, task.action_size), generator=self.random).to(device)
-        action, mean = torch.empty_like(noise), torch.empty_like(noise)
+        action, mean, taught = torch.empty_like(noise), torch.empty_like(noise), torch.zeros_like(noise)
         raw = np.empty((s.horizon + 1, s.envs, task.observation_size), dtype=np.float32)
         reward, done = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.bool_)
         finals, ended = [], []
@@ -178,6 +183,8 @@ class Training:
                 mean[t] = agent.policy(agent.scaler(torch.from_numpy(raw[t]).to(device)))
                 torch.add(mean[t], noise[t], out=action[t])
                 decided = action[t].cpu().numpy()
+                if is_taught:
+                    taught[t] = torch.from_numpy(arms.teach())
                 step = arms.step(decided)
                 reward[t], done[t], raw[t + 1] = step.reward, step.done, step.observation
                 if s.action_cost:
@@ -198,7 +205,7 @@ class Training:
             likelihood = agent.likelihood(mean, action)
             self._look(raw[:-1])
         samples = ppo.Samples(seen[:-1], action, mean, likelihood, value, advantage)
-        return samples, self._facts(float(reward.mean()), ended)
+        return samples, self._facts(float(reward.mean()), ended), taught
 
     def _look(self, raw: Any) -> None:
         """Let the scaler see the observations of all workers."""
