@@ -120,6 +120,11 @@ class PegInHole:
         return _FRAME * len(self.history)
 
     @property
+    def hidden_size(self) -> int:
+        """Size of `hidden`."""
+        return 6
+
+    @property
     def action_size(self) -> int:
         """Size of an action."""
         return len(AXES)
@@ -157,6 +162,20 @@ class PegInHole:
         shown = pose[..., AXES] / _POSE
         aim = (command - pose)[..., AXES] / _POSE
         return np.concatenate([shown, aim, np.clip(wrench[..., AXES] / _WRENCH, -5.0, 5.0)], axis=-1)
+
+    def hidden(self, pose: Array, hole: Array, friction: Array) -> Array:
+        """What the value network alone sees while a policy is trained: where the hole is, as in Pinto et al. 2018.
+
+        Args:
+            pose: of the tip, shape (..., 6) [m, rad].
+            hole: the true one, likewise.
+            friction: of peg and hole, shape (...,).
+
+        Returns:
+            Shape (..., 6).
+        """
+        turn = (hole - pose)[..., 3:5] / _POSE[3:]
+        return np.concatenate([self.offset(pose, hole) / _POSE[:3], turn, friction[..., None]], axis=-1)
 
     def advance(self, command: Array, pose: Array, action: Array) -> Array:
         """The next set-point of the impedance.

@@ -95,6 +95,11 @@ class ReachTask:
         return 23 if self.feature else 17
 
     @property
+    def hidden_size(self) -> int:
+        """What the value network sees beyond an observation while a policy is trained: nothing."""
+        return 0
+
+    @property
     def action_size(self) -> int:
         """Size of an action."""
         return 7 if self.action == "joint" else 3

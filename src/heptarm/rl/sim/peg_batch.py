@@ -151,6 +151,7 @@ class BatchPeg:
         seed: of everything drawn.
         threads: of the simulation.
         starts: "staggered" or "together".
+        reveal: whether observations end with `PegInHole.hidden`, for the value network of a training.
 
     Raises:
         CommandRejected: a randomisation that this task has not.
@@ -165,7 +166,7 @@ class BatchPeg:
         seed: int | np.random.SeedSequence = 0,
         threads: int = 2,
         starts: str = "staggered",
-        engine: Any = None,
+        reveal: bool = False,
     ) -> None:
         if randomisation.payload[1] > 0 or randomisation.velocity_noise or np.isfinite(randomisation.stiffness[1]):
             raise CommandRejected("only latency and bandwidth differ in this task", parameter="randomisation")
@@ -179,6 +180,7 @@ class BatchPeg:
         self._filter, self._friction = self._batch.expand("actuator_dynprm"), self._batch.expand("geom_friction")
         self._substeps = round(_FREQUENCY / task.rate / _READINGS)
         self._all = np.arange(envs)
+        self._reveal = reveal
         self._staggered = starts == "staggered"
         self._noise = TORQUE_NOISE * task.model.tau_max
         self.hole, self.command, self.pose = (np.zeros((envs, 6)) for _ in range(3))
@@ -231,7 +233,10 @@ class BatchPeg:
 
     def observe(self) -> Array:
         """The current observations, shape (envs, n)."""
-        return np.concatenate([self._frames[age] for age in self.task.history], axis=-1)
+        shown = [self._frames[age] for age in self.task.history]
+        if self._reveal:
+            shown.append(self.task.hidden(self.pose, self.hole, np.asarray(self._friction)[:, 0, 0]))
+        return np.concatenate(shown, axis=-1)
 
     def teach(self) -> Array:
         """What one who knows the true holes would do, shape (envs, 5)."""

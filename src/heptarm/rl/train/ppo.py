@@ -184,14 +184,27 @@ def network(inputs: int, hidden: tuple[int, ...], outputs: int, last: float) -> 
 
 
 class Agent(nn.Module):  # type: ignore[misc]
-    """Scaler, policy network, value network."""
+    """Scaler, policy network, value network.
 
-    def __init__(self, observations: int, actions: int, settings: PpoSettings) -> None:
+    Args:
+        observations: size of an observation.
+        actions: size of an action.
+        settings: the numbers.
+        hidden: how many numbers at the end of what is seen only the value network sees.
+    """
+
+    def __init__(self, observations: int, actions: int, settings: PpoSettings, *, hidden: int = 0) -> None:
         super().__init__()
-        self.scaler = Scaler(observations)
+        self.observations = observations
+        self.scaler = Scaler(observations + hidden)
         self.policy = network(observations, settings.hidden, actions, 0.01)
-        self.value = network(observations, settings.hidden, 1, 1.0)
+        self.value = network(observations + hidden, settings.hidden, 1, 1.0)
         self.spread = nn.Parameter(torch.full((actions,), settings.spread))
+
+    def act(self, seen: Tensor) -> Tensor:
+        """Mean actions for what is seen, scaled."""
+        mean: Tensor = self.policy(seen[..., : self.observations])
+        return mean
 
     def likelihood(self, mean: Tensor, action: Tensor) -> Tensor:
         """Log-likelihood of actions, up to a constant."""
@@ -329,7 +342,7 @@ class Learner:
             for rows in torch.randperm(len(goal), generator=shuffle).split(len(goal) // s.minibatches):
                 x = seen[rows.to(seen.device)]
                 self._value_gradients(x, goal[rows])
-                loss = ((agent.policy(x) - aim[rows]) ** 2).mean()
+                loss = ((agent.act(x) - aim[rows]) ** 2).mean()
                 _differentiate(loss, list(agent.policy.parameters()))
                 losses.append(float(self._shared(loss.detach())))
                 self._average_gradients()
@@ -357,7 +370,7 @@ class Learner:
     ) -> Tensor:
         """Set the gradients of policy and spread; return the divergence."""
         s, agent = self.settings, self.agent
-        now = agent.policy(seen)
+        now = agent.act(seen)
         ratio = torch.exp(agent.likelihood(now, action) - before)
         better = torch.minimum(gain * ratio, gain * ratio.clamp(1.0 - s.clip_range, 1.0 + s.clip_range))
         _differentiate(-better.mean() - s.entropy_coef * agent.spread.sum(), self._acts)

@@ -125,7 +125,9 @@ class Training:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(recipe.seed)  # the same networks everywhere
             task = recipe.task
-            self.agent = ppo.Agent(task.observation_size, task.action_size, settings).to(team.device)
+            self.agent = ppo.Agent(
+                task.observation_size, task.action_size, settings, hidden=task.hidden_size
+            ).to(team.device)
         team.align(self.agent)
         self.learner = ppo.Learner(
             self.agent,
@@ -140,6 +142,7 @@ class Training:
             seed=seeds,
             threads=threads,
             engine=engine,
+            reveal=True,
         )
         self.history: list[Row] = []
         self.steps = 0
@@ -173,14 +176,14 @@ class Training:
         shape = (s.horizon, s.envs)
         noise = torch.randn((*shape, task.action_size), generator=self.random).to(device)
         action, mean, taught = torch.empty_like(noise), torch.empty_like(noise), torch.zeros_like(noise)
-        raw = np.empty((s.horizon + 1, s.envs, task.observation_size), dtype=np.float32)
+        raw = np.empty((s.horizon + 1, s.envs, task.observation_size + task.hidden_size), dtype=np.float32)
         reward, done = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.bool_)
         finals, ended = [], []
         with torch.no_grad():
             noise *= agent.spread.exp()
             raw[0] = arms.observe()
             for t in range(s.horizon):
-                mean[t] = agent.policy(agent.scaler(torch.from_numpy(raw[t]).to(device)))
+                mean[t] = agent.act(agent.scaler(torch.from_numpy(raw[t]).to(device)))
                 torch.add(mean[t], noise[t], out=action[t])
                 decided = action[t].cpu().numpy()
                 if is_taught:
@@ -246,12 +249,12 @@ class Training:
             "randomisation": recipe.randomisation.as_dict(),
             "settings": recipe.settings.as_dict(),
         }
-        scaler = agent.scaler
+        scaler, seen = agent.scaler, agent.observations
         return Policy(
             recipe.task,
             layers=layers,
-            mean=scaler.mean.cpu().numpy(),
-            std=scaler.std.cpu().numpy(),
+            mean=scaler.mean[:seen].cpu().numpy(),
+            std=scaler.std[:seen].cpu().numpy(),
             facts=facts,
         )
 
