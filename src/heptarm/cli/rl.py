@@ -25,6 +25,7 @@ from heptarm.rl import deploy as deployment
 from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.policy import Policy, shipped
 from heptarm.rl.report import EpisodeReport
+from heptarm.rl.task import ReachTask
 from heptarm.values.files import refuse_existing
 from heptarm.values.mode.impedance import JointImpedance
 
@@ -73,7 +74,6 @@ def train(
     """Train a policy; under torchrun, several workers train one."""
     require("torch", extra="rl")
     from heptarm.rl.peg import PegInHole
-    from heptarm.rl.task import ReachTask
     from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import train as work
 
@@ -216,7 +216,15 @@ def deploy(
 
 
 def _load(file: Path | None) -> Policy:
-    return shipped() if file is None else Policy.load(file)
+    policy = shipped() if file is None else Policy.load(file)
+    if not isinstance(policy.task, ReachTask):
+        raise CommandRejected(
+            f"the policy must be of the reach task, got one of {policy.task.name}",
+            parameter="policy",
+            value=policy.task.name,
+            hint="its episodes run in heptarm.rl.peg_env.PegInHoleEnv",
+        )
+    return policy
 
 
 def _targets(

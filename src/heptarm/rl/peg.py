@@ -3,13 +3,13 @@
 One definition serves training, evaluation and an arm: the scene's dimensions, how an episode begins, what the policy
 observes, what its actions do, what is rewarded, what counts as success, and what bounds the forces.
 
-* **Scene.** That of the shipped scene `peg-in-hole`: a peg of 20 mm in the gripper, a hole that is wider by `clearance`.
+* **Scene.** That of the shipped scene `peg-in-hole`: a peg of 20 mm in the gripper, a hole wider by `clearance`.
 * **Reset.** The tip is some millimetres above the place where the hole should be; the hole itself is drawn around it.
-* **Observation.** Of some of the last decisions each: pose of the tip and of its set-point in the frame of the presumed hole, and
-  the wrench at the tip in its axes, from joint torques, zeroed when the episode begins. A peg that is pressed onto the
+* **Observation.** Of some of the last decisions each: pose of the tip and of its set-point in the frame of the presumed
+  hole, and the wrench at the tip in its axes, from joint torques, zeroed when the episode begins. A peg that is pressed onto the
   rim is supported on one side: the moment shows where the hole is, which is why no spiral is needed.
-* **Action.** A step of the set-point of a Cartesian impedance: x, y, z and turns about x and y. A round peg needs no turn
-  about its own axis.
+* **Action.** A step of the set-point of a Cartesian impedance: x, y, z and turns about x and y. A round peg needs no
+  turn about its own axis.
 * **Reward.** Privileged: the true hole is known to the simulator alone.
 * **Success.** The peg is `depth` deep in the hole at the end, within `radius`.
 * **Safety.** The set-point stays within a leash of the measured pose, so that the spring cannot press harder than leash
@@ -38,7 +38,15 @@ _WRENCH = np.array([10.0, 10.0, 10.0, 0.2, 0.2])
 AXES = np.arange(5)
 #: Force with which the teacher presses onto the rim while it looks for the hole [N].
 PRESS = 7.0
-_UNITS = {"rate": "Hz", "clearance": "m", "depth": "m", "radius": "m", "step": "m", "turn": "rad", "force": "N"}
+_UNITS = {
+    "rate": "Hz",
+    "clearance": "m",
+    "depth": "m",
+    "radius": "m",
+    "step": "m",
+    "turn": "rad",
+    "force": "N",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +69,7 @@ class PegInHole:
         above: tip above the presumed rim at the start, lowest and highest [m].
         step: of the set-point at |action| = 1 [m].
         turn: likewise [rad].
-        leash: farthest that the set-point may be from the measured pose [m]; times the stiffness it is the largest force.
+        leash: farthest that the set-point may be from the measured pose [m]; times the stiffness: the largest force.
         turn_leash: likewise [rad].
         stiffness: of the impedance [N/m].
         turn_stiffness: likewise [Nm/rad].
@@ -99,7 +107,9 @@ class PegInHole:
     def __post_init__(self) -> None:
         self.model  # noqa: B018  raises for an unknown robot
         for name, unit in _UNITS.items():
-            object.__setattr__(self, name, within(getattr(self, name), name, 0.0, _LARGE, above=True, unit=unit))
+            object.__setattr__(
+                self, name, within(getattr(self, name), name, 0.0, _LARGE, above=True, unit=unit)
+            )
         integer(self.steps, "steps", 1, 1_000_000)
         object.__setattr__(self, "history", tuple(integer(one, "history", 0, 1000) for one in self.history))
         object.__setattr__(self, "above", tuple(float(one) for one in self.above))
@@ -236,7 +246,9 @@ class PegInHole:
         """Depth that is missing, shape (...,) [m]; what is beside the hole is not in it."""
         inside = self.offset(pose, hole)
         beside = np.hypot(inside[..., 0], inside[..., 1]) > 0.5 * self.clearance + 1e-3
-        return self.depth - np.where(beside, np.minimum(inside[..., 2], 0.0), np.minimum(inside[..., 2], self.depth))
+        return self.depth - np.where(
+            beside, np.minimum(inside[..., 2], 0.0), np.minimum(inside[..., 2], self.depth)
+        )
 
     def reward(self, pose: Array, hole: Array, wrench: Array) -> Array:
         """Reward of one decision, about -1 to 1."""

@@ -1,7 +1,7 @@
-"""Many simulated arms in the peg-in-hole task: the arm's full dynamics, a Cartesian impedance inside the engine, contacts.
+"""Many simulated arms in the peg-in-hole task: full dynamics, a Cartesian impedance inside the engine, contacts.
 
-The impedance is six MuJoCo actuators between two sites, the peg's tip and the presumed hole: their lengths are the pose,
-their controls the set-point, so that no law runs in Python between two decisions. Gravity counts as compensated.
+The impedance is six MuJoCo actuators between two sites, the peg's tip and the presumed hole: their lengths are the
+pose, their controls the set-point, so that no law runs in Python between two decisions. Gravity counts as compensated.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ DOWN = np.diag([-1.0, 1.0, -1.0])
 _RADIUS, _SHAFT, _TIP = 0.01, 0.05, 0.225
 _WALL, _WIDTH, _DEEP = 0.015, 0.0165, 0.02
 _GRIPPER_MASS, _PEG_MASS = 1.0, 0.19
-#: Radius of the peg's rounded edge [m], of so many points: the engine's contacts of a flat end are few and irregular, so
-#: that their moment would not show on which side the end is supported.
+#: Radius of the peg's rounded edge [m], of so many points: the engine's contacts of a flat end are few and irregular,
+#: so that their moment would not show on which side the end is supported.
 _EDGE, _POINTS = 0.4e-3, 16
 #: Readings of the torque sensors that a decision averages.
 _READINGS = 4
@@ -168,16 +168,25 @@ class BatchPeg:
         starts: str = "staggered",
         reveal: bool = False,
     ) -> None:
-        if randomisation.payload[1] > 0 or randomisation.velocity_noise or np.isfinite(randomisation.stiffness[1]):
+        if (
+            randomisation.payload[1] > 0
+            or randomisation.velocity_noise
+            or np.isfinite(randomisation.stiffness[1])
+        ):
             raise CommandRejected("only latency and bandwidth differ in this task", parameter="randomisation")
         self.task, self.envs, self.randomisation = task, envs, randomisation
         self._random = np.random.default_rng(seed)
         model = build(task)
         self._batch = batch.Batch(model, nsim=envs, nthread=threads)
         bind = self._batch.bind
-        self._state = {n: bind(n) for n in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")}
+        self._state = {
+            n: bind(n) for n in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")
+        }
         self._length, self._contact = bind("actuator_length"), bind("qfrc_constraint")
-        self._filter, self._friction = self._batch.expand("actuator_dynprm"), self._batch.expand("geom_friction")
+        self._filter, self._friction = (
+            self._batch.expand("actuator_dynprm"),
+            self._batch.expand("geom_friction"),
+        )
         self._substeps = round(_FREQUENCY / task.rate / _READINGS)
         self._all = np.arange(envs)
         self._reveal = reveal
@@ -282,7 +291,10 @@ class BatchPeg:
         self._sense(torque)
         self._frames[1:] = self._frames[:-1].copy()
         self._frames[0] = task.frame(self.pose, self.command, self.wrench)
-        reward, missing = task.reward(self.pose, self.hole, self.true_wrench), task.missing(self.pose, self.hole)
+        reward, missing = (
+            task.reward(self.pose, self.hole, self.true_wrench),
+            task.missing(self.pose, self.hole),
+        )
         tip, force = self.pose[:, :3].copy(), np.linalg.norm(self.true_wrench[:, :3], axis=1)
         self.age += 1
         observation = self.observe()
@@ -297,7 +309,19 @@ class BatchPeg:
     # ------------------------------------------------------------------------------ interrupted training
 
     def _changing(self) -> dict[str, Any]:
-        own = ("hole", "command", "pose", "wrench", "age", "_latency", "_late", "_frames", "_gain", "_filter", "_friction")
+        own = (
+            "hole",
+            "command",
+            "pose",
+            "wrench",
+            "age",
+            "_latency",
+            "_late",
+            "_frames",
+            "_gain",
+            "_filter",
+            "_friction",
+        )
         return {**self._state, **{name: getattr(self, name) for name in own}}
 
     def save(self) -> dict[str, Any]:

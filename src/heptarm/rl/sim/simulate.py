@@ -11,7 +11,9 @@ from heptarm.rl.sim.peg_batch import BatchPeg
 from heptarm.rl.tasks import Task
 
 
-def simulate(task: Task, *, engine: Any = Engine, reveal: bool = False, **given: Any) -> BatchReach | BatchPeg:
+def simulate(
+    task: Task, *, engine: Any = Engine, reveal: bool = False, **given: Any
+) -> BatchReach | BatchPeg:
     """Many simulated arms in a task; the arguments are those of its class.
 
     Raises:
@@ -20,5 +22,7 @@ def simulate(task: Task, *, engine: Any = Engine, reveal: bool = False, **given:
     if not isinstance(task, PegInHole):
         return BatchReach(task, engine=engine, **given)
     if engine is not Engine:
-        raise CommandRejected(f"{task.name} is simulated by MuJoCo on the processor alone", parameter="engine")
+        raise CommandRejected(
+            f"{task.name} is simulated by MuJoCo on the processor alone", parameter="engine"
+        )
     return BatchPeg(task, reveal=reveal, **given)

@@ -348,6 +348,9 @@ class Learner:
                 self._average_gradients()
                 nn.utils.clip_grad_norm_(self._trained, s.max_grad_norm)
                 self.optimiser.step()
+        self.rate = (
+            0.1 * s.learning_rate
+        )  # the optimiser's moments are of smaller gradients than those of rewards
         return {
             "kl": 0.0,
             "loss": sum(losses) / len(losses),

@@ -6,8 +6,8 @@ from dataclasses import KW_ONLY, asdict, dataclass, field
 from typing import Any
 
 from heptarm.errors import LimitError
-from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.peg import PegInHole
+from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import Task, task_from_dict
 from heptarm.rl.train import ppo
@@ -27,16 +27,16 @@ _OLDER = {
     "gradient": "max_grad_norm",
     "entropy": "entropy_coef",
 }
-#: Robots, environment steps with the teacher, and algorithm of the peg-in-hole task. The noise is small from the beginning: the
-#: teacher has shown what to try.
+#: Robots, environment steps with the teacher, and algorithm of the peg-in-hole task. The noise is small from the
+#: beginning: the teacher has shown what to try.
 PEG = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
-PEG_TAUGHT = 300_000
+PEG_TAUGHT = 100_000
 PEG_SETTINGS = ppo.PpoSettings(
     envs=256,
     horizon=16,
     gamma=0.97,
     hidden=(128, 128),
-    learning_rate=5e-4,
+    learning_rate=1e-3,
     reward_scale=0.3,
     spread=-1.4,
     spread_end=-2.0,
@@ -75,7 +75,9 @@ class Recipe:
             raise LimitError(f"steps must be at least 1, got {self.steps}", code=2, parameter="steps")
         if self.taught and not isinstance(self.task, PegInHole):
             raise LimitError(
-                f"taught must be 0 for a task without a teacher, got {self.taught}", code=2, parameter="taught"
+                f"taught must be 0 for a task without a teacher, got {self.taught}",
+                code=2,
+                parameter="taught",
             )
         if self.seed < 0:
             raise LimitError(f"seed must be 0 or more, got {self.seed}", code=2, parameter="seed")
