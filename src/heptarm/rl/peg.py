@@ -6,8 +6,8 @@ observes, what its actions do, what is rewarded, what counts as success, and wha
 * **Scene.** That of the shipped scene `peg-in-hole`: a peg of 20 mm in the gripper, a hole wider by `clearance`.
 * **Reset.** The tip is some millimetres above the place where the hole should be; the hole itself is drawn around it.
 * **Observation.** Of some of the last decisions each: pose of the tip and of its set-point in the frame of the presumed
-  hole, and the wrench at the tip in its axes, from joint torques, zeroed when the episode begins. A peg that is pressed onto the
-  rim is supported on one side: the moment shows where the hole is, which is why no spiral is needed.
+  hole, and the wrench at the tip in its axes, from joint torques, zeroed when the episode begins. A peg that is pressed
+  onto the rim is supported on one side: the moment shows where the hole is, which is why no spiral is needed.
 * **Action.** A step of the set-point of a Cartesian impedance: x, y, z and turns about x and y. A round peg needs no
   turn about its own axis.
 * **Reward.** Privileged: the true hole is known to the simulator alone.
