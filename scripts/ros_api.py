@@ -55,7 +55,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "detach_tool": ("~/detach_tool",),
         "detach_workpiece": ("~/detach_workpiece",),
         "frames": ("~/frames", "~/get_pose"),
-        "follow": (WORDS + "`~/plan_and_execute` checks its path before the motion, not during it",),
+        "follow": ("~/plan_and_execute",),
         "fri": ("~/fri/open", "~/fri/close", "parameter `execution`"),
         "guarded": ("~/collision_guard", "~/collisions", "~/set_guard"),
         "guide_precisely": ("~/guide",),

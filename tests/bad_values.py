@@ -138,6 +138,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "CollisionModel.add": {"name": "post", "shape": heptarm.shapes.sphere(0.1), "at": POSE},
     "CollisionModel.add_points": {"cloud": [[0.5, 0.0, 0.5]]},
     "CollisionModel.remove": {"body": "cube"},
+    "CollisionModel.become": {"other": heptarm.CollisionModel("iiwa14", scene="table")},
     "CollisionModel.allowing": {"pairs": (("cube", "table"),)},
     "Mesh": {
         "vertices": np.vstack([np.zeros(3), 0.1 * np.eye(3)]),

@@ -1,12 +1,20 @@
-"""Whether this machine can draw pictures: MuJoCo needs EGL or OSMesa where there is no display."""
+"""Tests of pictures: whether this machine can draw them (without a display by EGL or OSMesa), and what they show."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from functools import cache
+
+import numpy as np
+import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.values.camera import Camera
+
+#: Gray levels by which a pixel must differ to show something else, whatever JPEG does.
+CHANGED = 60
 
 
 @cache
@@ -19,3 +27,16 @@ def cannot_draw() -> str:
         return error.text
     feed.close()
     return ""
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Wait for a condition; fails after a minute."""
+    deadline = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def changed(one: npt.NDArray[np.uint8], other: npt.NDArray[np.uint8]) -> int:
+    """Number of pixels that show something else."""
+    return int((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > CHANGED).sum())

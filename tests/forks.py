@@ -215,6 +215,12 @@ def main(number: str, *packages: str) -> None:
 
 _POPEN = subprocess.Popen
 _owner: int | None = None
+_home = ""  # network namespace of the forks
+
+
+def _network() -> str:
+    """The network namespace of this thread."""
+    return os.readlink("/proc/thread-self/ns/net")
 
 
 class Popen(subprocess.Popen):  # type: ignore[type-arg]
@@ -229,7 +235,8 @@ class Popen(subprocess.Popen):  # type: ignore[type-arg]
         if not shell and isinstance(args, (list, tuple)) and list(args[:2]) == [sys.executable, "-m"]:
             known = self.forks.get(args[2])
         particular = before is not None or passed or any(value not in (-1, None) for value in more[1:5])
-        if known is None or particular or os.getpid() != _owner or not known.suits(environment):
+        is_here = os.getpid() == _owner and _network() == _home
+        if known is None or particular or not is_here or not known.suits(environment):
             super()._execute_child(args, *rest)  # type: ignore[misc]
             return
         self.pid = known.start(
@@ -251,9 +258,9 @@ class _Diverted(Popen):
 
 def pytest_configure() -> None:
     """Divert the programs from now on."""
-    global _owner
+    global _owner, _home
     if sys.platform == "linux":  # elsewhere a fork of a process with libraries of the system is not safe
-        _owner = os.getpid()
+        _owner, _home = os.getpid(), _network()
         subprocess.Popen = _Diverted  # type: ignore[misc]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from bench.measure.figure import Figure, benchmark
 from heptarm import calibration
 from heptarm.calibration import FittedArm
-from tests.calibration.hidden_arm import HIDDEN, IIWA, computed, drawn, recorded, trajectory
+from tests.calibration.hidden_arm import HIDDEN, IIWA, TWO_SIGMA, computed, drawn, recorded, trajectory
 
 #: Durations of the recording that identifies, and of the other one that is predicted [s].
 RECORDED, OTHER = 600.0, 30.0
@@ -35,21 +35,11 @@ def identification() -> Iterator[Figure]:
 def identification_sigma() -> Iterator[Figure]:
     """Fraction of 100 arms, drawn at random, whose numbers are within two sigma of the identified ones."""
     along = trajectory(20.0)
-    names = (
-        "coulomb",
-        "breakaway",
-        "viscous",
-        "asymmetry",
-        "rotor",
-        "torque_offset",
-        "torque_gain",
-        "stiffness",
-    )
-    inside = dict.fromkeys(names, 0.0)
+    inside = dict.fromkeys(TWO_SIGMA, 0.0)
     for seed in range(RUNS):
         hidden = drawn(seed)
         found = calibration.simulator(computed(hidden, along, seed=seed), robot=IIWA).arm
-        for name in names:
+        for name in TWO_SIGMA:
             if name in found:
                 off = np.abs(found[name].value - hidden[name].value)
                 inside[name] += float((off <= 2.0 * found[name].sigma).mean()) / RUNS

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -14,27 +13,14 @@ import heptarm as ha
 from heptarm import model
 from heptarm.errors import CommandRejected, LimitError, ShapeError, StaleState, Timeout
 from tests.arm.peer import Peer
-from tests.drawing import cannot_draw
+from tests.drawing import cannot_draw, changed
 
 UPRIGHT, BENT = (0.1,) * 7, (0.5, 0.9, 0.0, -1.2, 0.0, 0.8, 0.0)
-#: Gray levels by which a pixel must differ to show something else.
-CHANGED = 60
 
 
 def needs_drawing() -> None:
     if why := cannot_draw():
         pytest.skip(why)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
-def changed(one: np.ndarray, other: np.ndarray) -> int:
-    return int((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > CHANGED).sum())
 
 
 def test_a_simulated_camera_gives_pictures_depth_and_labels_of_the_states(peer: Peer) -> None:

@@ -21,6 +21,17 @@ from tests.sim import motions
 
 IIWA = robot("iiwa14")
 START = deg(0, 30, 0, -90, 0, 60, 0)
+#: Quantities of an arm whose standard deviations are looked at.
+TWO_SIGMA = (
+    "coulomb",
+    "breakaway",
+    "viscous",
+    "asymmetry",
+    "rotor",
+    "torque_offset",
+    "torque_gain",
+    "stiffness",
+)
 #: Speed of the fastest motions, a fraction of each axis' maximum.
 FAST = 0.5
 

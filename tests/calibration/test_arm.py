@@ -20,21 +20,21 @@ from heptarm.rl.sim.randomisation import MILD, Randomisation
 from heptarm.sim.plant.plant import Plant, fitted_arm
 from heptarm.values.checks import Array
 from heptarm.values.robot import Body, robot
-from tests.calibration.hidden_arm import HIDDEN, IIWA, START, computed, drawn, number, recorded, trajectory
+from tests.calibration.hidden_arm import (
+    HIDDEN,
+    IIWA,
+    START,
+    TWO_SIGMA,
+    computed,
+    drawn,
+    number,
+    recorded,
+    trajectory,
+)
 from tests.long import longer
 from tests.simulators import FASTER
 
 Along = tuple[Array, Array, Array, Array, Array]
-TWO_SIGMA = (
-    "coulomb",
-    "breakaway",
-    "viscous",
-    "asymmetry",
-    "rotor",
-    "torque_offset",
-    "torque_gain",
-    "stiffness",
-)
 
 
 @pytest.fixture(scope="module")

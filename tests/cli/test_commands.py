@@ -216,6 +216,8 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
     (found,) = objects(*words)
     assert found["end_q"] == pytest.approx(np.radians([40, 50, 0, -80, 0, 50, 0]), abs=1e-6)
     assert found["clearance_m"] > 0.004 and found["states"] >= 2 and len(found["points"]) >= 2
+    (faster,) = objects(*words, "--improve", "100")
+    assert faster["states"] >= found["states"] + 100 and faster["duration_s"] <= found["duration_s"]
     printed = run(*words)
     assert printed.returncode == 0 and "waypoints, clearance" in printed.stdout.splitlines()[0]
     (after,) = objects("state", "--target", target)

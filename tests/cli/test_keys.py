@@ -45,6 +45,9 @@ WITHOUT_A_CONNECTION = {
     "completion",
     "rl train",
     "rl eval",
+    "twin",
+    "export",
+    "calibrate board",
 }
 #: What else the commands must be given to get as far as their connection.
 ARGUMENTS = {
@@ -56,6 +59,7 @@ ARGUMENTS = {
     "teach": "{folder}/taught.npz",
     "replay": "{folder}/recorded.npz",
     "bench": "--fri",
+    "calibrate eye": "--camera sim",
     "rl deploy": "{folder}/policy.npz",
 }
 

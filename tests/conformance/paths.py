@@ -75,7 +75,7 @@ def case_a_path_is_found_around_a_wall_and_moved_along(probe: Probe, stage: Stag
     blocked = probe.call("plan", "PlanPath", goals=[inside], timeout=SEARCH)
     refused(blocked, "goal is in collision", "wall")
     assert blocked.reason == "goal"
-    found = done(probe.call("plan", "PlanPath", goals=[inside, goal], timeout=SEARCH))
+    found = done(probe.call("plan", "PlanPath", goals=[inside, goal], timeout=SEARCH, improve=50))
     assert list(found.trajectory.joint_names) == JOINTS and len(found.trajectory.points) > 20
     ends = found.trajectory.points[0].positions, found.trajectory.points[-1].positions
     np.testing.assert_allclose(ends, [HOME, THERE], atol=2e-3)
@@ -87,6 +87,30 @@ def case_a_path_is_found_around_a_wall_and_moved_along(probe: Probe, stage: Stag
     assert {"planning", "moving"} >= {one.state for one in sent.reported} != set()
     refused(act(probe, "plan_and_execute", "PlanAndExecute", goals=[inside], timeout=SEARCH), "wall")
     emptied(probe)
+    home(probe)
+
+
+def case_a_path_goes_around_points_that_appear_on_it(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    assert not world(probe)
+    goal = probe.make("heptarm_msgs/PathGoal", position=THERE)
+    done(probe.call("set_override", "SetNumber", value=0.1))  # until the points are there
+    sent = probe.send("plan_and_execute", "PlanAndExecute", goals=[goal], timeout=SEARCH, speed=0.3)
+    until(lambda: any(one.progress > 0.02 for one in sent.reported), "the arm does not move")
+    x, y, z = forward(robot("iiwa14"), [np.radians(35.0), *HOME[1:]])[:3, 3]
+    cloud = np.array([[x, y, z + up] for up in np.linspace(-0.05, 0.05, 11)], np.float32)
+    fields = [
+        probe.make("sensor_msgs/PointField", name=name, offset=4 * index, datatype=7, count=1)
+        for index, name in enumerate("xyz")
+    ]
+    seen: dict[str, Any] = {"fields": fields, "height": 1, "width": len(cloud), "point_step": 12}
+    seen |= {"row_step": cloud.nbytes, "data": cloud.tobytes()}
+    probe.tell("points", "sensor_msgs/PointCloud2", **seen)()
+    until(lambda: sent.reported[-1].progress < 0.01, "the arm does not begin a new path")
+    done(probe.call("set_override", "SetNumber", value=1.0))
+    result = done(sent.end())
+    assert "around what came into the way" in result.message and result.residual < 0.01
+    probe.tell("points", "sensor_msgs/PointCloud2", **(seen | {"width": 0, "row_step": 0, "data": b""}))()
     home(probe)
 
 

@@ -161,6 +161,55 @@ def test_changes_of_a_world_are_counted_and_waited_for(world: ha.CollisionModel)
     ended.join()
 
 
+def test_a_world_becomes_another_one_in_one_change(world: ha.CollisionModel) -> None:
+    world.add("old", shapes.sphere(0.1), at=Pose.at(1.0, 0.0, 0.5))
+    pen = ha.Tool("pen", shapes=[shapes.sphere(0.01, at=Pose.at(0, 0, 0.05))])
+    mine = world.carrying(pen).allowing([("ball", "pen")])
+    draft = mine.carrying(None)
+    draft.remove("old")
+    draft.add("ball", shapes.sphere(0.1), at=Pose.at(1.0, 0.0, 0.5))
+    draft.add("part", shapes.sphere(0.02), at=Pose.at(1.0, 0.0, 0.5))
+    draft.hold("part", Pose.at(0.0, 0.0, 0.1))
+    draft = draft.with_arm("right", at=Pose.at(0.0, 1.2, 0.0), q=np.full(7, 0.2))
+    before, bodies = mine.revision, mine.bodies
+    with pytest.raises(ha.CommandRejected, match="iiwa14, got one of the iiwa7"):
+        mine.become(ha.CollisionModel("iiwa7"))
+    assert (mine.revision, mine.bodies) == (before, bodies)
+    mine.become(draft)
+    assert mine.revision == before + 1 and "old" not in mine.bodies
+    assert {"pen", "ball", "part", "right/link_3"} <= set(mine.bodies)
+    assert mine.held("part") == Pose.at(0.0, 0.0, 0.1) and mine.pose("ball") == Pose.at(1.0, 0.0, 0.5)
+    assert mine.allowed == {frozenset({"ball", "pen"})} and mine.margin == world.margin
+    q = np.full(7, 0.1)
+    assert mine.carrying(None).clearances(q, below=1.0) == draft.allowing([("ball", "pen")]).clearances(
+        q, below=1.0
+    )
+    draft.place("ball", Pose.at(2.0, 0.0, 0.5))
+    draft.set_arm("right", np.zeros(7))
+    assert mine.pose("ball") == Pose.at(1.0, 0.0, 0.5)
+    assert mine.clearances(q, below=1.0) != draft.clearances(q, below=1.0)
+    mine.become(mine)
+    assert mine.revision == before + 2 and "ball" in mine.bodies
+
+
+def test_two_worlds_may_become_each_other_at_once(world: ha.CollisionModel) -> None:
+    other = world.carrying(None)
+    world.add("ball", shapes.sphere(0.1), at=Pose.at(1.0, 0.0, 0.5))
+
+    def become(one: ha.CollisionModel, another: ha.CollisionModel) -> None:
+        for _ in range(20):
+            one.become(another)
+
+    threads = [
+        threading.Thread(target=become, args=pair, daemon=True) for pair in ((world, other), (other, world))
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(120.0)
+    assert not any(thread.is_alive() for thread in threads)
+
+
 def test_a_world_is_changed_while_other_threads_check_it(world: ha.CollisionModel) -> None:
     world.add("ball", shapes.sphere(0.1), at=Pose.at(0.0, 0.0, 1.4))
     touch, free, q = Pose.at(0.0, 0.0, 1.4), Pose.at(0.0, 0.0, 3.0), np.zeros((20, 7))

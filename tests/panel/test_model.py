@@ -416,7 +416,9 @@ def test_a_path_to_the_handle_is_shown_first_and_driven_where_bodies_leave_it_fr
     with pytest.raises(CommandRejected, match="no path is shown"):
         model.drive(places={})
     away = {"block": Pose.at(0.0, 0.6, 0.3)}
-    model.plan_to(goal, places=away, speed=0.5)
+    with pytest.raises(NoPath, match="contradicts keep"):
+        model.plan_to(goal, places=away, keep=ha.OnPlane((0.0, 0.0, 0.0)))
+    model.plan_to(goal, places=away, speed=0.5, keep=ha.Upright("z"))
     assert model.has_path and model.plan is not None
     message = model.poll().message
     assert message is not None and "waypoint" in message.what

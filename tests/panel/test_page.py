@@ -353,6 +353,7 @@ def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelAr
     assert goal is not None
 
     # a path to it is shown first, and driven by a press of its own
+    page.check("Keep the tool upright")
     page.press("Plan around bodies")
     page.shows("nothing moves")
     assert model.has_path and arm.state.pose.distance_to(start) < 2e-3

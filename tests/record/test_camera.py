@@ -6,8 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -23,15 +21,13 @@ from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from tests.arm.peer import Peer
 from tests.conftest import RunningCabinet
-from tests.drawing import cannot_draw
+from tests.drawing import cannot_draw, changed, until
 from tests.processes import running
 from tests.simulators import PATIENT
 
 SMALL = ha.Camera(size=(160, 120), rate=20.0)
 #: Positions of the joints in which the arm looks different.
 UPRIGHT, BENT = (0.1,) * 7, (0.5, 0.9, 0.0, -1.2, 0.0, 0.8, 0.0)
-#: Gray levels by which a pixel must differ to show something else, whatever JPEG does.
-CHANGED = 60
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -39,18 +35,6 @@ def can_draw() -> None:
     """Skips where the machine has neither EGL nor OSMesa."""
     if why := cannot_draw():
         pytest.skip(why)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
-def changed(one: np.ndarray, other: np.ndarray) -> int:
-    """Number of pixels that show something else."""
-    return int((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > CHANGED).sum())
 
 
 def taken(feed: CameraFeed) -> list[DrawnPicture]:

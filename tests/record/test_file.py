@@ -208,7 +208,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 def test_a_full_disk_is_refused_at_once() -> None:
-    with pytest.raises(CommandRejected, match="No space left"):
+    with pytest.raises(CommandRejected, match="no space left"):
         RecordingFile(Path("/dev/full"), FACTS, epoch=0, chunk=1000)
 
 

@@ -134,6 +134,90 @@ def test_shapes_have_their_sizes(context: Any) -> None:
     assert len(wedge.faces) == 4
 
 
+def cloud(
+    points: Any, *, frame: str = "", datatype: int = 7, big: bool = False, rows: int = 1
+) -> SimpleNamespace:
+    """A sensor_msgs/PointCloud2 with a color between y and z, and four bytes behind each row."""
+    size = 4 if datatype == 7 else 8
+    order, kind = ">" if big else "<", f"f{size}"
+    layout = np.dtype([("x", order + kind), ("y", order + kind), ("rgb", "u4"), ("z", order + kind)])
+    given = np.asarray(points, float).reshape(-1, 3)
+    packed = np.zeros(len(given), layout)
+    packed["x"], packed["y"], packed["z"] = given.T
+    each = len(given) // rows
+    lines = [packed[each * row : each * (row + 1)].tobytes() + b"\0" * 4 for row in range(rows)]
+    offsets = {"x": 0, "y": size, "rgb": 2 * size, "z": 2 * size + 4}
+    return message(
+        header=header(frame),
+        fields=[
+            message(name=one, offset=offsets[one], datatype=6 if one == "rgb" else datatype)
+            for one in offsets
+        ],
+        is_bigendian=big,
+        width=each,
+        height=rows,
+        point_step=layout.itemsize,
+        row_step=each * layout.itemsize + 4,
+        data=b"".join(lines),
+    )
+
+
+POINTS = [[0.5, 0.2, 0.3], [np.nan, 0.0, 0.0], [0.5, 0.25, 0.3], [0.6, 0.2, 0.3]]
+
+
+@pytest.mark.parametrize(("datatype", "big", "rows"), [(7, False, 1), (8, False, 2), (7, True, 4)])
+def test_a_cloud_of_points_is_a_body_that_the_next_one_replaces(
+    context: Any, datatype: int, big: bool, rows: int
+) -> None:
+    scene.points(context, cloud(POINTS, datatype=datatype, big=big, rows=rows))
+    found = context.world.bodies["points"]
+    np.testing.assert_allclose(found.cloud, [POINTS[0], *POINTS[2:]], atol=1e-6)
+    assert "points" in context.world.model.bodies
+    scene.collision_object(context, body("wall", pose=pose((0.0, 0.6, 0.3))))
+    scene.points(context, cloud([[0.0, 0.0, 0.005]], frame="flange"))
+    model = context.world.model
+    assert {one.second for one in model.touching(HOME)} == {"points"} and "wall" in model.bodies
+    nothing = cloud(np.zeros((0, 3)))
+    nothing.fields, nothing.point_step = [], 0  # as some drivers send it
+    scene.points(context, nothing)
+    scene.points(context, nothing)
+    assert set(context.world.bodies) == {"wall"} and not context.world.model.touching(HOME)
+
+
+def test_clouds_that_make_no_sense_change_nothing(context: Any) -> None:
+    scene.points(context, cloud(POINTS))
+    before = context.world.model.revision
+    short, flat, many = (
+        cloud(POINTS),
+        cloud(POINTS),
+        cloud(np.random.default_rng(1).uniform(0.3, 3.0, (9000, 3))),
+    )
+    short.data = short.data[:-1]
+    flat.fields = flat.fields[:3]
+    for wrong, text in (
+        (short, "4 points"),
+        (flat, "x, y and z"),
+        (many, "at most 5000"),
+        (cloud(POINTS, frame="lens"), "lens"),
+    ):
+        with pytest.raises(HeptarmError, match=text):
+            scene.points(context, wrong)
+    with pytest.raises(CommandRejected, match="cloud of points"):
+        scene.collision_object(context, body("points", operation=2))
+    assert context.world.model.revision == before and len(context.world.bodies["points"].cloud) == 3
+    assert not scene.scene_fields(context)["world"]["collision_objects"]
+
+
+def test_a_world_is_one_object_that_changes_once_for_each_message(context: Any) -> None:
+    model = context.world.model
+    scene.collision_object(context, body("wall", pose=pose((0.5, 0.2, 0.3))))
+    assert context.world.model is model and model.revision == 1 and "wall" in model.bodies
+    with pytest.raises(HeptarmError), context.world.changing() as draft:
+        draft.remove("wall")
+        draft.remove("nothing")
+    assert model.revision == 1 and "wall" in model.bodies
+
+
 def test_the_arm_carries_what_is_attached_and_leaves_it_where_it_is(context: Any) -> None:
     place = (FLANGE @ Pose.at(0.0, 0.0, 0.2)).xyz
     scene.collision_object(context, body("part", pose=pose(tuple(place))))

@@ -65,7 +65,8 @@ def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table: Any)
         "~/query_state",
         "~/controller_state",
         "~/gripper_cmd",  # of the class TwoSignalGripper, which is no member of the arm
-        "planning_scene",  # of CollisionModel, likewise
+        "~/points",  # of CollisionModel, likewise
+        "planning_scene",
         "collision_object",
         "attached_collision_object",
         "forward_position_controller/commands",

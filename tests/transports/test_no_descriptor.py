@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +21,7 @@ from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import UdpSocket, own_address
 from heptarm.panel.guard import free_port
 from heptarm.values.files import read_bytes
+from tests import forks
 from tests.descriptors import refused_with_fewer, spare
 
 
@@ -39,7 +41,10 @@ from tests.descriptors import refused_with_fewer, spare
         pytest.param(7, lambda: connect("sim://iiwa14"), id="simulator"),
     ],
 )
-def test_what_cannot_be_opened_names_the_remedy(number: int, attempt: Callable[[], object]) -> None:
+def test_what_cannot_be_opened_names_the_remedy(
+    number: int, attempt: Callable[[], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(forks, "_owner", None)  # a process of its own, as users start it
     library()  # a program that has used FRI before
     refused_with_fewer(number, attempt)
 
@@ -48,6 +53,7 @@ def test_a_simulator_that_does_not_start_leaves_no_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The folder of its file of positions is made before its process."""
+    monkeypatch.setattr(forks, "_owner", None)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with spare(3), pytest.raises(ha.ConnectFailed, match="did not start: too many open files"):
         connect("sim://iiwa14?scene=table")
@@ -55,6 +61,7 @@ def test_a_simulator_that_does_not_start_leaves_no_folder(
 
 
 def test_a_package_that_cannot_be_read_is_not_to_be_installed_again() -> None:
+    importlib.invalidate_caches()  # else the listing of its folder may be known already
     with spare(0), pytest.raises(ha.MissingExtra, match="cannot be imported") as caught:
         require("mcap.no_such_part", extra="record")
     assert "pip" not in caught.value.hint and shortage(caught.value.__cause__ or ValueError())

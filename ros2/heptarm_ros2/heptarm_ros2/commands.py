@@ -7,6 +7,7 @@ from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from heptarm.errors import HeptarmError
@@ -17,6 +18,9 @@ from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm_ros2.topic_thread import LeftAlone, TopicThread
+
+#: By whether sensors publish a topic: a subscription that accepts best effort receives reliable publishers, too.
+_RELIABILITY = {True: ReliabilityPolicy.BEST_EFFORT, False: ReliabilityPolicy.RELIABLE}
 
 
 class Commands:
@@ -37,7 +41,7 @@ class Commands:
                 class_of(row.type, "msg"),
                 row.name,
                 self._on_message(row),
-                row.depth,
+                QoSProfile(depth=row.depth, reliability=_RELIABILITY[row.is_sensor]),
                 callback_group=at_once if row.at_once else one_scene if row.aside else one_topic,
                 qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             )

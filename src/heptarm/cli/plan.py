@@ -134,6 +134,10 @@ def plan_to(
     *,
     seed: Annotated[int, Parameter(help="Of the search: the same seed finds the same path.")] = 0,
     timeout: Annotated[float, Parameter(help="Longest search [s].")] = TIMEOUT,
+    improve: Annotated[
+        int,
+        Parameter(help="Joint positions that the search reaches after a path was found, for faster paths."),
+    ] = 0,
     upright: Annotated[
         float | None,
         Parameter(
@@ -161,7 +165,9 @@ def plan_to(
     keep = None if upright is None else Upright("z", within=_angles((upright,), options)[0])
     with options.target.connect(control=False) as arm:
         world = CollisionModel(arm.robot.name, scene=options.scene, boxes=options.box)
-        path = arm.find_path(to, avoid=world, keep=keep, speed=options.speed, timeout=timeout, seed=seed)
+        path = arm.find_path(
+            to, avoid=world, keep=keep, speed=options.speed, timeout=timeout, improve=improve, seed=seed
+        )
         preview = arm.plan(path, speed=options.speed)
     found = {
         "path": str(path),

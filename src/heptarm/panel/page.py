@@ -19,6 +19,7 @@ from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import HISTORY, PanelArm, Readout
 from heptarm.values.frames import BASE, FLANGE, TOOL
+from heptarm.values.motion.planned_path import Upright
 from heptarm.values.pose import Pose
 
 #: How often a held button asks again [Hz].
@@ -298,6 +299,9 @@ class ArmPage:
         self._plan_path = self._button(
             "Plan around bodies", self._find_path, color="gray", visible=False, hint="a path to the handle"
         )
+        self._upright = self._gui.add_checkbox(
+            "Keep the tool upright", initial_value=False, visible=False, hint="on the path around bodies"
+        )
         self._drive = self._gui.add_button("Drive the path", color="orange", visible=False)
         self._drive.on_click(self._runner(lambda: self.model.drive(places=self._world.places)))
         self._follows.visible = False
@@ -337,13 +341,14 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        for one in (self._gizmo, self._go, self._follows, self._plan_path):
+        for one in (self._gizmo, self._go, self._follows, self._plan_path, self._upright):
             one.visible = shown
         self._world.name_bodies(visible=shown)
         self.model.goal = None
 
     def _find_path(self) -> None:
-        self.model.plan_to(self._gizmo_pose(), places=self._world.places, speed=self._fraction())
+        keep = Upright("z") if self._upright.value else None
+        self.model.plan_to(self._gizmo_pose(), places=self._world.places, speed=self._fraction(), keep=keep)
 
     async def _on_gizmo(self, event: Any) -> None:
         self.model.goal = self._gizmo_pose()

@@ -405,7 +405,6 @@ class CollisionModel(Sealed):
         self._check_free(body)
         return self._distances.shapes_of(body)
 
-    @_alone
     def allowing(self, pairs: Iterable[tuple[str, str]]) -> CollisionModel:
         """The same model, with the world as it is now, in which more pairs of bodies may touch.
 
@@ -415,12 +414,8 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: not pairs of names.
         """
-        view = self._copy()
-        view._allowed = self._allowed | _pairs(pairs)
-        view._distances = view._compiled(self._distances)
-        return view
+        return self._view(self._carried, self._allowed | _pairs(pairs))
 
-    @_alone
     def carrying(
         self,
         tool: Tool | KnownTool | None,
@@ -443,8 +438,40 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: wrong types.
         """
+        return self._view(_carried(tool, workpiece, at), self._allowed)
+
+    def become(self, other: CollisionModel) -> None:
+        """Have the bodies and the other arms of another model, as they are now.
+
+        So several changes, made to a copy, are one change for those who watch this model. What this arm carries, its
+        margin and the pairs that may touch stay.
+
+        Args:
+            other: of the same robot, such as a copy: `world.carrying(None)`.
+
+        Raises:
+            ShapeError: no model.
+            CommandRejected: it is of another robot.
+        """
+        instance(other, CollisionModel, "other")
+        if other.robot.name != self._robot.name:
+            raise CommandRejected(
+                f"other must be a model of this robot, the {self._robot.name}, got one of the {other.robot.name}",
+                parameter="other",
+                value=other.robot.name,
+            )
+        self._take(other._view(self._carried, self._allowed))
+
+    @_changes
+    def _take(self, view: CollisionModel) -> None:
+        self._models, self._added, self._held, self._arms = view._models, view._added, view._held, view._arms
+        self._distances = view._distances
+
+    @_alone
+    def _view(self, carried: tuple[CarriedShapes, ...], allowed: frozenset[frozenset[str]]) -> CollisionModel:
+        """The same model, with the world as it is now, in which the arm carries and may touch something else."""
         view = self._copy()
-        view._carried = _carried(tool, workpiece, at)
+        view._carried, view._allowed = carried, allowed
         view._distances = view._compiled(self._distances)
         return view
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isnan, nan
+from math import inf, isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,8 +41,9 @@ SIGNALS: dict[str, tuple[str, float]] = {
 BANDS: dict[str, float] = {name: band for name, (_, band) in SIGNALS.items()}
 #: Both part where a deviation is outside its band for so long: shorter ones are noise [s].
 _LASTING = 0.02
-#: So much of a motion decides when it began [s], found within this time of its event [s], in so many steps.
-_ONSET, _NEAR, _STEPS = 1.0, 0.3, 12
+#: So much of a motion decides when it began [s], found within this time of its event [s], by such steps and
+#: then so many of Gauss and Newton.
+_ONSET, _NEAR, _STEP, _STEPS = 1.0, 0.3, 0.005, 12
 #: A set-point that moves less than this in the onset does not show when it began [rad].
 _SHOWS = 1e-3
 #: Time after a motion in which the arm comes to rest, which is compared as well [s].
@@ -277,8 +278,7 @@ def aligned_twin(
     """The twin's recording on the time line of the recorded one.
 
     A motion of the twin begins when the recorded one began. Where their set-points show it, the begin is found to a
-    fraction of a state's period: by the shift that makes the squares of their differences least in the first second
-    (Gauss and Newton), from the events on.
+    fraction of a state's period: by the shift that makes the squares of their differences least in the first second.
 
     Args:
         recorded: the recording.
@@ -294,10 +294,13 @@ def aligned_twin(
     ran = [one for one in repetitions if one.number in by_id]
     last = float(simulated.t[-1])
     begins = [by_id[one.number].begin for one in ran]
-    wanted = [
-        one.section.motion.begin - (_shift(recorded, simulated, begin, one.section) if same_speed else 0.0)
+    shifts = [
+        _shift(recorded, simulated, begin, one.section) if same_speed else 0.0
         for one, begin in zip(ran, begins, strict=True)
     ]
+    # one that waited for the end of the one before begins with its set-points
+    begins = [begin + max(shift, 0.0) for begin, shift in zip(begins, shifts, strict=True)]
+    wanted = [one.section.motion.begin + max(-shift, 0.0) for one, shift in zip(ran, shifts, strict=True)]
     sources: list[float] = []
     targets: list[float] = []
     spans: list[tuple[float, float]] = []
@@ -366,16 +369,28 @@ def _shift(recorded: Recording, simulated: Recording, begin: float, section: Sec
     if len(t) < 3 or float(np.ptp(q, axis=0).max()) < _SHOWS:
         return 0.0
     own_t, own_q = simulated.t, simulated["q_cmd"]
-    lost = _gaps(own_t)
-    slopes = np.gradient(own_q, own_t, axis=0)
-    shift = 0.0
-    for _ in range(_STEPS):
+    lost, slopes = _gaps(own_t), np.gradient(own_q, own_t, axis=0)
+
+    def off(shift: float) -> tuple[Array, Array]:
+        """Recorded minus own set-points where both are known, and the speed of the own ones, shape (m, 7) each."""
         at = t - there + begin + shift
-        now = np.stack([np.interp(at, own_t, column) for column in own_q.T], axis=1)
-        speed = np.stack([np.interp(at, own_t, column) for column in slopes.T], axis=1)
-        speed[_is_lost(at, own_t, lost)] = 0.0  # such rows do not count
+        both = ~_is_lost(at, own_t, lost)
+        now, speed = (
+            np.stack([np.interp(at[both], own_t, column) for column in one.T], axis=1)
+            for one in (own_q, slopes)
+        )
+        return q[both] - now, speed
+
+    def square(shift: float) -> float:
+        difference, _ = off(shift)
+        return float((difference**2).mean()) if len(difference) > len(t) // 2 else inf
+
+    # all of them: a motion back along the path of the one before fits that, too, and better than what is beside both
+    shift = min(np.arange(-_NEAR, _NEAR, _STEP).tolist(), key=square)
+    for _ in range(_STEPS):
+        difference, speed = off(shift)
         weight = float((speed**2).sum())
-        step = float((speed * (q - now)).sum()) / weight if weight > 0.0 else 0.0
+        step = float((speed * difference).sum()) / weight if weight > 0.0 else 0.0
         shift = float(np.clip(shift + step, -_NEAR, _NEAR))
         if abs(step) < 1e-7:
             break

@@ -17,7 +17,7 @@ from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import put
 from heptarm.ros.node.task import ArmTask
 from heptarm.ros.trajectory.goal import GoalOutcome
-from heptarm.values.result import Cause
+from heptarm.values.result import Cause, Result
 
 _log = logging.getLogger("heptarm.ros")
 
@@ -138,6 +138,16 @@ def result_of_motion(handle: MotionHandle, *, cancelled: bool) -> ActionResult:
         result = handle.wait(timeout=FEEDBACK_PERIOD)
     except HeptarmError as error:
         return ActionResult(GoalOutcome.ABORTED, str(error))
+    return ended(result, cancelled=cancelled)
+
+
+def ended(result: Result, *, cancelled: bool) -> ActionResult:
+    """Convert the result of a motion.
+
+    Args:
+        result: of the motion.
+        cancelled: whether the client of the goal has cancelled it.
+    """
     fields: dict[str, Any] = {
         "residual": 0.0 if isnan(result.residual) else result.residual,
         "item": result.item,

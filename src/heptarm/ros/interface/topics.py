@@ -48,6 +48,7 @@ class Topic:
         counted: its handler takes a `PublishInfo` after the message.
         depth: most messages that wait; further ones replace the oldest.
         aside: its messages are handled in order, but neither wait for those of another topic nor let these wait.
+        is_sensor: sensors publish it, in ROS 2 mostly without a guarantee that each message arrives.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Topic:
     counted: bool = False
     depth: int = 1
     aside: bool = False
+    is_sensor: bool = False
 
 
 class TopicDispatcher:
@@ -266,6 +268,7 @@ TOPICS = (
     Topic("~/fri/joint", _JOINTS, fri_joint),
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
     Topic("~/fri/pose", _POSE, fri_pose),
+    Topic("~/points", "sensor_msgs/PointCloud2", scene.points, aside=True, is_sensor=True),
     Topic("planning_scene", _SCENE, scene.planning_scene, depth=100, aside=True),
     Topic("collision_object", "moveit_msgs/CollisionObject", scene.collision_object, depth=100, aside=True),
     Topic(

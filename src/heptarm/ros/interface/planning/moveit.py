@@ -142,11 +142,10 @@ class _Request:
         self.start = here if start is None or self.is_here else start
         self._goals = goals_of(context, message.goal_constraints)
         self._keep = keep_of(context, message.path_constraints, self.start)
-        self._world = context.world.model
+        draft = context.world.draft()
         if difference is not None:
-            draft = context.world.draft()
             change_scene(context, draft, difference)
-            self._world = draft.model
+        self._world = draft.model
 
     def find(self, stop: Callable[[], bool] | None) -> Path:
         """Search until `stop` returns true.

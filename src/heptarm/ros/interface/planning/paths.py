@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import nan
 from typing import Any, cast
 
 import numpy as np
 
-from heptarm.errors import CollisionForeseen, HeptarmError, NoPath, ShapeError
+from heptarm.arm.motion.following import FollowedPath
+from heptarm.errors import HeptarmError, NoPath, ShapeError
 from heptarm.planning.search import STATES, TIMEOUT
-from heptarm.ros.interface.action import ActionResult, GoalClient, GoalWork
+from heptarm.ros.interface.action import (
+    ActionResult,
+    GoalClient,
+    GoalWork,
+    ended,
+    result_of_failed_task,
+    wait_for_task,
+)
 from heptarm.ros.interface.conditions import condition_of, reaction_of
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.motions import positions, stamped_pose
-from heptarm.ros.interface.program_goal import start_program
 from heptarm.ros.interface.service import ServiceResponse
 from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.values.checks import Array
@@ -40,57 +49,63 @@ def plan(context: NodeContext, request: Any) -> ServiceResponse:
 
 
 def plan_and_execute(context: NodeContext, goal: Any) -> GoalWork:
-    """Find a path around the bodies of the world, and move along it."""
+    """Find a path around the bodies of the world, move along it, and around what comes into the way."""
     context.check_active()
-    condition_of(goal.until)  # refused now, not after the search
-    reaction_of(goal.then)
+    until, then = condition_of(goal.until), reaction_of(goal.then)  # refused now, not after the search
     find = _search(context, goal)
 
     def work(client: GoalClient) -> ActionResult:
-        client.publish_feedback({"state": "planning", "remaining": nan})
+        client.publish_feedback({"state": "planning"})
         try:
             path = find(client.is_cancel_requested)
         except NoPath as error:
             return _not_found(error, client)
         except HeptarmError as error:
             return ActionResult(GoalOutcome.ABORTED, str(error), {"clearance": nan})
-        return move_along(context, goal, path, client)
+        driver = context.driver
+        follow = partial(
+            context.arm.follow,
+            path,
+            speed=_speed(context, goal),
+            until=driver.guard if until is None else until,
+            then=then,
+        )
+        return _moved(context, path, follow, client)
 
     return work
 
 
-def move_along(context: NodeContext, goal: Any, path: Path, client: GoalClient) -> ActionResult:
-    """Move along a path, after it was checked against the world as it is now.
+def _moved(
+    context: NodeContext, path: Path, follow: Callable[..., FollowedPath], client: GoalClient
+) -> ActionResult:
+    """Move along a path in a task, which watches the world.
 
     Args:
         context: of the node.
-        goal: has the speed, the condition that ends the motion, and the reaction to it.
         path: begins where the arm rests.
+        follow: `Arm.follow` along it.
         client: of the goal.
     """
+    done = deque([0.0], maxlen=1)
     try:
-        work = start_program(context, goal, (replace(path, world=context.world.model),))
-    except CollisionForeseen as error:
-        return ActionResult(GoalOutcome.ABORTED, f"the world has changed: {error}", _fields(path))
+        task = context.driver.run_task("the path", partial(follow, on_progress=done.append))
     except HeptarmError as error:
         return ActionResult(GoalOutcome.ABORTED, str(error), _fields(path))
-    result = work(_Moving(client))
-    return replace(result, fields={**_fields(path), **result.fields})
 
+    def report() -> None:
+        client.publish_feedback({"state": "moving", "progress": done[-1]})
 
-class _Moving:
-    """The client of a goal whose path was found."""
-
-    def __init__(self, client: GoalClient) -> None:
-        self._client = client
-
-    def publish_feedback(self, fields: Mapping[str, Any]) -> None:
-        """Publish feedback of the motion."""
-        self._client.publish_feedback({"state": "moving", **fields})
-
-    def is_cancel_requested(self) -> bool:
-        """Whether the client has requested to cancel the goal."""
-        return self._client.is_cancel_requested()
+    failure = wait_for_task(task, client, report)
+    if failure is not None:
+        why = {"reason": failure.reason} if isinstance(failure, NoPath) else {}
+        return replace(result_of_failed_task(task, client, failure), fields={**_fields(path), **why})
+    found: FollowedPath = task.result()
+    result = ended(found.result, cancelled=client.is_cancel_requested())
+    last = found.detours[-1].path if found.detours else path
+    count = len(found.detours)
+    around = f", {count} times around what came into the way" if count else ""
+    fields = {name: value for name, value in result.fields.items() if name != "item"}
+    return replace(result, text=result.text + around, fields={**_fields(last), **fields})
 
 
 def _not_found(error: NoPath, client: GoalClient) -> ActionResult:
@@ -124,6 +139,7 @@ def _search(context: NodeContext, request: Any) -> Callable[[Callable[[], bool] 
             speed=speed,
             timeout=request.timeout or TIMEOUT,
             states=request.states or STATES,
+            improve=request.improve,
             seed=request.seed,
             stop=stop,
         )

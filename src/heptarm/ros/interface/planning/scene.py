@@ -1,7 +1,7 @@
-"""Messages of MoveIt about the world: their conversion from and to bodies, and the topics on which they come.
+"""Messages about the world, MoveIt's and point clouds: their conversion to bodies, and the topics on which they come.
 
-moveit_msgs has the same fields in both ROS. The pose of a body is in the frame that its header names: the base, a
-taught frame, or the flange or tool of an arm at rest.
+They have the same fields in both ROS. The pose of a body is in the frame that its header names: the base, a taught
+frame, or the flange or tool of an arm at rest.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from heptarm.ros.interface.motions import frame_in_base, pose_of
 from heptarm.ros.interface.planning.world import Part, SceneBody, WorldDraft
 from heptarm.sim.collision import CollisionModel
 from heptarm.values import shape as shapes
+from heptarm.values.checks import Array, frozen
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
 from heptarm.values.shape import ORIGIN
@@ -29,6 +30,10 @@ ADD, REMOVE, APPEND, MOVE = range(4)
 #: Types of shape_msgs/SolidPrimitive, and how many dimensions they have.
 BOX, SPHERE, CYLINDER = 1, 2, 3
 _DIMENSIONS = {BOX: 3, SPHERE: 1, CYLINDER: 2}
+#: Datatypes of sensor_msgs/PointField that coordinates have.
+_FLOATS = {7: "f4", 8: "f8"}
+#: The body that is the newest cloud of points.
+POINTS = "points"
 #: Links that a held body touches anyway: it is next to them.
 _NEIGHBOURS = 6
 
@@ -52,6 +57,16 @@ def planning_scene(context: NodeContext, message: Any) -> None:
     """Change, or replace, the world by a moveit_msgs/PlanningScene."""
     with context.world.changing() as draft:
         replace_scene(context, draft, message)
+
+
+def points(context: NodeContext, message: Any) -> None:
+    """Replace the body "points" by the cloud of a sensor_msgs/PointCloud2; by nothing, where it has no points."""
+    cloud, frame = cloud_of(message), _frame_of(context, message.header)
+    with context.world.changing() as draft:
+        if len(cloud):
+            draft.add(POINTS, SceneBody((), frame, cloud=cloud))
+        elif POINTS in draft.bodies:
+            draft.remove(POINTS)
 
 
 # ------------------------------------------------------------------------------------------- changes
@@ -175,6 +190,13 @@ def _body_of(context: NodeContext, draft: WorldDraft, message: Any, frame: Pose)
     if _operation(message) != APPEND or message.id not in draft.bodies:
         return body
     before = draft.bodies[message.id]
+    if before.cloud is not None:
+        raise CommandRejected(
+            f"shapes cannot be appended to {message.id!r}, which is a cloud of points",
+            parameter="id",
+            value=message.id,
+            hint="give them another id",
+        )
     place = flange_in_base(context) @ before.pose if before.is_held else before.pose
     shift = place.inverse() @ body.pose
     return SceneBody((*before.parts, *(replace(one, pose=shift @ one.pose) for one in parts)), place)
@@ -214,6 +236,43 @@ def _mesh(message: Any, at: Pose) -> Mesh:
     vertices = np.array([[one.x, one.y, one.z] for one in message.vertices])
     faces = np.array([list(one.vertex_indices) for one in message.triangles])
     return Mesh(vertices, faces, at)
+
+
+def cloud_of(message: Any) -> Array:
+    """Points of a sensor_msgs/PointCloud2 that are finite, in the frame of its header, shape (n, 3) [m].
+
+    Raises:
+        ShapeError: it has no coordinates, or not as many bytes as it should.
+    """
+    if not message.width * message.height:
+        return frozen(np.zeros((0, 3)))  # some drivers leave out the fields, too
+    order, fields = ">" if message.is_bigendian else "<", {one.name: one for one in message.fields}
+    kinds = [_FLOATS.get(fields[name].datatype) if name in fields else None for name in "xyz"]
+    if None in kinds:
+        raise ShapeError(
+            f"fields must have x, y and z as FLOAT32 or FLOAT64, got {', '.join(fields) or 'none'}",
+            parameter="fields",
+        )
+    width, height, step, row = message.width, message.height, message.point_step, message.row_step
+    data = np.frombuffer(bytes(message.data), np.uint8)
+    ends = [fields[name].offset + int(kind[1:]) for name, kind in zip("xyz", kinds) if kind is not None]
+    if row < width * step or len(data) != row * height or max(ends) > step:
+        raise ShapeError(
+            f"data must have {height} rows of {width} points with {max(ends)} bytes or more each, got "
+            f"{len(data)} bytes, point_step {step} and row_step {row}",
+            parameter="data",
+        )
+    layout = np.dtype(
+        {
+            "names": list("xyz"),
+            "formats": [f"{order}{kind}" for kind in kinds],
+            "offsets": [fields[name].offset for name in "xyz"],
+            "itemsize": step,
+        }
+    )
+    rows = np.ascontiguousarray(data.reshape(height, row)[:, : width * step]).reshape(-1).view(layout)
+    found = np.column_stack([rows[name].astype(float) for name in "xyz"])
+    return frozen(found[np.isfinite(found).all(axis=1)])  # a camera has no distance there
 
 
 # -------------------------------------------------------------------------------------------- frames
@@ -271,7 +330,8 @@ def _frame_of(context: NodeContext, header: Any) -> Pose:
 
 def scene_fields(context: NodeContext) -> dict[str, Any]:
     """Fields of a moveit_msgs/PlanningScene: the bodies that were added, and the state of the arm."""
-    bodies = context.world.bodies
+    added = context.world.bodies
+    bodies = {name: body for name, body in added.items() if body.cloud is None}  # clouds have no such message
     loose = [_object(context, name, body, context.base) for name, body in bodies.items() if not body.is_held]
     flange = context.driver.configuration.links[0]
     held = []

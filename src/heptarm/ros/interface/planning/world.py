@@ -1,7 +1,7 @@
 """The bodies around the arm of a node, as topics and services report them.
 
-A change happens to a copy, which replaces the world when all of it has succeeded. So a refused message changes nothing,
-and a search that runs keeps the world with which it began.
+A change happens to a copy, which the world becomes when all of it has succeeded. So a refused message changes nothing.
+A search that runs keeps the world with which it began; an arm that moves along a path watches the world as it is.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TypeAlias
 from heptarm.errors import CommandRejected
 from heptarm.ros.node.driver import Driver
 from heptarm.sim.collision import CollisionModel
+from heptarm.values.checks import Array
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
 from heptarm.values.shape import ORIGIN, Shape
@@ -31,11 +32,13 @@ class SceneBody:
         parts: its shapes, in the frame of the body.
         pose: of the body, in the base; of one that the arm holds, in the flange frame.
         is_held: whether the arm holds it.
+        cloud: of one that is a cloud of points: these, in its frame, shape (n, 3) [m]; it has no parts.
     """
 
     parts: tuple[Part, ...]
     pose: Pose
     is_held: bool = False
+    cloud: Array | None = None
 
 
 class WorldDraft:
@@ -61,7 +64,11 @@ class WorldDraft:
         """
         if name in self.bodies:
             self.model.remove(name)
-        self.model.add(name, body.parts, at=ORIGIN if body.is_held else body.pose)
+        place = ORIGIN if body.is_held else body.pose
+        if body.cloud is None:
+            self.model.add(name, body.parts, at=place)
+        else:
+            self.model.add_points(body.cloud, name=name, at=place)
         self._put(name, body)
 
     def remove(self, name: str) -> None:
@@ -112,20 +119,27 @@ class NodeWorld:
 
     def __init__(self, driver: Driver) -> None:
         self._driver = driver
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._model: CollisionModel | None = None
         self._bodies: Mapping[str, SceneBody] = MappingProxyType({})
 
     @property
     def model(self) -> CollisionModel:
-        """The world as it is now. It is not changed any more: a change makes another one.
+        """The world, which changes; see `draft` for a copy.
 
         Raises:
             CommandRejected: there is no such scene.
             MissingExtra: the models of bodies are not installed.
         """
         with self._lock:
-            return self._made()
+            if self._model is None:
+                values = self._driver.configuration.values
+                self._model = CollisionModel(
+                    self._driver.arm.robot.name,
+                    scene=values["planning.scene"],
+                    margin=values["planning.margin"],
+                )
+            return self._model
 
     @property
     def bodies(self) -> Mapping[str, SceneBody]:
@@ -138,7 +152,8 @@ class NodeWorld:
         Raises:
             HeptarmError: as `model`.
         """
-        return WorldDraft(self.model.carrying(None), self._bodies)
+        with self._lock:
+            return WorldDraft(self.model.carrying(None), self._bodies)
 
     @contextlib.contextmanager
     def changing(self) -> Iterator[WorldDraft]:
@@ -148,14 +163,7 @@ class NodeWorld:
             HeptarmError: as `model`.
         """
         with self._lock:
-            draft = WorldDraft(self._made().carrying(None), self._bodies)
+            draft = self.draft()
             yield draft
-            self._model, self._bodies = draft.model, MappingProxyType(draft.bodies)
-
-    def _made(self) -> CollisionModel:
-        if self._model is None:
-            values = self._driver.configuration.values
-            self._model = CollisionModel(
-                self._driver.arm.robot.name, scene=values["planning.scene"], margin=values["planning.margin"]
-            )
-        return self._model
+            self.model.become(draft.model)
+            self._bodies = MappingProxyType(draft.bodies)
