@@ -28,7 +28,7 @@ OWN_SIMULATOR = ("24_tool_shapes.py",)
 IN_LONG_RUN = tuple(
     f"{one}.py" for one in ("15_pick_and_place", "16_insertion", "17_polishing", "20_two_arms")
 )
-IN_LONG_RUN += ("26_calibrate.py",)
+IN_LONG_RUN += ("26_calibrate.py", "27_learned_insertion.py")
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself

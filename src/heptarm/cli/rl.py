@@ -23,7 +23,8 @@ from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, require
 from heptarm.rl import deploy as deployment
 from heptarm.rl.deploy import DeploySettings, circle
-from heptarm.rl.policy import Policy, shipped
+from heptarm.rl.peg import PegInHole
+from heptarm.rl.policy import Policy, shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
 from heptarm.values.files import refuse_existing
@@ -34,7 +35,8 @@ if TYPE_CHECKING:
 
 Seed = Annotated[int, Parameter(help="Seed of all random numbers.")]
 Randomisation = Annotated[
-    Literal["none", "mild", "strong"], Parameter(help="How much simulated robots differ.")
+    Literal["none", "mild", "strong"],
+    Parameter(help="How much simulated robots differ; of peg-in-hole: latency and bandwidth."),
 ]
 Engine = Annotated[
     Literal["mujoco", "warp", "plant"],
@@ -42,9 +44,9 @@ Engine = Annotated[
         help="Simulation: MuJoCo on the CPU, MuJoCo Warp on a GPU, or the virtual cabinet's own plant."
     ),
 ]
-PolicyFile = Annotated[Path, Parameter(help="File of the policy, .npz.")]
 AnyPolicy = Annotated[
-    Path | None, Parameter(help="File of the policy, .npz. Default: the one that comes with heptarm.")
+    Path | None,
+    Parameter(help="File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."),
 ]
 
 
@@ -73,7 +75,6 @@ def train(
 ) -> int:
     """Train a policy; under torchrun, several workers train one."""
     require("torch", extra="rl")
-    from heptarm.rl.peg import PegInHole
     from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import train as work
 
@@ -162,9 +163,10 @@ def evaluate(
     from heptarm.rl.sim.randomisation import level
 
     _refuse_reports(out, overwrite=overwrite, film=False)
-    report = work(
-        _load(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
-    )
+    network, known = _load(policy), level(randomisation)
+    if isinstance(network.task, PegInHole):
+        known = known.of_servo()
+    report = work(network, episodes, randomisation=known, seed=seed, engine=_engine(engine))
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
 
 
@@ -196,7 +198,7 @@ def deploy(
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
     _refuse_reports(out, overwrite=overwrite, film=film)
-    network = _load(policy)
+    network = _load_reach(policy)
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
@@ -215,20 +217,27 @@ def deploy(
     return _report(report, out, film=film, overwrite=overwrite, as_json=as_json)
 
 
-def _load(file: Path | None) -> Policy:
-    policy = shipped() if file is None else Policy.load(file)
+def _load(file: Path | None) -> Policy[Any]:
+    """The policy of a file, or the included one of a task by its name."""
+    if file is None or str(file) == ReachTask.name:
+        return shipped()
+    return shipped_peg() if str(file) == PegInHole.name else Policy.load(file)
+
+
+def _load_reach(file: Path | None) -> Policy[ReachTask]:
+    policy = _load(file)
     if not isinstance(policy.task, ReachTask):
         raise CommandRejected(
             f"the policy must be of the reach task, got one of {policy.task.name}",
             parameter="policy",
             value=policy.task.name,
-            hint="its episodes run in heptarm.rl.peg_env.PegInHoleEnv",
+            hint="a peg must be in the gripper: see examples/27_learned_insertion.py",
         )
     return policy
 
 
 def _targets(
-    network: Policy, at: tuple[tuple[float, float, float], ...], random: int, follow: bool, seed: int
+    network: Policy[Any], at: tuple[tuple[float, float, float], ...], random: int, follow: bool, seed: int
 ) -> list[Any]:
     if follow:
         moving: deployment.Target = circle(network.task.centre, 0.12, period=6.0)
@@ -242,7 +251,7 @@ def _targets(
     return list(network.task.targets(np.random.default_rng(seed), random))
 
 
-def _ask(arm: Any, network: Policy, settings: DeploySettings) -> int:
+def _ask(arm: Any, network: Policy[Any], settings: DeploySettings) -> int:
     """Move to targets typed by the user, until an empty line."""
     print("target x y z [m], empty line to end; the box is around", network.task.centre, file=sys.stderr)
     while line := sys.stdin.readline().strip():

@@ -24,13 +24,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from heptarm.errors import CommandRejected
-from heptarm.values.checks import Array, integer, within
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.values.checks import Array, array, integer, numbers, shown, within
 from heptarm.values.robot import RobotModel, robot
 
 #: Numbers of a frame of the observation: pose, set-point and wrench, five each.
 _FRAME = 15
-_LARGE = 1e6
+#: Largest number of a task, and the age of the oldest frame.
+_LARGE, _OLDEST = 1e6, 1000
 #: Scales of an observation: [m], [rad], [N], [Nm].
 _POSE = np.array([3e-3, 3e-3, 10e-3, 0.035, 0.035])
 _WRENCH = np.array([10.0, 10.0, 10.0, 0.2, 0.2])
@@ -43,6 +44,13 @@ _UNITS = {
     "clearance": "m",
     "depth": "m",
     "radius": "m",
+    "place": "m",
+    "height": "m",
+    "tilt": "rad",
+    "leash": "m",
+    "turn_leash": "rad",
+    "stiffness": "N/m",
+    "turn_stiffness": "Nm/rad",
     "step": "m",
     "turn": "rad",
     "force": "N",
@@ -88,7 +96,7 @@ class PegInHole:
     _: KW_ONLY
     clearance: float = 0.5e-3
     rate: float = 20.0
-    steps: int = 100
+    steps: int = 160
     history: tuple[int, ...] = (0, 1, 3, 7, 15)
     depth: float = 0.03
     radius: float = 1.5e-3
@@ -111,8 +119,16 @@ class PegInHole:
                 self, name, within(getattr(self, name), name, 0.0, _LARGE, above=True, unit=unit)
             )
         integer(self.steps, "steps", 1, 1_000_000)
-        object.__setattr__(self, "history", tuple(integer(one, "history", 0, 1000) for one in self.history))
-        object.__setattr__(self, "above", tuple(float(one) for one in self.above))
+        ages = numbers(self.history, "history", "ages in decisions").tolist()
+        if not isinstance(ages, list) or not ages:
+            raise ShapeError(
+                f"history must be ages in decisions, got {shown(self.history)}", parameter="history"
+            )
+        ages = [int(one) if isinstance(one, float) and one.is_integer() else one for one in ages]
+        object.__setattr__(self, "history", tuple(integer(one, "history", 0, _OLDEST) for one in ages))
+        low, high = array(self.above, 2, "above").tolist()
+        within(high, "above", within(low, "above", 0.0, 0.1, unit="m"), 0.1, unit="m")
+        object.__setattr__(self, "above", (low, high))
 
     @property
     def model(self) -> RobotModel:
@@ -141,7 +157,7 @@ class PegInHole:
 
     # ------------------------------------------------------------------------------ drawing episodes
 
-    def holes(self, random: np.random.Generator, count: int) -> Array:
+    def targets(self, random: np.random.Generator, count: int) -> Array:
         """True holes in the frame of the presumed one: x, y, z [m] and a rotation vector [rad], shape (count, 6)."""
         found = np.zeros((count, 6))
         found[:, :2] = random.uniform(-self.place, self.place, (count, 2))
@@ -172,6 +188,17 @@ class PegInHole:
         shown = pose[..., AXES] / _POSE
         aim = (command - pose)[..., AXES] / _POSE
         return np.concatenate([shown, aim, np.clip(wrench[..., AXES] / _WRENCH, -5.0, 5.0)], axis=-1)
+
+    def observe(self, frames: Array) -> Array:
+        """The observation: some of the last frames.
+
+        Args:
+            frames: the newest first, shape (max(history) + 1, ..., 15).
+
+        Returns:
+            Shape (..., n).
+        """
+        return np.concatenate([frames[age] for age in self.history], axis=-1)
 
     def hidden(self, pose: Array, hole: Array, friction: Array) -> Array:
         """What the value network alone sees while a policy is trained: where the hole is, as in Pinto et al. 2018.
@@ -257,13 +284,14 @@ class PegInHole:
         left = self.missing(pose, hole)
         turned = np.linalg.norm((pose - hole)[..., 3:5], axis=-1) / self.tilt
         hard = np.maximum(np.linalg.norm(wrench[..., :3], axis=-1) / self.force - 1.0, 0.0)
-        return (
+        result: Array = (
             -0.4 * np.minimum(aside, 2.0)
             - 0.5 * left / self.depth
             - 0.1 * np.minimum(turned, 2.0)
             - 0.2 * np.minimum(hard, 5.0)
             + 0.5 * (left <= self.radius)
         )
+        return result
 
     # ------------------------------------------------------------------------------ in files
 
@@ -278,7 +306,9 @@ class PegInHole:
         Raises:
             CommandRejected: entries that are not of this task.
         """
-        given = {k: tuple(v) if isinstance(v, list) else v for k, v in entries.items() if k != "name"}
+        given: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in entries.items() if k != "name"
+        }
         unknown = set(given) - {field.name for field in fields(cls)}
         if unknown:
             raise CommandRejected(

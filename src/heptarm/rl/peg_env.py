@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, NotReady, require
+from heptarm.errors import CommandRejected, require
+from heptarm.rl.env import TaskEnv, action_space
 from heptarm.rl.peg import PegInHole
-from heptarm.rl.sim.batch import Step
+from heptarm.rl.sim.episodes import Step
 from heptarm.rl.sim.peg_batch import BatchPeg
 from heptarm.rl.sim.randomisation import NONE, Randomisation
-from heptarm.values.checks import array, instance
+from heptarm.values.checks import instance
 
 require("gymnasium", extra="rl")
 
-import gymnasium  # noqa: E402  after the check that it is there
-from gymnasium import spaces  # noqa: E402
+from gymnasium import spaces  # noqa: E402  after the check that it is there
 from gymnasium.vector import AutoresetMode, VectorEnv  # noqa: E402
 from gymnasium.vector.utils import batch_space  # noqa: E402
 
@@ -31,20 +31,12 @@ def observation_space(task: PegInHole) -> spaces.Box:
     return spaces.Box(-LARGEST, LARGEST, (task.observation_size,), dtype=np.float32)
 
 
-def action_space(task: PegInHole) -> spaces.Box:
-    """Space of the actions: fractions of the largest step."""
-    return spaces.Box(-1.0, 1.0, (task.action_size,), dtype=np.float32)
-
-
 def _seen(observation: npt.NDArray[np.float64]) -> Numbers:
     return np.clip(observation, -LARGEST, LARGEST).astype(np.float32)
 
 
-class PegInHoleEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is not looked into
-    """One simulated arm that inserts a peg.
-
-    Episodes are truncated after `task.steps` decisions and never terminate. `info` holds "missing" (depth) [m],
-    "is_success", "hole" (true pose in the frame of the presumed one, shape (6,) [m, rad]) and "force" [N].
+class PegInHoleEnv(TaskEnv):
+    """One simulated arm that inserts a peg; "distance" is the depth that is missing.
 
     Args:
         task: the task; None: its defaults.
@@ -68,58 +60,9 @@ class PegInHoleEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium 
         if task is not None:
             instance(task, PegInHole, "task")
         instance(randomisation, Randomisation, "randomisation")
-        if render_mode is not None:
-            raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
-        self.render_mode = None
         self.task = task or PegInHole()
-        self.observation_space, self.action_space = observation_space(self.task), action_space(self.task)
-        self._arms = BatchPeg(self.task, envs=1, randomisation=randomisation, threads=1, starts="together")
-        self._open = False
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Numbers, dict[str, Any]]:
-        """Start an episode.
-
-        Args:
-            seed: of what is drawn from now on.
-            options: {"hole": six numbers} instead of a drawn one, see `PegInHole.holes`.
-
-        Raises:
-            ShapeError: the hole does not have six numbers.
-            CommandRejected: an unknown option.
-        """
-        super().reset(seed=seed)
-        wanted = dict(options or {})
-        hole = wanted.pop("hole", None)
-        if wanted:
-            raise CommandRejected(f"unknown options: {', '.join(wanted)}", hint="the only option is 'hole'")
-        holes = None if hole is None else array(hole, 6, "hole")[None]
-        own = None if seed is None else int(self.np_random.integers(2**63))
-        seen = self._arms.reset(holes, seed=own)
-        self._open = True
-        missing = float(self.task.missing(self._arms.pose, self._arms.hole)[0])
-        return _seen(seen[0]), self._info(missing, self._arms.hole[0].copy(), 0.0)
-
-    def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
-        """One decision; `action` of shape (5,), clipped to +-1.
-
-        Raises:
-            ShapeError: another shape, or not finite.
-            NotReady: the episode has ended, or has not started.
-        """
-        if not self._open:
-            raise NotReady("no episode is running", hint="call reset()")
-        hole = self._arms.hole[0].copy()
-        step = self._arms.step(np.asarray(action)[None])
-        ended = bool(step.done[0])
-        self._open = not ended
-        seen = step.final if ended else step.observation
-        info = self._info(float(step.distance[0]), hole, float(step.force[0]))
-        return _seen(seen[0]), float(step.reward[0]), False, ended, info
-
-    def _info(self, missing: float, hole: Any, force: float) -> dict[str, Any]:
-        return {"missing": missing, "is_success": missing <= self.task.radius, "hole": hole, "force": force}
+        arms = BatchPeg(self.task, envs=1, randomisation=randomisation, threads=1, starts="together")
+        super().__init__(arms, observation_space(self.task), render_mode=render_mode)
 
 
 class PegInHoleVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked into
@@ -172,7 +115,7 @@ class PegInHoleVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not l
         """
         step: Step = self._arms.step(actions)
         success = step.distance <= self.task.radius
-        info: dict[str, Any] = {"missing": step.distance, "is_success": success, "force": step.force}
+        info: dict[str, Any] = {"distance": step.distance, "is_success": success, "force": step.force}
         if step.done.any():
             last = np.empty(self.num_envs, dtype=object)
             for index, seen in zip(np.flatnonzero(step.done).tolist(), _seen(step.final), strict=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, asdict, dataclass, fields
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -55,6 +55,9 @@ class ReachTask:
         ShapeError: unknown action or feature, or something that is no number.
         LimitError: a number outside its range.
     """
+
+    #: Name at the command line.
+    name: ClassVar[str] = "reach"
 
     robot: str = "iiwa14"
     _: KW_ONLY

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from heptarm.errors import CommandRejected
 from heptarm.rl.peg import PegInHole
@@ -10,7 +10,8 @@ from heptarm.rl.task import ReachTask
 
 #: One definition of what is learned: it serves training, evaluation and an arm.
 Task: TypeAlias = ReachTask | PegInHole
-TASKS: dict[str, type[ReachTask] | type[PegInHole]] = {"reach": ReachTask, PegInHole.name: PegInHole}
+TASKS: dict[str, type[ReachTask] | type[PegInHole]] = {kind.name: kind for kind in (ReachTask, PegInHole)}
+OfTask = TypeVar("OfTask", bound=Task)
 
 
 def task_from_dict(entries: dict[str, Any]) -> Task:
@@ -19,7 +20,7 @@ def task_from_dict(entries: dict[str, Any]) -> Task:
     Raises:
         CommandRejected: no such task, or entries that are not its.
     """
-    name = entries.get("name", "reach")
+    name = entries.get("name", ReachTask.name)
     if name not in TASKS:
         raise CommandRejected(
             f"task must be one of {', '.join(TASKS)}, got {name!r}",

@@ -6,18 +6,16 @@ pose, their controls the set-point, so that no law runs in Python between two de
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 from mujoco import batch
 
-from heptarm.errors import CommandRejected, ShapeError
+from heptarm.errors import CommandRejected
 from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
 from heptarm.rl.peg import PegInHole
-from heptarm.rl.sim.batch import Index, Step
+from heptarm.rl.sim.episodes import ALL, Batch, Index
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.sim.plant.sensor_errors import GAIN, TORQUE_NOISE
 from heptarm.sim.plant.world import specification
@@ -124,7 +122,8 @@ def build(task: PegInHole) -> Any:
 
 def home(task: PegInHole) -> Array:
     """Joint positions with the tip at the presumed rim, shape (7,) [rad]."""
-    return _joints(task, np.zeros((1, 6)))[0]
+    result: Array = _joints(task, np.zeros((1, 6)))[0]
+    return result
 
 
 def _joints(task: PegInHole, poses: Array) -> Array:
@@ -141,8 +140,8 @@ def _quaternion(matrix: Array) -> Array:
     return found
 
 
-class BatchPeg:
-    """The task on many simulated arms; episodes that end restart by themselves. Same methods as `BatchReach`.
+class BatchPeg(Batch):
+    """The peg-in-hole task on many simulated arms.
 
     Args:
         task: the task.
@@ -150,12 +149,21 @@ class BatchPeg:
         randomisation: latency and bandwidth; what else differs is the task's.
         seed: of everything drawn.
         threads: of the simulation.
-        starts: "staggered" or "together".
+        starts: "staggered" or "together", see `Batch`.
         reveal: whether observations end with `PegInHole.hidden`, for the value network of a training.
 
+    Attributes:
+        target: the true holes, shape (envs, 6) [m, rad].
+        pose: of the tips, likewise.
+        wrench: on the tips, as the arms' torque sensors show it, shape (envs, 6) [N, Nm].
+        true_wrench: without their errors.
+
     Raises:
+        LimitError: no arms, or no threads.
         CommandRejected: a randomisation that this task has not.
     """
+
+    task: PegInHole
 
     def __init__(
         self,
@@ -168,35 +176,28 @@ class BatchPeg:
         starts: str = "staggered",
         reveal: bool = False,
     ) -> None:
-        if (
-            randomisation.payload[1] > 0
-            or randomisation.velocity_noise
-            or np.isfinite(randomisation.stiffness[1])
-        ):
+        if randomisation != randomisation.of_servo():
             raise CommandRejected("only latency and bandwidth differ in this task", parameter="randomisation")
-        self.task, self.envs, self.randomisation = task, envs, randomisation
-        self._random = np.random.default_rng(seed)
-        model = build(task)
-        self._batch = batch.Batch(model, nsim=envs, nthread=threads)
-        bind = self._batch.bind
-        self._state = {
-            n: bind(n) for n in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")
-        }
-        self._length, self._contact = bind("actuator_length"), bind("qfrc_constraint")
-        self._filter, self._friction = (
-            self._batch.expand("actuator_dynprm"),
-            self._batch.expand("geom_friction"),
+        super().__init__(
+            task,
+            envs=envs,
+            randomisation=randomisation,
+            seed=seed,
+            threads=threads,
+            starts=starts,
+            sizes=(6, 6),
         )
+        self._batch = batch.Batch(build(task), nsim=envs, nthread=threads)
+        bind, expand = self._batch.bind, self._batch.expand
+        names = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")
+        self._state = {name: bind(name) for name in names}
+        self._length, self._contact = bind("actuator_length"), bind("qfrc_constraint")
+        self._filter, self._friction = expand("actuator_dynprm"), expand("geom_friction")
         self._substeps = round(_FREQUENCY / task.rate / _READINGS)
-        self._all = np.arange(envs)
         self._reveal = reveal
-        self._staggered = starts == "staggered"
-        self._noise = TORQUE_NOISE * task.model.tau_max
-        self.hole, self.command, self.pose = (np.zeros((envs, 6)) for _ in range(3))
-        self.wrench, self.true_wrench = np.zeros((envs, 6)), np.zeros((envs, 6))
+        self._noise = TORQUE_NOISE * task.model.tau_max / np.sqrt(_READINGS)
+        self.pose, self.wrench, self.true_wrench = (np.zeros((envs, 6)) for _ in range(3))
         self._gain = np.ones((envs, 7))
-        self.age, self._latency = np.zeros(envs, dtype=np.int64), np.zeros(envs, dtype=np.int64)
-        self._late = np.zeros((randomisation.latency[1] + 1, envs, 6))
         self._frames = np.zeros((max(task.history) + 1, envs, task.frame_size))
         self.reset()
 
@@ -205,30 +206,17 @@ class BatchPeg:
         """Measured positions, shape (envs, 7) [rad]."""
         return np.asarray(self._state["qpos"])
 
-    def reset(self, holes: npt.ArrayLike | None = None, *, seed: int | None = None) -> Array:
-        """Start an episode of every arm; `holes` of shape (envs, 6) instead of drawn ones. The observations."""
-        if seed is not None:
-            self._random = np.random.default_rng(seed)
-        self._begin(self._all, None if holes is None else np.asarray(holes, dtype=np.float64))
-        if self._staggered:
-            self.age[:] = self._random.integers(0, self.task.steps, self.envs)
-        return self.observe()
-
-    def _begin(self, which: Index, holes: Array | None = None) -> None:
+    def _place(self, which: Index, starts: Array) -> None:
         count, task, random, state = len(which), self.task, self._random, self._state
-        hole = task.holes(random, count) if holes is None else holes
-        pose = task.starts(random, count)
-        self.hole[which], self.command[which], self.pose[which] = hole, pose, pose
-        self._late[:, which] = pose
-        self.age[which] = 0
-        self._latency[which] = self.randomisation.draw_latency(random, count)
+        self.pose[which] = starts
         self._filter[which, :, 0] = 1.0 / self.randomisation.draw_bandwidth(random, count)[:, None]
         self._friction[which, :, 0] = random.uniform(*FRICTION, (count, 1))
         self._gain[which] = random.uniform(1.0 - GAIN, 1.0 + GAIN, (count, 7))
-        state["qpos"][which] = _joints(task, pose)
+        state["qpos"][which] = _joints(task, starts)
         for name in ("qvel", "qacc_warmstart"):
             state[name][which] = 0.0
-        state["act"][which] = state["ctrl"][which] = pose
+        state["act"][which] = state["ctrl"][which] = starts
+        hole = self.target[which]
         state["mocap_pos"][which, 0] = PLACE + hole[:, :3] @ DOWN.T
         turn = np.empty(4)
         base = _quaternion(DOWN)
@@ -238,99 +226,57 @@ class BatchPeg:
             mujoco.mju_mulQuat(turn, base, turn)
             state["mocap_quat"][row, 0] = turn
         self.wrench[which] = self.true_wrench[which] = 0.0
-        self._frames[:, which] = task.frame(pose, pose, np.zeros((count, 6)))
+        self._frames[:, which] = task.frame(starts, starts, np.zeros((count, 6)))
 
-    def observe(self) -> Array:
-        """The current observations, shape (envs, n)."""
-        shown = [self._frames[age] for age in self.task.history]
-        if self._reveal:
-            shown.append(self.task.hidden(self.pose, self.hole, np.asarray(self._friction)[:, 0, 0]))
-        return np.concatenate(shown, axis=-1)
+    def observe(self, which: Index | slice = ALL) -> Array:
+        """The current observations of all arms or some, shape (envs, n)."""
+        seen = self.task.observe(self._frames[:, which])
+        if not self._reveal:
+            return seen
+        friction = np.asarray(self._friction)[which, 0, 0]
+        hidden = self.task.hidden(self.pose[which], self.target[which], friction)
+        return np.concatenate([seen, hidden], axis=-1)
 
     def teach(self) -> Array:
         """What one who knows the true holes would do, shape (envs, 5)."""
-        return self.task.teach(self.command, self.pose, self.hole)
+        return self.task.teach(self.command, self.pose, self.target)
+
+    def _advance(self, action: Array) -> Array:
+        return self.task.advance(self.command, self.pose, action)
+
+    def _simulate(self, command: Array) -> Array:
+        self._state["ctrl"][:] = command
+        torque = np.zeros((self.envs, 7))
+        for _ in range(_READINGS):
+            self._batch.step(nstep=self._substeps)
+            torque += np.asarray(self._contact) / _READINGS
+        self.pose[:] = self._length
+        self._sense(torque)
+        self._frames[1:] = self._frames[:-1]
+        self._frames[0] = self.task.frame(self.pose, self.command, self.wrench)
+        force: Array = np.linalg.norm(self.true_wrench[:, :3], axis=1)
+        return force
 
     def _sense(self, torque: Array) -> None:
-        """Pose and wrench of the tip; the wrench from external joint torques, with the errors of their sensors."""
-        self.pose[:] = self._length
-        noise = self._noise / np.sqrt(_READINGS) * self._random.standard_normal(torque.shape)
+        """Wrenches of the tips from external torques, shape (envs, 7) [Nm], with and without the errors of sensors."""
+        felt = self._gain * torque + self._noise * self._random.standard_normal(torque.shape)
         q = self.q
         jacobian = jacobian_batch(self.task.model, q)
         arm = forward_batch(self.task.model, q)[:, :3, 2] * _TIP
         # velocity of the tip: v + w x arm
         jacobian[:, :3] += np.cross(np.swapaxes(jacobian[:, 3:], 1, 2), arm[:, None]).swapaxes(1, 2)
         inverse = np.linalg.solve(jacobian @ jacobian.swapaxes(1, 2), jacobian)
-        both = np.stack([torque, self._gain * torque + noise], axis=-1)
-        found = (inverse @ both).reshape(self.envs, 2, 3, 2)
+        found = (inverse @ np.stack([torque, felt], axis=-1)).reshape(self.envs, 2, 3, 2)
         found = np.einsum("ij,nkjl->nkil", DOWN.T, found).reshape(self.envs, 6, 2)
         self.true_wrench[:], self.wrench[:] = found[..., 0], found[..., 1]
 
-    def step(self, action: npt.ArrayLike) -> Step:
-        """One decision of every arm, `action` of shape (envs, 5), clipped to +-1.
+    def outcome(self) -> tuple[Array, Array]:
+        """Where the tips are in the frame of the presumed hole, shape (envs, 3), and missing depths, (envs,) [m]."""
+        return self.pose[:, :3].copy(), self.task.missing(self.pose, self.target)
 
-        Raises:
-            ShapeError: another shape, or not finite.
-        """
-        task = self.task
-        given = np.asarray(action, dtype=np.float64)
-        if given.shape != (self.envs, task.action_size) or not np.isfinite(given).all():
-            raise ShapeError(
-                f"action must have shape {(self.envs, task.action_size)} and be finite, got shape {given.shape}",
-                parameter="action",
-            )
-        self.command = task.advance(self.command, self.pose, given)
-        if len(self._late) > 1:
-            self._late[1:] = self._late[:-1]
-        self._late[0] = self.command
-        self._state["ctrl"][:] = self._late[self._latency, self._all]
-        torque = np.zeros((self.envs, 7))
-        for _ in range(_READINGS):
-            self._batch.step(nstep=self._substeps)
-            torque += np.asarray(self._contact) / _READINGS
-        self._sense(torque)
-        self._frames[1:] = self._frames[:-1].copy()
-        self._frames[0] = task.frame(self.pose, self.command, self.wrench)
-        reward, missing = (
-            task.reward(self.pose, self.hole, self.true_wrench),
-            task.missing(self.pose, self.hole),
-        )
-        tip, force = self.pose[:, :3].copy(), np.linalg.norm(self.true_wrench[:, :3], axis=1)
-        self.age += 1
-        observation = self.observe()
-        done = self.age >= task.steps
-        final = observation[done]
-        if done.any():
-            which = np.flatnonzero(done)
-            self._begin(which)
-            observation[done] = self.observe()[done]
-        return Step(observation, reward, tip, missing, done, final, force)
-
-    # ------------------------------------------------------------------------------ interrupted training
+    def _reward(self, distance: Array) -> Array:
+        return self.task.reward(self.pose, self.target, self.true_wrench)
 
     def _changing(self) -> dict[str, Any]:
-        own = (
-            "hole",
-            "command",
-            "pose",
-            "wrench",
-            "age",
-            "_latency",
-            "_late",
-            "_frames",
-            "_gain",
-            "_filter",
-            "_friction",
-        )
-        return {**self._state, **{name: getattr(self, name) for name in own}}
-
-    def save(self) -> dict[str, Any]:
-        """The complete state, to resume later: arrays and one text."""
-        kept = {name: np.array(rows) for name, rows in self._changing().items()}
-        return {**kept, "random": json.dumps(self._random.bit_generator.state)}
-
-    def load(self, entries: dict[str, Any]) -> None:
-        """Restore what `save` returned."""
-        for name, rows in self._changing().items():
-            rows[:] = entries[name]
-        self._random.bit_generator.state = json.loads(entries["random"])
+        own = ("pose", "wrench", "_frames", "_gain", "_filter", "_friction")
+        return {**super()._changing(), **self._state, **{name: getattr(self, name) for name in own}}

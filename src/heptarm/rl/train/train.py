@@ -66,7 +66,7 @@ class Trained:
         done: all steps were taken; False where `progress` ended it.
     """
 
-    policy: Policy
+    policy: Policy[Any]
     history: tuple[Row, ...]
     _: KW_ONLY
     done: bool = True
@@ -233,7 +233,7 @@ class Training:
             "success": close / count if count else missing,
         }
 
-    def policy(self) -> Policy:
+    def policy(self) -> Policy[Any]:
         """The current policy."""
         agent, recipe = self.agent, self.recipe
         layers = [
