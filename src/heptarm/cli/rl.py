@@ -64,7 +64,7 @@ def train(
         bool, Parameter(negative="", help="Exactly the paper's reward: no costs for robustness.")
     ] = False,
     steps: Annotated[
-        int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.3 for peg-in-hole.")
+        int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 for peg-in-hole.")
     ] = 0,
     seed: Seed = 0,
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,

@@ -121,6 +121,7 @@ def deploy_peg(
         raise ShapeError(
             f"errors must have shape (n, 6) and be finite, got shape {holes.shape}", parameter="errors"
         )
+    arm.subscribe(rate=2.0 * _FINE * task.rate)
     arm.pose(chosen.frame)  # refuses a frame that is not there before anything moves
     spring = CartesianImpedance(
         np.repeat([task.stiffness, task.turn_stiffness], 3),

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, NotReady, require
 from heptarm.rl.sim.batch import BatchReach, Engine
-from heptarm.rl.sim.episodes import Batch
+from heptarm.rl.sim.episodes import TaskBatch
 from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import COARSE, ReachTask
@@ -58,7 +58,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
 
     metadata = {"render_modes": [], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
 
-    def __init__(self, arms: Batch, space: spaces.Box, *, render_mode: str | None) -> None:
+    def __init__(self, arms: TaskBatch, space: spaces.Box, *, render_mode: str | None) -> None:
         if render_mode is not None:
             raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
         self.render_mode = None

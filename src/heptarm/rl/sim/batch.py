@@ -9,7 +9,7 @@ import numpy as np
 
 from heptarm.errors import MissingExtra
 from heptarm.rl.sim import simulation
-from heptarm.rl.sim.episodes import ALL, Batch, Index
+from heptarm.rl.sim.episodes import ALL, Index, TaskBatch
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.values.checks import Array
@@ -97,7 +97,7 @@ class Engine:
             self._filter[:, :, 0] = entries["filter"]
 
 
-class BatchReach(Batch):
+class BatchReach(TaskBatch):
     """The reach task on many simulated arms.
 
     Args:
@@ -106,7 +106,7 @@ class BatchReach(Batch):
         randomisation: what differs between them.
         seed: of everything drawn.
         threads: of the simulation.
-        starts: "staggered" or "together", see `Batch`.
+        starts: "staggered" or "together", see `TaskBatch`.
         engine: class of the simulation, `Engine` or one with its methods.
 
     Raises:

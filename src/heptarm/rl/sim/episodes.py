@@ -45,11 +45,11 @@ class Step:
     final: Array
 
 
-class Batch(ABC):
+class TaskBatch(ABC):
     """A task on many simulated arms; episodes that end restart by themselves.
 
-    A simulation of one task says how an episode begins, what a command does, and what an arm sees. It calls `reset` at
-    the end of its constructor.
+    A simulation of one task defines how an episode begins, what a command does, and what an arm sees. It calls `reset`
+    at the end of its constructor.
 
     Args:
         task: the task.

@@ -15,7 +15,7 @@ from mujoco import batch
 from heptarm.errors import CommandRejected
 from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
 from heptarm.rl.peg import PegInHole
-from heptarm.rl.sim.episodes import ALL, Batch, Index
+from heptarm.rl.sim.episodes import ALL, Index, TaskBatch
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.sim.plant.sensor_errors import GAIN, TORQUE_NOISE
 from heptarm.sim.plant.world import specification
@@ -140,7 +140,7 @@ def _quaternion(matrix: Array) -> Array:
     return found
 
 
-class BatchPeg(Batch):
+class BatchPeg(TaskBatch):
     """The peg-in-hole task on many simulated arms.
 
     Args:
@@ -149,7 +149,7 @@ class BatchPeg(Batch):
         randomisation: latency and bandwidth; what else differs is the task's.
         seed: of everything drawn.
         threads: of the simulation.
-        starts: "staggered" or "together", see `Batch`.
+        starts: "staggered" or "together", see `TaskBatch`.
         reveal: whether observations end with `PegInHole.hidden`, for the value network of a training.
 
     Attributes:

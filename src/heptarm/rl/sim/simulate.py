@@ -7,12 +7,12 @@ from typing import Any
 from heptarm.errors import CommandRejected
 from heptarm.rl.peg import PegInHole
 from heptarm.rl.sim.batch import BatchReach, Engine
-from heptarm.rl.sim.episodes import Batch
+from heptarm.rl.sim.episodes import TaskBatch
 from heptarm.rl.sim.peg_batch import BatchPeg
 from heptarm.rl.tasks import Task
 
 
-def simulate(task: Task, *, engine: Any = Engine, reveal: bool = False, **given: Any) -> Batch:
+def simulate(task: Task, *, engine: Any = Engine, reveal: bool = False, **given: Any) -> TaskBatch:
     """Many simulated arms in a task; the arguments are those of its class.
 
     Raises:
