@@ -136,7 +136,7 @@ def deploy_peg(
         episodes.append(episode)
         late += ticks
         if progress is not None:
-            progress(number, float(task.missing(episode.poses[-1], error)))
+            progress(number, float(_missing(task, episode.poses[-1], error)))
     poses = np.array([one.poses for one in episodes])
     facts = {
         "engine": "arm",
@@ -148,7 +148,7 @@ def deploy_peg(
     return EpisodeReport(
         task,
         holes,
-        task.missing(poses[:, 1:], holes[:, None]),
+        _missing(task, poses[:, 1:], holes[:, None]),
         poses[..., :3],
         joints=np.array([one.joints for one in episodes]),
         forces=np.array([one.forces for one in episodes]),
@@ -202,6 +202,15 @@ def _run(
     out = lin_rel(z=-max(float(poses[-1][2]), 0.0) - _CLEAR, frame=presumed, moving=frame, speed_mps=_RETREAT)
     arm.move(out, mode=spring)
     return _Episode(np.array(poses), np.array(joints), np.array(forces)), late
+
+
+def _missing(task: PegInHole, poses: Array, holes: Array) -> Array:
+    """Depth that is missing, shape (...,) [m].
+
+    Beside the hole an arm cannot be deep. How far aside the tip seems to be does not count, since a peg turns in its
+    gripper.
+    """
+    return task.depth - np.minimum(task.offset(poses, holes)[..., 2], task.depth)
 
 
 class _Tip:
