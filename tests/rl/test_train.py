@@ -41,7 +41,7 @@ def curve(trained: Trained) -> list[tuple[float | None, ...]]:
     return [tuple(None if v != v else v for v in row.values()) for row in rows]
 
 
-def same(one: Policy, other: Policy) -> bool:
+def same(one: Policy[Any], other: Policy[Any]) -> bool:
     pairs = zip(one.layers, other.layers, strict=True)
     return all((a == b).all() for layer in pairs for a, b in zip(*layer, strict=True)) and bool(
         (one.mean == other.mean).all() and (one.std == other.std).all()
