@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import threading
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -285,6 +286,12 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     assert reported["protocol"] == f"{MAJOR}.{MINOR}"
     assert (out / "src/heptarm/app/HeptarmApplication.java").exists()
     assert (out / "src/heptarm/wire/Messages.java").exists()
+    with zipfile.ZipFile(reported["archive"]) as archive:  # one file to carry to Workbench
+        names = archive.namelist()
+        assert len(names) == reported["files"] and all((out / "src" / name).exists() for name in names)
+        settings = archive.read("heptarm/core/session/ServerSettings.java").decode()
+    assert f'SOURCES = "{reported["sources"]}"' in settings and len(reported["sources"]) == 12
+    assert "heptarm.key" not in names
     assert (
         "heptarm.port" in (out / "RoboticsAPI.data.xml").read_text()
         and "T1" in (out / "INSTALL.md").read_text()
@@ -296,6 +303,8 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
 def test_install_cabinet_leaves_options_out(tmp_path: Path) -> None:
     (reported,) = objects("install-cabinet", "--out", str(tmp_path / "some"), "--without", "hand-guiding,fri")
     assert reported["without"] == ["fri", "hand-guiding"]
+    (other,) = objects("install-cabinet", "--out", str(tmp_path / "all"))
+    assert reported["sources"] != other["sources"]
     app = tmp_path / "some/src/heptarm/app"
     assert "left out" in (app / "SunriseFri.java").read_text(encoding="utf-8")
     assert "SmartServo" in (app / "SunriseServo.java").read_text(encoding="utf-8")

@@ -108,7 +108,7 @@ def probe(ros: None, arena: Stage) -> Iterator[Client]:
 
 
 CASES = surface.CASES | hands.CASES | paths.CASES
-#: What every run has with the node of ROS 2, with the same part of both; here it keeps a case of each way in and out.
+#: What the node of ROS 2 shows in every run with the same part of both; here one topic, service and action stay.
 IN_LONG_RUN = {
     "a_guard_ends_commands_and_servo_topics",
     "a_servo_topic_follows_lines",
