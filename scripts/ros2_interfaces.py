@@ -274,7 +274,7 @@ def compiled_headers(prefix: Path, folder: Path) -> Path:
 
 
 def _parse_once() -> None:
-    """Let upstream's generators share what their parser makes of a file; each of the five would parse it again."""
+    """Keep what the parser of upstream's generators makes of a file; each of the five would parse it again."""
     parser: Any = importlib.import_module("rosidl_parser.parser")
     parser.get_ast_from_idl_string = functools.cache(parser.get_ast_from_idl_string)
 
