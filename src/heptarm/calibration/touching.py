@@ -465,4 +465,4 @@ def at_no_force(
         float(np.polyfit(push[begin:] ** (1.0 / power), travel[begin:], 1)[1]) for power in (1, 2, 3)
     )
     contact = place + (square - travel[begin]) * direction
-    return Pose.from_matrix(np.column_stack([turn, contact])), 0.5 * abs(linear - cubic)
+    return Pose.from_matrix(np.column_stack([turn, contact])), abs(linear - cubic)
