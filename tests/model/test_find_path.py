@@ -130,7 +130,9 @@ def test_a_glass_stays_upright(wall: ha.CollisionModel) -> None:
     )  # it would tilt otherwise
 
 
-def test_a_path_that_goes_on_elsewhere_keeps_the_direction_of_the_first_start(wall: ha.CollisionModel) -> None:
+def test_a_path_that_goes_on_elsewhere_keeps_the_direction_of_the_first_start(
+    wall: ha.CollisionModel,
+) -> None:
     first = planning.find_path(wall, start=LEFT, goal=RIGHT, keep=ha.Upright("z", within=0.2), timeout=120.0)
     (keep,) = first.keep
     assert isinstance(keep, ha.Upright)
@@ -161,10 +163,18 @@ def test_a_constraint_is_read_from_a_text(text: str, keep: Any) -> None:
 @pytest.mark.parametrize(
     "text",
     ["", "z", "Upright", "Upright(z)", "Upright('z', size=1)", "OnPlane()", "Upright(*[1])", "Upright(**{})"]
-    + ["ha.Upright()", "open('x')", "Upright(", "Upright(" * 300, "Upright('z', within=0.1 " + " " * 1000 + ")"],
+    + [
+        "ha.Upright()",
+        "open('x')",
+        "Upright(",
+        "Upright(" * 300,
+        "Upright('z', within=0.1 " + " " * 1000 + ")",
+    ],
 )
 def test_a_text_that_is_no_constraint_is_refused(text: str) -> None:
-    with pytest.raises(ha.CommandRejected, match=r"^keep\[1\] must be Upright, OnPlane, OnLine, Workspace as in Python"):
+    with pytest.raises(
+        ha.CommandRejected, match=r"^keep\[1\] must be Upright, OnPlane, OnLine, Workspace as in Python"
+    ):
         constraint_from_text(text, "keep[1]")
 
 

@@ -366,7 +366,9 @@ def test_a_goal_that_cannot_be_understood_is_refused_with_moveits_code(
 
 
 def test_what_holds_along_a_path_is_that_of_the_tool_frame_and_never_loosened(context: Any) -> None:
-    turned = tuple((Pose.from_rotvec(np.zeros(3), np.array([0.1, 0.0, 0.0])) @ Pose.of(np.zeros(3), FLANGE.quat)).quat)
+    turned = tuple(
+        (Pose.from_rotvec(np.zeros(3), np.array([0.1, 0.0, 0.0])) @ Pose.of(np.zeros(3), FLANGE.quat)).quat
+    )
 
     def kept(**constraints_of_a_kind: Any) -> Any:
         return constraints.keep_of(context, wanted(**constraints_of_a_kind))
@@ -388,8 +390,14 @@ def test_what_holds_along_a_path_is_that_of_the_tool_frame_and_never_loosened(co
     np.testing.assert_allclose(ranges.joints[:, 0], [robot.q_min[0], robot.q_max[0]])
     assert kept() == []
     for wrong, text in (
-        ({"orientation_constraints": [orientation("flange", turned, (0.5, 0.4, 0.3))]}, "leave free one axis"),
-        ({"position_constraints": [position("flange", (0.5, 0, 0.4), [1, 1, 1], kind=1)]}, "tool frame itself"),
+        (
+            {"orientation_constraints": [orientation("flange", turned, (0.5, 0.4, 0.3))]},
+            "leave free one axis",
+        ),
+        (
+            {"position_constraints": [position("flange", (0.5, 0, 0.4), [1, 1, 1], kind=1)]},
+            "tool frame itself",
+        ),
         ({"position_constraints": [position("tool", (0.5, 0, 0.4), [0.1])]}, "must be a box"),
         ({"joint_constraints": [message(joint_name="finger", position=0.0)]}, "joint must be one of"),
         ({"visibility_constraints": [message()]}, "got one of visibility"),

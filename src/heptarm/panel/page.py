@@ -348,7 +348,15 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        for one in (self._gizmo, self._go, self._follows, self._plan_path, self._upright, self._level, self._also):
+        for one in (
+            self._gizmo,
+            self._go,
+            self._follows,
+            self._plan_path,
+            self._upright,
+            self._level,
+            self._also,
+        ):
             one.visible = shown
         self._world.name_bodies(visible=shown)
         self.model.goal = None

@@ -370,7 +370,11 @@ def constraint_from_text(text: str, parameter: str = "keep") -> PathConstraint:
         if len(text) > _LONGEST_TEXT:
             raise ValueError(f"at most {_LONGEST_TEXT} characters are allowed, got {len(text)}")
         call = ast.parse(text.strip(), mode="eval").body
-        if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id not in _WRITTEN:
+        if (
+            not isinstance(call, ast.Call)
+            or not isinstance(call.func, ast.Name)
+            or call.func.id not in _WRITTEN
+        ):
             raise ValueError("it is no call of one of these")
         named = {str(one.arg): ast.literal_eval(one.value) for one in call.keywords}
         found: PathConstraint = _WRITTEN[call.func.id](*map(ast.literal_eval, call.args), **named)

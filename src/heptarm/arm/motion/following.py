@@ -227,9 +227,7 @@ class PathFollower:
                 return None
             noticed, braked = blocked.noticed, blocked.braked
             seconds = time.monotonic() - noticed
-            self._detours.append(
-                Detour(blocked.clearance, braked - noticed, rests - braked, seconds, found)
-            )
+            self._detours.append(Detour(blocked.clearance, braked - noticed, rests - braked, seconds, found))
             return found
         return None
 
