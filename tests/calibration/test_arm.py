@@ -229,7 +229,7 @@ def test_a_virtual_cabinet_of_a_fitted_arm_is_identified_again(tmp_path: Path) -
         arm.move(ha.ptp(START))
         plan = calibration.excitation(arm, seconds=20.0, collision_check=ha.CollisionModel("iiwa14"))
         assert plan.is_checked and "none foreseen" in str(plan)
-        with pytest.raises(CommandRejected, match="nothing was moved"):
+        with pytest.raises(CommandRejected, match="nothing moves"):
             calibration.record_excitation(arm, tmp_path / "no.mcap", plan=plan, confirm=lambda plan: False)
         run = calibration.record_excitation(arm, tmp_path / "run.mcap", plan=plan)
     fit = calibration.simulator(run)

@@ -224,7 +224,7 @@ def test_the_arm_measures_its_camera(frame: Frame, tmp_path: Path) -> None:
     ):
         arm.move(ha.ptp(HOME))
         shown: list[str] = []
-        with pytest.raises(CommandRejected, match="not confirmed: nothing else was moved"):
+        with pytest.raises(CommandRejected, match="not confirmed: nothing moves"):
             calibration.hand_eye(arm, stream, BOARD, confirm=lambda plan: bool(shown.append(str(plan))))
         assert "Look at the board from about here" in shown[0] and "A7" in shown[0]
         with pytest.raises(CommandRejected, match="does not see the board from here: .* the apriltag board"):

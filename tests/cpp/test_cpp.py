@@ -20,6 +20,7 @@ from heptarm.wire.codes import Code
 from heptarm.wire.messages import MAJOR
 from tests.arm.standstill import stand_still
 from tests.cli.running import sim
+from tests.long import few
 from tests.retry import retry, silent
 from tests.schema.python_side import recoded
 from tests.simulators import FASTER
@@ -270,7 +271,7 @@ def test_nobody_there(probe: Path) -> None:
 # ------------------------------------------------------------------------------------ examples
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "cpp" / "examples").glob("*.cpp")))
+@pytest.mark.parametrize("name", few(sorted(path.stem for path in (ROOT / "cpp" / "examples").glob("*.cpp"))))
 def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
     # the probe uses the same header, optimised: what only the optimiser warns of is found there
     program = compiled(ROOT / "cpp" / "examples" / f"{name}.cpp", tmp_path, "-O0")
@@ -293,6 +294,7 @@ def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
     assert {"first_motion": "refused: ", "servo": "targets followed"}[name] in done.stdout
 
 
+@pytest.mark.long  # the probe and an example use the same header
 @pytest.mark.computing
 def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     """A block with a main is a program; the others are the body of one function, in their order."""

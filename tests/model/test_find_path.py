@@ -172,9 +172,8 @@ def test_a_constraint_is_read_from_a_text(text: str, keep: Any) -> None:
     ],
 )
 def test_a_text_that_is_no_constraint_is_refused(text: str) -> None:
-    with pytest.raises(
-        ha.CommandRejected, match=r"^keep\[1\] must be Upright, OnPlane, OnLine, Workspace as in Python"
-    ):
+    wanted = r"^keep\[1\] must be Upright, OnPlane, OnLine, Workspace as in Python"
+    with pytest.raises(ha.CommandRejected, match=wanted):
         constraint_from_text(text, "keep[1]")
 
 

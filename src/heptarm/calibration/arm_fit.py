@@ -78,11 +78,11 @@ class Validation(Value):
     def __str__(self) -> str:
         """Errors of all predictions beside the noise."""
         rows = {
-            "torques": " ".join(f"{one:.3f}" for one in self.torque) + " Nm off",
-            "noise": " ".join(f"{one:.3f}" for one in self.noise) + " Nm",
-            "ratio": " ".join(f"{one:.2f}" for one in self.ratio),
-            "motors": " ".join(f"{one:.3f}" for one in self.motor) + " Nm off",
-            "deflection": " ".join(f"{1e6 * one:.1f}" for one in self.deflection) + " µrad off",
+            "torques": " ".join(f"{value:.3f}" for value in self.torque) + " Nm off",
+            "noise": " ".join(f"{value:.3f}" for value in self.noise) + " Nm",
+            "ratio": " ".join(f"{value:.2f}" for value in self.ratio),
+            "motors": " ".join(f"{value:.3f}" for value in self.motor) + " Nm off",
+            "deflection": " ".join(f"{1e6 * value:.1f}" for value in self.deflection) + " µrad off",
         }
         return lines(f"Prediction of {self.source or 'samples'}", rows)
 
@@ -104,7 +104,7 @@ class ArmFit(Value):
     def __str__(self) -> str:
         """The numbers, the prediction, and the remarks."""
         return "\n".join(
-            [str(self.arm), str(self.validation), *(f"  not known: {one}" for one in self.remarks)]
+            [str(self.arm), str(self.validation), *(f"  not known: {remark}" for remark in self.remarks)]
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
@@ -226,11 +226,11 @@ def _differences(file: Path) -> tuple[str, ...]:
         report = json.loads(read_text(file, name="commissioning"))
         date, steps = report["date"], report["steps"]
         return tuple(
-            f"commissioning of {date}: {step['step']}: {one['quantity']}: expected {one['expected']}, measured "
-            f"{one['measured']}"
+            f"commissioning of {date}: {step['step']}: {comparison['quantity']}: expected {comparison['expected']}, "
+            f"measured {comparison['measured']}"
             for step in steps
-            for one in step["comparisons"]
-            if not one["agrees"]
+            for comparison in step["comparisons"]
+            if not comparison["agrees"]
         )
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, CommandRejected):

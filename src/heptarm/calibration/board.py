@@ -222,18 +222,20 @@ class Board:
         check_pose(at, "at")
         file = path_of(path).with_suffix(".xml")
         drawn = file.with_suffix(".png")
-        for one in (file, drawn):
-            refuse_existing(one, overwrite=overwrite)
+        for target in (file, drawn):
+            refuse_existing(target, overwrite=overwrite)
         image = require("PIL.Image", extra="vision").fromarray(self.picture(pixels=128))
         middle = self.centre + (0.0, 0.0, 0.5 * _PLATE)
         numbers: dict[str, npt.ArrayLike] = {
             "vertices": self.outline - (0.0, 0.0, _ABOVE),
             "pos": at.xyz,
             "quat": np.roll(at.quat, 1),
-            "half": (*(0.5 * one for one in self.size), 0.5 * _PLATE),
+            "half": (*(0.5 * length for length in self.size), 0.5 * _PLATE),
             "middle": middle,
         }
-        texts = {name: " ".join(f"{one:.9g}" for one in np.ravel(value)) for name, value in numbers.items()}
+        texts = {
+            name: " ".join(f"{number:.9g}" for number in np.ravel(value)) for name, value in numbers.items()
+        }
         names = {"body": "tool" if on_flange else "stand", "plate": "board"}
         text = _SCENE.format(board=self, picture=drawn.name, **texts, **names)
         try:

@@ -47,7 +47,7 @@ def export(
     """
     path = Path(f"{model}{_ENDINGS[form]}") if out is None else out
     if FORMATS.get(path.suffix.lower()) != form:
-        endings = ", ".join(ending for ending, one in FORMATS.items() if one == form)
+        endings = ", ".join(ending for ending, other in FORMATS.items() if other == form)
         raise CommandRejected(
             f"out must end in {endings} for {form}, got {path.name!r}", parameter="out", value=str(path)
         )
@@ -74,7 +74,7 @@ def _tool(name: str, target: str) -> Tool:
             value=target,
             hint="heptarm targets lists them; heptarm calibrate load --save makes a tool of one",
         )
-    known = {one.name: one for one in saved.tools}
+    known = {tool.name: tool for tool in saved.tools}
     if name not in known:
         listed = ", ".join(known) or "none"
         raise CommandRejected(

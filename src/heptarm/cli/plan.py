@@ -182,7 +182,7 @@ def plan_to(
         preview = arm.plan(path, speed=options.speed)
     found = {
         "path": str(path),
-        "points": [one.q.tolist() for one in path.points],
+        "points": [point.q.tolist() for point in path.points],
         "clearance_m": None if path.clearance is None else path.clearance.distance,
         "states": path.stats.states,
         "seconds": path.stats.seconds,
@@ -230,11 +230,17 @@ def preview_data(preview: ProgramPreview) -> dict[str, Any]:
         "end_xyz": preview.end.xyz.tolist(),
         "end_quat": preview.end.quat.tolist(),
         "closest": {
-            name: {"axis": one.axis, "fraction": one.fraction, "t_s": one.t} for name, one in closest.items()
+            name: {"axis": place.axis, "fraction": place.fraction, "t_s": place.t}
+            for name, place in closest.items()
         },
         "checked": preview.is_checked,
         "collisions": [
-            {"first": one.clearance.first, "second": one.clearance.second, "t_s": one.t, "motion": one.motion}
-            for one in preview.collisions
+            {
+                "first": touch.clearance.first,
+                "second": touch.clearance.second,
+                "t_s": touch.t,
+                "motion": touch.motion,
+            }
+            for touch in preview.collisions
         ],
     }

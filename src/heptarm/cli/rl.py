@@ -241,7 +241,7 @@ def _refuse_reports(out: Path | None, *, overwrite: bool, film: bool) -> None:
 
 def _report(report: EpisodeReport, out: Path | None, *, film: bool, overwrite: bool, as_json: bool) -> int:
     if out is not None:
-        files = [report.save(out.with_suffix(one), overwrite=overwrite) for one in (".npz", ".json")]
+        files = [report.save(out.with_suffix(ending), overwrite=overwrite) for ending in (".npz", ".json")]
         files.append(report.plot(out.with_suffix(".png"), overwrite=overwrite))
         if film:
             from heptarm.rl.film import film as draw

@@ -148,7 +148,7 @@ def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBo
     last = _name(model, int(site.bodyid[0]))
     bodies.append(TreeBody(FLANGE, last, Pose.of(site.pos, np.roll(site.quat, -1))))
     bodies += _tool(tool) if tool is not None else []
-    names = [one.name for one in bodies]
+    names = [body.name for body in bodies]
     doubled = next((name for name in names if names.count(name) > 1), "")
     if doubled:
         raise CommandRejected(
@@ -178,7 +178,7 @@ def _name(model: mujoco.MjModel, body: int) -> str:
 def _body(model: mujoco.MjModel, index: int, robot: RobotModel) -> TreeBody:
     turn = Pose.of((0.0, 0.0, 0.0), np.roll(model.body_iquat[index], -1)).rotation
     name = _name(model, index)
-    joints = [int(model.body_jntadr[index]) + one for one in range(int(model.body_jntnum[index]))]
+    joints = [int(model.body_jntadr[index]) + offset for offset in range(int(model.body_jntnum[index]))]
     if len(joints) > 1:
         raise CommandRejected(
             f"the body {name!r} of the scene has {len(joints)} joints, and other formats know one for each body",
@@ -272,10 +272,10 @@ def _tool(tool: Tool) -> list[TreeBody]:
     """A tool as a body on the flange, and its frames."""
     colour = np.array([0.45, 0.47, 0.5, 1.0])
     shapes = []
-    for one in tool.shapes:
-        radius, length, _ = one.size.tolist()
-        size = 0.5 * one.size if one.kind == "box" else np.array([radius, 0.5 * length, 0.0])
-        shapes.append(TreeShape(one.kind, size, one.pose, colour, collides=True, is_drawn=True))
+    for shape in tool.shapes:
+        radius, length, _ = shape.size.tolist()
+        size = 0.5 * shape.size if shape.kind == "box" else np.array([radius, 0.5 * length, 0.0])
+        shapes.append(TreeShape(shape.kind, size, shape.pose, colour, collides=True, is_drawn=True))
     name = tool.name.replace("/", "_").replace(" ", "_")
     body = TreeBody(name, FLANGE, ORIGIN, tool.mass, tool.com, symmetric(tool.inertia), None, tuple(shapes))
     frames = [TreeBody(f"{name}_{frame}".replace(" ", "_"), name, pose) for frame, pose in tool.frames]

@@ -71,8 +71,8 @@ class Constraints:
     def __init__(self, keep: Sequence[PathConstraint], robot: RobotModel, tcp: Pose, start: Array) -> None:
         self._robot, self._tcp = robot, tcp
         turn = self._tools(start[None])[1][0]
-        self.keep = tuple(_directed(one, turn) for one in keep)
-        self._parts = [part for one in self.keep for part in _parts(one, robot)]
+        self.keep = tuple(_directed(constraint, turn) for constraint in keep)
+        self._parts = [part for constraint in self.keep for part in _parts(constraint, robot)]
         self._most = _USED
         self.step = min(part.step for part in self._parts)
         self._check_start(start)
@@ -82,9 +82,10 @@ class Constraints:
         if deviation > 1.0 + _SAG:
             random = np.random.default_rng(0)
             tried = [start, *random.uniform(self._robot.q_min, self._robot.q_max, (_TRIALS, 7))]
-            if all(self.projected(one) is None for one in tried):
+            if all(self.projected(point) is None for point in tried):
                 raise NoPath(
-                    f"keep contradicts itself: no joint positions obey {' and '.join(one.name for one in self._parts)}",
+                    "keep contradicts itself: no joint positions obey "
+                    f"{' and '.join(part.name for part in self._parts)}",
                     reason="constraint",
                     parameter="keep",
                     hint="leave out one of the constraints, or allow more",
@@ -129,7 +130,7 @@ class Constraints:
         for _ in range(_ITERATIONS):
             xyz, turns = self._tools(q[None])
             offsets = [part.offsets(xyz, turns, q[None]) for part in self._parts]
-            deviations = [float(part.deviations(one)[0]) for part, one in zip(self._parts, offsets)]
+            deviations = [float(part.deviations(point)[0]) for part, point in zip(self._parts, offsets)]
             if max(deviations) <= _AIM:
                 is_inside = (q >= self._robot.q_min).all() and (q <= self._robot.q_max).all()
                 return np.asarray(q) if is_inside else None

@@ -349,7 +349,7 @@ class _Search:
 
     def check_start(self) -> None:
         """Refuse a start at which bodies overlap by more than a little."""
-        deep = [one for one in self._world.touching(self._start) if one.distance < -_SLIGHT]
+        deep = [touch for touch in self._world.touching(self._start) if touch.distance < -_SLIGHT]
         if deep:
             raise NoPath(
                 f"start is in collision: {deep[0]}; it may overlap by {_SLIGHT * 1e3:g} mm",
@@ -366,7 +366,7 @@ class _Search:
         Raises:
             NoPath: bodies are in the way at all of them, or the goal cannot be reached.
         """
-        rows = np.concatenate([self._solutions(one) for one in _each(goal)])
+        rows = np.concatenate([self._solutions(single) for single in _each(goal)])
         if not len(rows):
             raise NoPath(
                 "goal has no inverse kinematics: it is out of reach, or every arm position that reaches it violates a "
@@ -680,7 +680,7 @@ class _Search:
         distances = self._world.distances(curve[:: _SAMPLES // 4], below=_REPORTED)
         worst = curve[:: _SAMPLES // 4][int(distances.argmin())]
         found = self._world.clearances(worst, below=_REPORTED) if np.isfinite(distances).any() else ()
-        allowed = [one for one in found if one.distance >= distances.min() - 1e-9]
+        allowed = [clearance for clearance in found if clearance.distance >= distances.min() - 1e-9]
         return allowed[0] if allowed else None
 
 
@@ -719,9 +719,9 @@ def _each(goal: object) -> list[Array | Pose | Region]:
         and goal
         and not isinstance(goal[0], int | float)
     ):
-        return [one for part in goal for one in _each(part)]
+        return [element for part in goal for element in _each(part)]
     if isinstance(goal, np.ndarray) and goal.ndim == 2:
-        return [one for row in goal for one in _each(row)]
+        return [element for row in goal for element in _each(row)]
     if isinstance(goal, np.ndarray | Sequence) and not isinstance(goal, str):
         return [array(goal, 7, "goal")]
     raise ShapeError(
@@ -741,9 +741,9 @@ def _is_same(one: Array | Pose | Region, other: Array | Pose | Region) -> bool:
 def _apart(points: list[Array]) -> Array:
     """Points without those that are where the one before is; a path that does not move keeps one."""
     kept = [points[0]]
-    for one in points[1:]:
-        if np.abs(one - kept[-1]).max() > 1e-4:
-            kept.append(one)
+    for point in points[1:]:
+        if np.abs(point - kept[-1]).max() > 1e-4:
+            kept.append(point)
     if len(kept) == 1 or np.abs(kept[-1] - points[-1]).max() > 0.0:
         kept = [*(kept if len(kept) == 1 else kept[:-1]), points[-1]]
     return np.array(kept)

@@ -58,7 +58,7 @@ class SpeedLimits:
         speed, acceleration = self.speed, 1.0
         for _ in range(_ROUNDS):
             motion = JointSpline(
-                points=tuple(Ptp(q=tuple(one.tolist())) for one in points[1:]),
+                points=tuple(Ptp(q=tuple(point.tolist())) for point in points[1:]),
                 dynamics=JointDynamics(velocity=(speed,) * 7, acceleration=(acceleration,) * 7),
             )
             planned = plan(robot, motion, points[0])

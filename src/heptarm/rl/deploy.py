@@ -105,7 +105,7 @@ def deploy(
             value=task.robot,
             hint=f"train one with --robot {arm.robot.name}",
         )
-    goals = [_target(one, settings.guard) for one in _listed(targets)]
+    goals = [_target(target, settings.guard) for target in _listed(targets)]
     begins = (
         [np.asarray(task.home)] * len(goals) if starts is None else list(np.atleast_2d(np.asarray(starts)))
     )
@@ -120,7 +120,7 @@ def deploy(
         late += ticks
         if progress is not None:
             progress(number, _distances(task, episode)[-1])
-    joints = np.array([one.joints for one in episodes])
+    joints = np.array([episode.joints for episode in episodes])
     facts = {
         "engine": "arm",
         "robot": arm.robot.title,
@@ -132,8 +132,8 @@ def deploy(
     }
     return EpisodeReport(
         task,
-        np.array([one.targets[-1] for one in episodes]),
-        np.array([_distances(task, one) for one in episodes]),
+        np.array([episode.targets[-1] for episode in episodes]),
+        np.array([_distances(task, episode) for episode in episodes]),
         task.tip(joints),
         joints=joints,
         facts=facts,

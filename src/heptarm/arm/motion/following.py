@@ -78,7 +78,7 @@ class FollowedPath(Value):
     def __str__(self) -> str:
         """A few lines."""
         rows = {"cause": self.result.cause.value}
-        rows |= {f"detour {number}": str(one) for number, one in enumerate(self.detours, 1)}
+        rows |= {f"detour {number}": str(detour) for number, detour in enumerate(self.detours, 1)}
         return lines("FollowedPath", rows)
 
 
@@ -236,7 +236,8 @@ class PathFollower:
         while not held.done and not self._is_over():
             if held.wait_started(_CYCLE) and not held.done:
                 state = self.connection.wait_for(
-                    lambda one: held.done or (one.motion is not None and one.motion.id == held.id), _SOON
+                    lambda state: held.done or (state.motion is not None and state.motion.id == held.id),
+                    _SOON,
                 )
                 return None if held.done else self._commanded(state)
         return None

@@ -353,8 +353,8 @@ def _at_once(function: Callable[..., float], *given: Tensor) -> Callable[[], flo
 
 
 def _differentiate(loss: Tensor, parameters: list[nn.Parameter]) -> None:
-    for one, gradient in zip(parameters, torch.autograd.grad(loss, parameters), strict=True):
-        one.grad = gradient
+    for parameter, gradient in zip(parameters, torch.autograd.grad(loss, parameters), strict=True):
+        parameter.grad = gradient
 
 
 def divergence(mean: Tensor, spread: Tensor, now: Tensor, spread_now: Tensor) -> Tensor:

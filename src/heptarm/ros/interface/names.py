@@ -18,6 +18,8 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from types import MappingProxyType
 
+from heptarm.ros.node.parameters import SPELLINGS
+
 
 class NameRole(Enum):
     """What a topic or an action is for."""
@@ -308,7 +310,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         "lbr_stack": Preset(
             MappingProxyType(
                 {
-                    "joint_names": [f"lbr_A{i}" for i in range(1, 8)],
+                    "joint_names": list(SPELLINGS["lbr_stack"][0]),
                     "base_frame": "lbr_link_0",
                     "flange_frame": "lbr_link_ee",
                 }

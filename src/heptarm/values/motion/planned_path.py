@@ -248,8 +248,8 @@ def unit_vector(value: npt.ArrayLike, name: str) -> Array:
     return frozen(given / length)
 
 
-def _check_place(one: OnPlane | OnLine, direction: str) -> None:
+def _check_place(part: OnPlane | OnLine, direction: str) -> None:
     """Check a plane or a line, and give its direction the length 1."""
-    object.__setattr__(one, "point", array(one.point, 3, "point"))
-    object.__setattr__(one, direction, unit_vector(getattr(one, direction), direction))
-    object.__setattr__(one, "within", within(one.within, "within", 1e-3, 1.0, unit="m"))
+    object.__setattr__(part, "point", array(part.point, 3, "point"))
+    object.__setattr__(part, direction, unit_vector(getattr(part, direction), direction))
+    object.__setattr__(part, "within", within(part.within, "within", 1e-3, 1.0, unit="m"))

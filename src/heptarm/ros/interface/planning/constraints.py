@@ -127,8 +127,8 @@ def start_of(context: NodeContext, state: Any) -> Array | None:
             MoveItCode.INVALID_ROBOT_STATE,
             hint="publish them on attached_collision_object",
         )
-    own = set(context.joints)
-    pairs = [pair for pair in zip(state.joint_state.name, state.joint_state.position) if pair[0] in own]
+    names = context.driver.configuration.own(state.joint_state.name)
+    pairs = [pair for pair in zip(names, state.joint_state.position) if pair[0] in context.joints]
     if not pairs:
         return None
     return positions(context.driver, [name for name, _ in pairs], [value for _, value in pairs])
@@ -145,7 +145,7 @@ def goals_of(context: NodeContext, constraints: Sequence[Any]) -> list[Array | P
     """
     if not constraints:
         raise RequestRefused("there is no goal", MoveItCode.INVALID_GOAL_CONSTRAINTS)
-    return [_goal_of(context, one) for one in constraints]
+    return [_goal_of(context, constraint) for constraint in constraints]
 
 
 def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
@@ -157,7 +157,9 @@ def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
         )
     joints = message.joint_constraints
     if joints and not any(counts):
-        return positions(context.driver, [one.joint_name for one in joints], [one.position for one in joints])
+        return positions(
+            context.driver, [joint.joint_name for joint in joints], [joint.position for joint in joints]
+        )
     if joints or not counts[0]:
         raise RequestRefused(
             "a goal must be joint positions, or a position with or without an orientation",
@@ -175,15 +177,16 @@ def _pose_goal(context: NodeContext, place: Any, turns: Sequence[Any]) -> Pose |
     has_lever = bool(np.abs(to_tool.xyz).max() > 0.0)
     centre, radius = _ball(context, place)
     if turns:
-        one = turns[0]
-        if one.link_name not in ("", place.link_name):
+        orientation = turns[0]
+        if orientation.link_name not in ("", place.link_name):
             raise RequestRefused(
-                f"position and orientation must be of the same link, got {place.link_name!r} and {one.link_name!r}",
+                "position and orientation must be of the same link, "
+                f"got {place.link_name!r} and {orientation.link_name!r}",
                 MoveItCode.INVALID_GOAL_CONSTRAINTS,
             )
-        quat = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).quat
-        cone = min(one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, pi)
-        turn = min(one.absolute_z_axis_tolerance, pi)
+        quat = _in_base(context, orientation.header, (0.0, 0.0, 0.0), orientation.orientation).quat
+        cone = min(orientation.absolute_x_axis_tolerance, orientation.absolute_y_axis_tolerance, pi)
+        turn = min(orientation.absolute_z_axis_tolerance, pi)
     elif has_lever:
         raise RequestRefused(
             "a position with any orientation must be of the tool frame itself",

@@ -258,8 +258,9 @@ def _check_free(context: NodeContext, message: Any) -> None:
     Raises:
         CollisionForeseen: they would.
     """
-    order = [message.joint_names.index(name) for name in context.joints if name in message.joint_names]
-    rows = [point.positions for point in message.points if len(point.positions) == len(message.joint_names)]
+    names = context.driver.configuration.own(message.joint_names)
+    order = [names.index(name) for name in context.joints if name in names]
+    rows = [point.positions for point in message.points if len(point.positions) == len(names)]
     if len(order) != 7 or not rows:
         return  # the driver refuses or completes it
     path = np.vstack([context.arm.state.q_cmd, np.array([[row[k] for k in order] for row in rows])])
@@ -356,7 +357,10 @@ def _cartesian(context: NodeContext, request: Any) -> Mapping[str, Any]:
         )
     link = link_on_flange(context, request.link_name)
     stamped = class_of("geometry_msgs/PoseStamped", "msg")
-    poses = [stamped_in_base(context, stamped(header=request.header, pose=one)) for one in request.waypoints]
+    poses = [
+        stamped_in_base(context, stamped(header=request.header, pose=waypoint))
+        for waypoint in request.waypoints
+    ]
     speed = (
         getattr(request, "max_velocity_scaling_factor", 0.0) or context.driver.configuration.values["speed"]
     )

@@ -120,7 +120,7 @@ def _search(context: NodeContext, request: Any) -> Callable[[Callable[[], bool] 
     Raises:
         HeptarmError: refused; the text gives the reason.
     """
-    goals = [_goal(context, one, f"goals[{index}]") for index, one in enumerate(request.goals)]
+    goals = [_goal(context, goal, f"goals[{index}]") for index, goal in enumerate(request.goals)]
     if not goals:
         raise ShapeError("goals must have at least one goal, got none", parameter="goals")
     keep = [constraint_from_text(one, f"keep[{index}]") for index, one in enumerate(request.keep)]
