@@ -6,7 +6,7 @@ STAMPS := build/stamps
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup native sanitized cabinet demo test test-fast test-computing test-ros test-ros2 test-ros1 test-pythons test-long mutants conformance lint check bench soak figures lock docs \
-	wheel first-hour clean help
+	wheel first-hour first-day clean help
 
 ##@ To try it
 
@@ -75,21 +75,24 @@ lint: $(STAMPS)/venv  ## ruff (rules and format), mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema, the diagrams with the sources
 	$(PY) schema/generate.py --check
 	$(PY) scripts/diagrams.py --check
+	$(PY) scripts/screens.py --check
 
 # Packages are unpacked on one processor while the other compiles. What installs system packages is all on one side: they
-# lock each other out. What fails of ROS is asked for again by its tests, and reported there.
+# lock each other out.
 .PHONY: prepared
 prepared: $(STAMPS)/demo
 	@$(MAKE) --no-print-directory $(STAMPS)/venv & packages=$$!; \
 	$(MAKE) --no-print-directory native cabinet $(STAMPS)/browser; compiled=$$?; \
-	$(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1; \
 	wait $$packages && exit $$compiled
 
-# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it, to the
-# end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are shown at the end.
+# The set-up of ROS, lint and what computes fill the time in which the others wait, and leave them the processor when they
+# want it, to the end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are
+# shown at the end. What fails of the set-up is asked for again by the tests of ROS, and reported there.
 test: prepared  ## everything; what takes long begins first
-	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-ros.log 2>&1 & ros=$$!; \
+	nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
 	$(PY) -m pytest $(PARALLEL) $(LONGEST) -m "not computing and not alone"; failed=$$?; \
+	wait $$ros; cat build/test-ros.log; \
 	$(MAKE) --no-print-directory test-ros ROS_JOBS=2 || failed=1; \
 	wait $$beside || failed=1; cat build/test-beside.log; exit $$failed
 	$(PY) -m pytest $(LONGEST) -m alone $(ALONE)
@@ -178,6 +181,7 @@ lock: $(STAMPS)/demo  ## versions and checksums of all packages, in scripts/lock
 
 docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
+	@$(PY) scripts/checklist_pdf.py docs/_build/html
 	@echo docs/_build/html/index.html
 
 wheel: $(STAMPS)/compiler cabinet  ## a wheel with the compiled jars, in dist/; installs only what that needs
@@ -185,6 +189,9 @@ wheel: $(STAMPS)/compiler cabinet  ## a wheel with the compiled jars, in dist/; 
 
 first-hour:  ## what a newcomer does, timed: clone, demo, tutorial, the wheel with each Python of this machine
 	python3 scripts/first_hour.py
+
+first-day:  ## a lab's first day from the documentation, timed: eight programs and some commands
+	python3 scripts/first_day.py
 
 clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars src/heptarm/_native*.so .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -16,7 +16,7 @@ import json
 import os
 import sys
 
-from bench.calibration import cameras, identification  # noqa: F401  every import registers its benchmarks
+from bench.calibration import cameras, flange, identification  # noqa: F401  every import registers its benchmarks
 from bench.contact import force  # noqa: F401
 from bench.fri import faults, guard, hold, loop  # noqa: F401
 from bench.lab import record  # noqa: F401
@@ -32,7 +32,7 @@ from bench.servo import stream  # noqa: F401
 from bench.simulator import life, tick  # noqa: F401
 from bench.speed import dynamics, fleet, idle, kinematics, request, unpaced  # noqa: F401
 from bench.state import push  # noqa: F401
-from bench.strangers import programs  # noqa: F401
+from bench.strangers import libiiwa, programs  # noqa: F401
 from bench.trust import lost_client as lost_clients  # noqa: F401
 from bench.trust import network, outsiders, readings, soak  # noqa: F401
 

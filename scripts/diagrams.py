@@ -142,15 +142,15 @@ def svg(lanes: tuple[str, ...], steps: tuple[Step, ...]) -> str:
         out.append(
             f'<rect x="{left}" y="{MARGIN}" width="{LANE}" height="{height - 2 * MARGIN}" fill="{COLOURS[number]}"/>'
         )
-        out.append(_text(left + LANE / 2, MARGIN + 21, lane, size=13, weight=600))
+        out.append(text(left + LANE / 2, MARGIN + 21, lane, size=13, weight=600))
     for number, step in enumerate(steps):
         x, y = _corner(number, step)
         out.append(
             f'<rect x="{x}" y="{y}" width="{BOX}" height="{HEIGHT}" rx="5" fill="#ffffff" stroke="{EDGE}"/>'
         )
-        out.append(_text(x + BOX / 2, y + 16, f"{number + 1}  {step.name}", size=12))
+        out.append(text(x + BOX / 2, y + 16, f"{number + 1}  {step.name}", size=12))
         short = "/".join(Path(step.file).parts[-2:])
-        out.append(_text(x + BOX / 2, y + 32, short, size=10, colour=MUTED))
+        out.append(text(x + BOX / 2, y + 32, short, size=10, colour=MUTED))
         if number + 1 < len(steps):
             out.append(_arrow(number, step, steps[number + 1]))
     return "\n".join([*out, "</svg>", ""])
@@ -221,14 +221,14 @@ def network() -> str:
             f'stroke="{EDGE}"/>'
         )
         middle = one.x + one.width / 2
-        out.append(_text(middle, one.y + 21, one.name, size=13, weight=600))
+        out.append(text(middle, one.y + 21, one.name, size=13, weight=600))
         for number, line in enumerate(one.lines):
-            out.append(_text(middle, one.y + 40 + 17 * number, line, size=11, colour=MUTED))
+            out.append(text(middle, one.y + 40 + 17 * number, line, size=11, colour=MUTED))
     for cable in CABLES:
         (x, y), (to_x, to_y) = cable.start, cable.end
         out.append(f'<path d="M{x} {y} L{to_x} {to_y}" stroke="{EDGE}" stroke-width="2" fill="none"/>')
-        out.append(_text((x + to_x) / 2, (y + to_y) / 2 - 8, cable.above, size=11))
-        out.append(_text((x + to_x) / 2, (y + to_y) / 2 + 18, cable.below, size=10, colour=MUTED))
+        out.append(text((x + to_x) / 2, (y + to_y) / 2 - 8, cable.above, size=11))
+        out.append(text((x + to_x) / 2, (y + to_y) / 2 + 18, cable.below, size=10, colour=MUTED))
     return "\n".join([*out, "</svg>", ""])
 
 
@@ -240,7 +240,7 @@ def _arrow(number: int, one: Step, other: Step) -> str:
     (x, y), (to_x, to_y) = _corner(number, one), _corner(number + 1, other)
     if one.lane == other.lane:
         start, end = (x + BOX / 2, y + HEIGHT), (x + BOX / 2, to_y)
-        label = _text(x + BOX / 2 + 6, y + HEIGHT + 15, one.arrow, size=10, colour=MUTED, anchor="start")
+        label = text(x + BOX / 2 + 6, y + HEIGHT + 15, one.arrow, size=10, colour=MUTED, anchor="start")
         path = f"M{start[0]} {start[1]} L{end[0]} {end[1]}"
     else:  # to the side, then down into the next column
         right = other.lane > one.lane
@@ -248,17 +248,48 @@ def _arrow(number: int, one: Step, other: Step) -> str:
         end = (to_x + BOX / 2, to_y)
         path = f"M{start[0]} {start[1]} L{end[0]} {start[1]} L{end[0]} {end[1]}"
         at = (start[0] + end[0]) / 2
-        label = _text(at, start[1] - 5, one.arrow, size=10, colour=MUTED)
+        label = text(at, start[1] - 5, one.arrow, size=10, colour=MUTED)
     return f'<path d="{path}" fill="none" stroke="{EDGE}" stroke-width="1.4" marker-end="url(#tip)"/>{label}'
 
 
-def _text(
-    x: float, y: float, text: str, *, size: int, weight: int = 400, colour: str = TEXT, anchor: str = "middle"
+def text(
+    x: float,
+    y: float,
+    content: str,
+    *,
+    size: int,
+    weight: int = 400,
+    colour: str = TEXT,
+    anchor: str = "middle",
 ) -> str:
+    """A line of text, with its anchor at a point [px]."""
     return (
         f'<text x="{x}" y="{y}" font-size="{size}" font-weight="{weight}" fill="{colour}" '
-        f'text-anchor="{anchor}">{escape(text)}</text>'
+        f'text-anchor="{anchor}">{escape(content)}</text>'
     )
+
+
+def write(drawings: dict[str, str], arguments: list[str], *, by: str) -> int:
+    """Write drawings into the folder, or with `--check` compare them.
+
+    Args:
+        drawings: SVG by the name of the file.
+        arguments: of the command line.
+        by: the script, for the message.
+
+    Returns:
+        The status to exit with.
+    """
+    stale = []
+    for name, drawing in drawings.items():
+        path = OUT / name
+        if "--check" not in arguments:
+            path.write_text(drawing, encoding="utf-8")
+        elif not path.is_file() or path.read_text(encoding="utf-8") != drawing:
+            stale.append(name)
+    if stale:
+        print(f"out of date: {', '.join(stale)}; run {by}", file=sys.stderr)
+    return 1 if stale else 0
 
 
 def main(arguments: list[str]) -> int:
@@ -270,16 +301,7 @@ def main(arguments: list[str]) -> int:
             print(f"flow-{name}.svg names files that do not exist: {', '.join(missing)}", file=sys.stderr)
             return 1
         drawings[f"flow-{name}.svg"] = svg(lanes, steps)
-    stale = []
-    for name, drawing in drawings.items():
-        path = OUT / name
-        if "--check" not in arguments:
-            path.write_text(drawing, encoding="utf-8")
-        elif not path.is_file() or path.read_text(encoding="utf-8") != drawing:
-            stale.append(name)
-    if stale:
-        print(f"out of date: {', '.join(stale)}; run scripts/diagrams.py", file=sys.stderr)
-    return 1 if stale else 0
+    return write(drawings, arguments, by="scripts/diagrams.py")
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ _LONG_FIRST = (
 _COMPUTING = ("fri", "house", "laws", "model", "rl", "schema", "sim", "values", "wire")
 
 # no timing assertions, above all on a busy machine
-settings.register_profile("heptarm", deadline=None, max_examples=longer(40, 200))
+settings.register_profile("heptarm", deadline=None, max_examples=longer(25, 200))
 settings.load_profile("heptarm")
 # a mutant is to be noticed, not to be explained
 settings.register_profile(
@@ -105,10 +105,14 @@ def cabinet(request: pytest.FixtureRequest) -> Iterator[RunningCabinet]:
 
     It runs faster than time, or at the SPEED of the module: 1.0 where time is the subject.
     """
+    yield from start_cabinet(getattr(request.module, "SPEED", FASTER))
+
+
+def start_cabinet(speed: float) -> Iterator[RunningCabinet]:
+    """The body of a fixture: a virtual iiwa 14 that runs so much faster than time."""
     from heptarm.arm.link.local_simulator import PrivateCabinet
     from heptarm.arm.link.target import Target
 
-    speed = getattr(request.module, "SPEED", FASTER)
     running = PrivateCabinet.start(Target(model="iiwa14", options=(("speed", f"{speed:g}"),)))
     yield RunningCabinet(running.host, running.port, running.pid)
     running.close()

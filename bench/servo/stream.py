@@ -79,7 +79,7 @@ def servo() -> Iterator[Figure]:
         found = by_turns(stream.block, lambda: bare(arm, raw, seconds), place)
     noisy = any(one.is_noisy for comparison in found for one in comparison.noise)
     for comparison in found:
-        yield comparison.figure("servo_set", 50, "us", limit=1.5)
+        yield comparison.figure("servo_set", 50, "us", limit=2.0)
         yield comparison.figure("servo_set_p99", 99, "us")
     counts = {
         "sent": stream.sent,

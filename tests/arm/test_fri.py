@@ -32,6 +32,7 @@ from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.conftest import RunningCabinet
 from tests.descriptors import refused_with_fewer
+from tests.long import few
 from tests.retry import answers_late, retry
 
 SPEED = 1.0  # FRI answers within milliseconds of this machine's time
@@ -133,6 +134,7 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
     assert any("A7: velocity limited" in line for line in rt.limited)
 
 
+@pytest.mark.long  # every run has torques and a wrench with the benchmark of test_fri_hold
 @pytest.mark.long  # every run has it with the benchmark of test_fri_hold, and without the stack in tests/sim_fri
 @patient
 def test_torques_bend_the_springs_of_joint_impedance(arm: ha.Arm) -> None:
@@ -143,6 +145,7 @@ def test_torques_bend_the_springs_of_joint_impedance(arm: ha.Arm) -> None:
     assert 0.015 < bent[6] < 0.025 and np.abs(bent[:6]).max() < 0.01
 
 
+@pytest.mark.long  # every run has torques and a wrench with the benchmark of test_fri_hold
 @pytest.mark.long  # as that
 @patient
 def test_a_wrench_bends_those_of_cartesian_impedance(arm: ha.Arm) -> None:
@@ -298,7 +301,7 @@ def test_both_sides_use_the_interface_of_their_peer_only(arm: ha.Arm, cabinet: R
         assert udp_addresses(cabinet.pid) == {"127.0.0.1"}
 
 
-@pytest.mark.parametrize("kind", ["position", "monitor"])
+@pytest.mark.parametrize("kind", few(["position", "monitor"]))
 def test_when_nothing_arrives_the_error_reports_where_to_look(arm: ha.Arm, kind: str) -> None:
     with (
         pytest.raises(ha.ConnectFailed, match="no FRI message arrived.*192.0.2.7.*firewall"),
@@ -379,6 +382,7 @@ def test_a_loop_that_is_killed_loses_the_quality_and_the_next_one_works(arm: ha.
         assert rt.next() is not None
 
 
+@pytest.mark.long  # tests/fri_loop have it with an overlay
 def test_a_loop_that_stands_still_ends_a_monitor_too(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.QualityLost, match="has not answered well for 10.0 s.*quality (is )?(POOR|FAIR)"),

@@ -40,6 +40,7 @@ def measured(run: Callable[[], Found], is_good: Callable[[Found], bool]) -> Foun
     return retry(run, busy)
 
 
+@pytest.mark.long  # tests/sim_fri/test_laws.py has it without the stack
 @patient
 def test_a_sine_is_followed(arm: ha.Arm) -> None:
     found = measured(lambda: fri_hold.track(arm, 3.0, period_ms=PERIOD), lambda one: one.delayed < 2e-3)

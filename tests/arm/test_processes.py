@@ -15,6 +15,7 @@ import heptarm as ha
 from heptarm.wire import messages as wire
 from tests.arm.peer import Peer
 from tests.arm.test_moving import HOME
+from tests.long import few
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows processes do not fork")
 
@@ -115,8 +116,8 @@ MULTIPROCESSING = """
 
 @pytest.mark.parametrize(
     "program",
-    [FORK, FORK_IN_BLOCKS, MULTIPROCESSING],
-    ids=["fork", "fork in blocks", "multiprocessing"],
+    few([FORK, MULTIPROCESSING, FORK_IN_BLOCKS], 2),
+    ids=few(["fork", "multiprocessing", "fork in blocks"], 2),
 )
 def test_a_child_process_leaves_the_arm_of_its_parent_alone(tmp_path: Path, program: str) -> None:
     file = tmp_path / "program.py"

@@ -225,6 +225,34 @@ def test_an_impedance_servo_is_compliant_and_its_stiffness_can_change(arm: ha.Ar
     assert sv.stats.refused == 0
 
 
+def test_the_limits_of_a_running_stream_change(arm: ha.Arm) -> None:
+    slow, fast = 0.1 * arm.robot.dq_max[6], 0.25 * arm.robot.dq_max[6]
+    with arm.servo("joint", watchdog=2.0, speed=0.1, acceleration=1.0) as sv:
+        goal = sv.start.q + 0.8 * A7
+        with pytest.raises(ha.LimitError, match="speed must be in"):
+            sv.change(speed=1.5)
+        with pytest.raises(ha.CommandRejected, match="something to change"):
+            sv.change()
+        with pytest.raises(ha.CommandRejected, match="speed_mps applies"):
+            sv.change(speed_mps=0.1)
+        sv.set(goal)
+        seen = arm.wait_until(lambda state: state.q[6] > sv.start.q[6] + 0.1)
+        assert 0.5 * slow < seen.dq[6] < 1.1 * slow
+        sv.change(speed=0.6)
+        sv.set(goal)
+        arm.wait_until(lambda state: state.dq[6] > fast)
+        arm.wait_until(lambda state: np.abs(state.q - goal).max() < TOUCH)
+    assert sv.result is not None and sv.result.cause is ha.Cause.CANCELLED
+    direct = arm.servo("joint", engine="direct", watchdog=2.0)
+    with direct, pytest.raises(ha.CommandRejected, match="cannot brake in between"):
+        direct.change(speed=0.5)
+    with (
+        arm.servo("velocity", watchdog=2.0) as jog,
+        pytest.raises(ha.CommandRejected, match="keeps its limits"),
+    ):
+        jog.change(speed=0.5)
+
+
 def test_motions_take_a_mode_of_their_own_or_of_a_block(arm: ha.Arm) -> None:
     home = arm.state.q
     assert arm.move(ha.ptp(home + 0.1 * A7), mode=JointImpedance(800.0)).arrived

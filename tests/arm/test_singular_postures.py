@@ -9,7 +9,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model
-from tests.long import longer
+from tests.long import few
 
 #: Degrees, and how joints went before.
 ROUND = {
@@ -22,10 +22,9 @@ ROUND = {
 #: How far a joint may move [rad]; noisy sensors tell a pose no better.
 STAYS, STAYS_WITH_NOISE = ha.deg(0.01)[0], ha.deg(0.1)[0]
 
-#: An arm with noisy sensors is never at rest, which costs five times the processor time: every run has one posture, and
-#: the rest with ideal sensors.
-WITH_NOISE = longer(list(ROUND)[:1], list(ROUND))
-either = pytest.mark.parametrize("sensors", longer(["ideal"], ["ideal", "noisy"]), indirect=True)
+#: An arm with noisy sensors is never at rest, which costs five times the processor time: every run has ideal sensors
+#: here, and noise in tests/sim/test_singular_postures.py.
+either = pytest.mark.parametrize("sensors", few(["ideal", "noisy"]), indirect=True)
 
 
 @pytest.fixture(scope="module")
@@ -39,13 +38,14 @@ def arm(sensors: str) -> Iterator[ha.Arm]:
         yield connected
 
 
-@pytest.mark.parametrize("name", ROUND)
+@pytest.mark.parametrize("name", few(ROUND, 2))
 @pytest.mark.parametrize("sensors", ["ideal"], indirect=True)
 def test_a_stream_of_its_own_pose_and_a_motion_to_it_move_nothing(arm: ha.Arm, name: str) -> None:
     streams_its_own_pose(arm, ROUND[name], STAYS)
 
 
-@pytest.mark.parametrize("name", WITH_NOISE)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ROUND)
 @pytest.mark.parametrize("sensors", ["noisy"], indirect=True)
 def test_with_noisy_sensors_they_move_hardly_anything(arm: ha.Arm, name: str) -> None:
     streams_its_own_pose(arm, ROUND[name], STAYS_WITH_NOISE)

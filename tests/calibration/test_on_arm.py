@@ -44,7 +44,7 @@ def test_a_load_is_measured_and_compared(arm: ha.Arm) -> None:
         begin = arm.state.q_cmd
         plan = calibration.load_plan(arm, speed=0.6, seconds=1.0)
         shown: list[str] = []
-        with pytest.raises(ha.CommandRejected, match="nothing was moved"):
+        with pytest.raises(ha.CommandRejected, match="nothing moves"):
             calibration.load(arm, plan=plan, confirm=lambda plan: bool(shown.append(str(plan))))
         assert np.abs(arm.state.q_cmd - begin).max() < 1e-6
         assert "A4 +0 to +30, A5 -90 to +90" in shown[0] and "at most 60%" in shown[0]
@@ -126,7 +126,7 @@ def test_the_command_shows_what_would_move_and_gives_up(
         calibrate.load(save="gripper", access=Access(target=target))
     monkeypatch.setattr("sys.stdin", io.StringIO("q" + os.linesep))
     with pytest.raises(ha.CommandRejected, match="pose 1 of 6 was not confirmed"):
-        calibrate.tcp(target=target)
+        calibrate.tcp(access=Access(target=target))
 
 
 def test_an_unsuited_posture_is_refused(arm: ha.Arm) -> None:

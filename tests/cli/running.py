@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
+import runpy
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
 from typing import IO, Any, ClassVar
+from unittest.mock import patch
 
+import heptarm.cli
 from tests.forks import Forks, Popen
 from tests.interrupts import ctrl_c_interrupts
+from tests.long import LONG
 from tests.retry import retry, silent
 
 #: Environment variables that would change what a command does.
@@ -54,6 +60,29 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
         return subprocess.CompletedProcess(process.args, process.returncode, *said)
 
     return retry(attempt, silent)
+
+
+def refused(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """One command that ends before it starts anything: in this process, or in one of its own with LONG=1.
+
+    A process takes most of a second of a processor, and there are a hundred refusals.
+    """
+    if LONG:
+        return run(*arguments)
+    variables = {name: value for name, value in os.environ.items() if name not in _OURS}
+    with (
+        patch.dict(os.environ, variables, clear=True),
+        patch.object(sys, "argv", ["heptarm", *arguments]),
+        redirect_stdout(io.StringIO()) as said,
+        redirect_stderr(io.StringIO()) as complained,
+    ):
+        try:
+            runpy.run_path(str(Path(heptarm.cli.__file__).with_name("main.py")), run_name="__main__")
+            code = 0
+        except SystemExit as end:
+            code = int(end.code or 0)
+    command = [*HEPTARM, *arguments]
+    return subprocess.CompletedProcess(command, code, said.getvalue(), complained.getvalue())
 
 
 def objects(*arguments: str) -> list[dict[str, Any]]:

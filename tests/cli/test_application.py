@@ -12,7 +12,8 @@ import pytest
 
 from heptarm.errors import CommandRejected
 from heptarm.sim.runtime.application import background, compile_application, find
-from tests.cli.running import run
+from tests.cli.running import refused, run
+from tests.long import few
 from tests.sim.station_setup import setup
 
 ROOT = Path(__file__).parents[2]
@@ -75,6 +76,7 @@ def test_a_foreign_application_runs_with_its_own_process_data(lab: Path) -> None
     assert "nodded 2 times" in done.stderr
 
 
+@pytest.mark.long
 @needs_javac
 def test_the_robot_of_its_station_setup_is_simulated_or_contradicted_aloud(lab: Path) -> None:
     (lab / "StationSetup.cat").write_text(setup())
@@ -211,7 +213,7 @@ public class Wild extends RoboticsAPIApplication {
 
 
 @needs_javac
-@pytest.mark.parametrize("encoding", ["utf-8", "windows-1252"])
+@pytest.mark.parametrize("encoding", few(["windows-1252", "utf-8"]))
 def test_sources_run_in_the_encodings_that_they_are_written_in(tmp_path: Path, encoding: str) -> None:
     text = WILD if encoding == "utf-8" else WILD.removeprefix("\ufeff")
     # 0x81 means nothing in windows-1252
@@ -240,6 +242,7 @@ def wrong(folder: Path, body: str, imports: str = "") -> str:
     return refused.value.hint
 
 
+@pytest.mark.long
 @needs_javac
 def test_the_hint_of_a_compile_error_fits_the_error(tmp_path: Path) -> None:
     missing = wrong(tmp_path, "".join(f"robot.dance{i}();\n" for i in range(150)))
@@ -263,6 +266,7 @@ def test_the_hint_of_a_compile_error_fits_the_error(tmp_path: Path) -> None:
     assert "no longer offers javax.xml.bind.JAXBContext" in gone
 
 
+@pytest.mark.long
 @needs_javac
 def test_one_bad_file_does_not_block_an_application_that_is_chosen(lab: Path) -> None:
     tasks = lab / "src" / "tasks"
@@ -366,7 +370,7 @@ def test_a_typed_line_answers_a_dialog_that_reports_what_to_type(asking: Path) -
 def test_an_option_that_means_nothing_to_an_application_is_refused(
     lab: Path, options: tuple[str, ...]
 ) -> None:
-    done = sim(lab, *options)
+    done = refused("sim", "--app", str(lab), *options)
     assert done.returncode != 0
     assert f"{options[0]} cannot be used with heptarm sim app" in done.stderr
 
@@ -381,7 +385,7 @@ def test_an_option_that_means_nothing_to_an_application_is_refused(
     ],
 )
 def test_an_option_of_those_who_look_on_needs_them(lab: Path, options: tuple[str, ...], needed: str) -> None:
-    done = sim(lab, *options)
+    done = refused("sim", "--app", str(lab), *options)
     assert done.returncode != 0
     assert f"{options[0]} needs {needed}" in done.stderr
 
@@ -390,11 +394,12 @@ def test_an_option_of_those_who_look_on_needs_them(lab: Path, options: tuple[str
     "options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0"), ("--map", "a=b")]
 )
 def test_an_option_of_an_application_needs_one(options: tuple[str, ...]) -> None:
-    done = run("sim", *options)
+    done = refused("sim", *options)
     assert done.returncode != 0
     assert f"{options[0]} needs heptarm sim app FOLDER" in done.stderr
 
 
+@pytest.mark.long
 @needs_javac
 def test_a_project_file_a_fault_and_a_payload_reach_an_application(lab: Path) -> None:
     other = lab.parent / "other.xml"

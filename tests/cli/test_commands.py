@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import threading
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,7 @@ import pytest
 
 from heptarm.io.plan_box import PlanBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
-from tests.cli.running import HEPTARM, objects, run, sim
+from tests.cli.running import HEPTARM, objects, refused, run, sim
 from tests.conftest import RunningCabinet
 from tests.retry import retry, starved
 
@@ -246,7 +247,7 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
 def test_refusals_are_one_sentence_and_exit_code_1(
     target: str, arguments: tuple[str, ...], words: tuple[str, ...]
 ) -> None:
-    done = run(*arguments, "--target", target)
+    done = refused(*arguments, "--target", target)
     assert done.returncode == 1 and done.stdout == ""
     assert len(done.stderr.strip().splitlines()) == 1 and "Traceback" not in done.stderr
     for word in words:
@@ -285,6 +286,12 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     assert reported["protocol"] == f"{MAJOR}.{MINOR}"
     assert (out / "src/heptarm/app/HeptarmApplication.java").exists()
     assert (out / "src/heptarm/wire/Messages.java").exists()
+    with zipfile.ZipFile(reported["archive"]) as archive:  # one file to carry to Workbench
+        names = archive.namelist()
+        assert len(names) == reported["files"] and all((out / "src" / name).exists() for name in names)
+        settings = archive.read("heptarm/core/session/ServerSettings.java").decode()
+    assert f'SOURCES = "{reported["sources"]}"' in settings and len(reported["sources"]) == 12
+    assert "heptarm.key" not in names
     assert (
         "heptarm.port" in (out / "RoboticsAPI.data.xml").read_text()
         and "T1" in (out / "INSTALL.md").read_text()
@@ -296,6 +303,8 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
 def test_install_cabinet_leaves_options_out(tmp_path: Path) -> None:
     (reported,) = objects("install-cabinet", "--out", str(tmp_path / "some"), "--without", "hand-guiding,fri")
     assert reported["without"] == ["fri", "hand-guiding"]
+    (other,) = objects("install-cabinet", "--out", str(tmp_path / "all"))
+    assert reported["sources"] != other["sources"]
     app = tmp_path / "some/src/heptarm/app"
     assert "left out" in (app / "SunriseFri.java").read_text(encoding="utf-8")
     assert "SmartServo" in (app / "SunriseServo.java").read_text(encoding="utf-8")

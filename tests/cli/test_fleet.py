@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import heptarm as ha
-from tests.cli.running import HEPTARM, run
+from tests.cli.running import HEPTARM, refused, run
 from tests.interrupts import ctrl_c_interrupts
 
 
@@ -100,5 +100,5 @@ def test_ports_follow_each_other_and_a_port_in_use_ends_both() -> None:
     ],
 )
 def test_refuses(words: tuple[str, ...], text: str) -> None:
-    done = run("sim", *words)
+    done = refused("sim", *words)
     assert done.returncode != 0 and text in done.stderr

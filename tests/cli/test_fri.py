@@ -17,7 +17,7 @@ import pytest
 import heptarm as ha
 from heptarm.fri.loop.client import Client
 from heptarm.values.pose import Pose
-from tests.cli.running import HEPTARM, run
+from tests.cli.running import HEPTARM, refused, run
 from tests.interrupts import ctrl_c_interrupts
 
 
@@ -182,7 +182,7 @@ def test_the_network_of_a_bare_controller_has_faults() -> None:
     ],
 )
 def test_what_no_cabinet_would_do_is_refused_in_words(arguments: tuple[str, ...], why: str) -> None:
-    done = run("sim", *arguments, "--fri-port", "0")
+    done = refused("sim", *arguments, "--fri-port", "0")
     misused = "cannot be used" in why  # the command, and not the value of an option
     assert done.returncode == (2 if misused else 1) and why in done.stderr and "Traceback" not in done.stderr
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.running import run
+from tests.cli.running import refused, run
 from tests.cli.test_fri import controller, free_port
 from tests.conftest import RunningCabinet
 from tests.retry import retry
@@ -124,5 +124,5 @@ def test_bench_measures_a_session_of_its_own(cabinet: RunningCabinet) -> None:
     ],
 )
 def test_what_cannot_be_measured_is_refused(arguments: tuple[str, ...], why: str) -> None:
-    done = run("bench", *arguments)
+    done = refused("bench", *arguments)
     assert done.returncode == 1 and why in done.stderr and "Traceback" not in done.stderr

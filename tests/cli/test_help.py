@@ -22,7 +22,7 @@ from heptarm.arm.link.target import parse_target
 from heptarm.cli.main import app, current_spelling
 from heptarm.cli.progress import timed
 from heptarm.errors import ConnectFailed
-from tests.cli.running import HEPTARM, run
+from tests.cli.running import HEPTARM, refused, run
 from tests.interrupts import ctrl_c_interrupts
 from tests.retry import retry, silent
 from tests.simulators import FASTER
@@ -66,7 +66,7 @@ def test_help_lists_no_double() -> None:
 
 @pytest.mark.parametrize("words", [("move", "ptp"), ("state",), ("targets", "add"), ("servo",)], ids=" ".join)
 def test_help_shows_an_example(words: tuple[str, ...]) -> None:
-    done = run(*words, "--help")
+    done = refused(*words, "--help")
     assert (
         done.returncode == 0 and "For example" in done.stdout and f"heptarm {' '.join(words)} " in done.stdout
     )
@@ -89,7 +89,7 @@ def test_help_shows_an_example(words: tuple[str, ...]) -> None:
     ids=lambda one: " ".join(one) if isinstance(one, tuple) else "",
 )
 def test_every_refusal_is_one_sentence(words: tuple[str, ...], said: str) -> None:
-    done = run(*words)
+    done = refused(*words)
     assert done.returncode == (2 if "--help" in done.stderr else 1) and done.stdout == "", done.stdout
     (line,) = done.stderr.strip().splitlines()
     assert line.startswith("heptarm: ") and said in line
@@ -97,7 +97,7 @@ def test_every_refusal_is_one_sentence(words: tuple[str, ...], said: str) -> Non
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_knows_commands_and_options(shell: str) -> None:
-    script = run("completion", shell).stdout
+    script = refused("completion", shell).stdout
     for word in ("install-cabinet", "lin-rel", "targets", "speed-scaling"):
         assert word in script
     if shell == "bash":
@@ -142,7 +142,7 @@ def test_older_spellings_of_sim_are_still_understood(older: str, current: str) -
     ],
 )
 def test_an_option_of_another_simulation_names_it(words: str, said: str) -> None:
-    done = run(*words.split())
+    done = refused(*words.split())
     assert done.returncode == 2 and said in done.stderr, done.stderr
 
 
@@ -222,7 +222,7 @@ def test_a_simulator_that_starts_too_slowly_is_one_sentence() -> None:
     ],
 )
 def test_a_wrong_word_names_the_help_that_there_is(words: tuple[str, ...], named: str) -> None:
-    done = run(*words)
+    done = refused(*words)
     assert done.returncode == 2 and done.stderr.endswith(f"({named})\n"), done.stderr
 
 

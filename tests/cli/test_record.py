@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from tests.cli.running import HEPTARM, objects, run
+from tests.cli.running import HEPTARM, objects, refused, run
 from tests.conftest import RunningCabinet
 from tests.drawing import cannot_draw
 from tests.interrupts import ctrl_c_interrupts
@@ -92,5 +92,5 @@ def test_for_some_seconds_with_pictures(cabinet: RunningCabinet, tmp_path: Path)
 def test_a_mistake_is_one_sentence(
     recorded: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
-    done = run(*(argument.format(recorded=recorded, folder=tmp_path) for argument in arguments))
+    done = refused(*(argument.format(recorded=recorded, folder=tmp_path) for argument in arguments))
     assert done.returncode == 1 and words in done.stderr and "Traceback" not in done.stderr

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from tests.cli.running import run, sim
+from tests.cli.running import refused, sim
 
 pytest.importorskip("viser")
 
@@ -26,7 +26,7 @@ pytest.importorskip("viser")
     ],
 )
 def test_meshes_that_nobody_could_see_are_refused(words: tuple[str, ...], text: str) -> None:
-    done = run("sim", *words)
+    done = refused("sim", *words)
     assert done.returncode != 0 and text in done.stderr
 
 

@@ -34,9 +34,9 @@ for _topic in (
 
 
 def part(number: int) -> list[str]:
-    """The cases that a node runs where not all of them have to: every sixth one, from this number on.
+    """The cases that a node runs where not all of them have to: every twelfth one, from this number on.
 
     The long run has every third one. All of them run against the runner alone, in tests/ros/test_conformance.py.
     """
-    names, step = list(CASES), longer(6, 3)
+    names, step = list(CASES), longer(12, 3)
     return [name for index, name in enumerate(names) if index % step == number or name in _EVERYWHERE]

@@ -70,7 +70,7 @@ def case_a_path_is_found_around_a_wall_and_moved_along(probe: Probe, stage: Stag
     with_bodies(probe)
     goal = probe.make("heptarm_msgs/PathGoal", position=THERE)
     refused(probe.call("plan", "PlanPath", goals=[]), "at least one goal")
-    refused(probe.call("plan", "PlanPath", goals=[goal], within=0.2), "upright")
+    refused(probe.call("plan", "PlanPath", goals=[goal], keep=["OnLine(3)"]), "keep[0]")
     inside = probe.make("heptarm_msgs/PathGoal", position=[np.radians(30.0), *HOME[1:]])
     blocked = probe.call("plan", "PlanPath", goals=[inside], timeout=SEARCH)
     refused(blocked, "goal is in collision", "wall")

@@ -20,6 +20,7 @@ from heptarm.wire.codes import Code
 from heptarm.wire.messages import MAJOR
 from tests.arm.standstill import stand_still
 from tests.cli.running import sim
+from tests.long import few
 from tests.retry import retry, silent
 from tests.schema.python_side import recoded
 from tests.simulators import FASTER
@@ -270,7 +271,7 @@ def test_nobody_there(probe: Path) -> None:
 # ------------------------------------------------------------------------------------ examples
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "cpp" / "examples").glob("*.cpp")))
+@pytest.mark.parametrize("name", few(sorted(path.stem for path in (ROOT / "cpp" / "examples").glob("*.cpp"))))
 def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
     # the probe uses the same header, optimised: what only the optimiser warns of is found there
     program = compiled(ROOT / "cpp" / "examples" / f"{name}.cpp", tmp_path, "-O0")
@@ -293,6 +294,7 @@ def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
     assert {"first_motion": "refused: ", "servo": "targets followed"}[name] in done.stdout
 
 
+@pytest.mark.long  # the probe and an example use the same header
 @pytest.mark.computing
 def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     """A block with a main is a program; the others are the body of one function, in their order."""
@@ -300,9 +302,10 @@ def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     whole = [block for block in blocks if "int main" in block]
     parts = [block for block in blocks if "int main" not in block]
     assert len(whole) == 1 and len(parts) > 5
-    head = "#include <cstdlib>\n#include <iostream>\n#include <heptarm/heptarm.hpp>\n"
+    head = "#include <cstdlib>\n#include <iostream>\n#include <heptarm/fri.hpp>\n"
     body = "void page() {\n    using namespace heptarm;\n" + "".join(parts) + "}\n"
     source = tmp_path / "page.cpp"
     source.write_text(whole[0] + head + body)  # the program first, with no headers but its own
     # the header is read once for both; the examples are compiled to the end, linked and run
-    compiled(source, tmp_path, "-fsyntax-only")
+    loop = [f"-I{ROOT / one}" for one in ("native", "src/heptarm/fri/loop/include")]
+    compiled(source, tmp_path, "-fsyntax-only", *loop)

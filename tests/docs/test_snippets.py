@@ -39,8 +39,12 @@ REAL_TIME = (
     ),
     "stopping.md",
 )
-#: What an example, or the tests of what they call, run in every test as well.
-IN_LONG_RUN = ("commissioning.md", "laws.md", "scenarios.md", "twin.md")
+#: What every run has, a page of each kind: first steps, motions, streams, FRI, states, records. The others run before a
+#: release; what they call, tests named after it show in every run, and that they compile is shown in every run, too.
+IN_EVERY_RUN = (
+    *("README.md", "index.md", "first-ten-minutes.md", "motions.md", "conditions.md", "servo.md", "io.md"),
+    *("recovery.md", "data-flow-fri.md", "kinematics.md"),
+)
 RUNNER = """
 import os, sys
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -86,7 +90,7 @@ RUNNING = [page for page in PAGES if any(run for *_, run in _blocks(page))]
 
 def _params(pages: list[Path]) -> list[object]:
     return [
-        pytest.param(page, id=_id(page), marks=[pytest.mark.long] if page.name in IN_LONG_RUN else [])
+        pytest.param(page, id=_id(page), marks=[] if page.name in IN_EVERY_RUN else [pytest.mark.long])
         for page in pages
     ]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from tests.doubles.test_doubles import HERE, _command, _compile
 
 BREAKING = (
@@ -45,6 +47,7 @@ TRIGGERING = (
 )
 
 
+@pytest.mark.long  # the same doubles as in tests/arm/test_triggers.py
 def test_triggers_of_motions_in_batches_and_of_segments(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Triggering.java", tmp_path)
     said = tmp_path / "said.txt"

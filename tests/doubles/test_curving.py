@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.doubles.test_doubles import _compile, _run
 
 HERE = Path(__file__).parent
@@ -28,6 +30,7 @@ SAID = (
 )
 
 
+@pytest.mark.long  # the same doubles as in tests/arm/test_paths.py
 def test_paths_of_a_sunrise_application(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Curving.java", tmp_path)
     said = tmp_path / "said.txt"

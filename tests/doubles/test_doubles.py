@@ -180,6 +180,7 @@ SERVING = (
 )
 
 
+@pytest.mark.long  # the same doubles as in tests/arm, through a program of its own
 def test_servo_motions_of_a_sunrise_application(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Serving.java", tmp_path)
     said = tmp_path / "said.txt"
@@ -217,6 +218,7 @@ COMPLIANT = (
 )
 
 
+@pytest.mark.long  # the same doubles as in tests/arm, through a program of its own
 def test_cartesian_impedance_of_a_sunrise_application(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Compliant.java", tmp_path)
     said = tmp_path / "said.txt"

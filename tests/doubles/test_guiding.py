@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+import pytest
+
 from tests.doubles.test_doubles import HERE, _command, _compile
 
 SAID = (
@@ -20,6 +22,7 @@ SAID = (
 OPERATOR = ("guide@2.5", "push 20 40 -20 1.5@3", "let_go@5", "guide@10", "let_go@12")
 
 
+@pytest.mark.long  # the same doubles as in tests/arm/test_guiding.py
 def test_an_application_is_led_by_hand(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Guiding.java", tmp_path)
     said = tmp_path / "said.txt"

@@ -13,6 +13,7 @@ pytestmark = pytest.mark.computing  # a compiler, and a program whose clock is t
 SOURCE = HERE / "java" / "Members.java"
 
 
+@pytest.mark.long  # test_surface.py has every member by name
 def test_members_that_few_applications_use(tmp_path: Path) -> None:
     _compile(SOURCE, tmp_path)
     said = tmp_path / "said.txt"

@@ -114,6 +114,7 @@ def _do(words: str, process: subprocess.Popen[str]) -> str:
     return process.stdout.readline()
 
 
+@pytest.mark.long  # test_surface.py has every member by name
 def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
     _compile(HERE / "java" / "Touring.java", tmp_path)
     said = tmp_path / "said.txt"

@@ -23,12 +23,16 @@ REAL_TIME = (
 )
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
-#: The same skills as in the cookbook, whose page runs in every test, and in the scenarios; what the page about several
-#: arms does; and what tests/calibration do.
+#: What tests of the same calls show: tests/skills and the scenarios, tests/arm of paths, shapes, several arms, FRI and
+#: laws, and tests/calibration.
 IN_LONG_RUN = tuple(
-    f"{one}.py" for one in ("15_pick_and_place", "16_insertion", "17_polishing", "20_two_arms")
+    f"{one}.py"
+    for one in (
+        *("12_straight_servo", "13_hand_guiding", "14_collision_guard", "15_pick_and_place", "16_insertion"),
+        *("17_polishing", "18_teleoperation", "20_two_arms", "21_laws", "24_tool_shapes", "25_around_things"),
+        *("26_calibrate", "27_learned_insertion"),
+    )
 )
-IN_LONG_RUN += ("26_calibrate.py",)
 RUNNER = """
 import runpy, sys
 del sys.argv[0]  # as if the example had been started by itself

@@ -22,6 +22,7 @@ from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.values.pose import Pose
+from tests.long import few
 
 from . import laws as python_laws
 from .controller import IPO, Controller
@@ -58,7 +59,7 @@ def form(kind: str, laws: Path) -> object:
     return filtered if kind == "numba" else filtered_slowly
 
 
-@pytest.mark.parametrize("kind", ["library", "numba", "python"])
+@pytest.mark.parametrize("kind", few(["library", "numba", "python"], 2))
 def test_parameters_and_memory_are_live_and_the_law_keeps_what_it_knows(kind: str, laws: Path) -> None:
     with Client(0, law=form(kind, laws), params=OFFSET, memory=FILTER, realtime=False) as client:  # type: ignore[arg-type]
         assert client.memory.calls == 0.0, "before the first call: as given"

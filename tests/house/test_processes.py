@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.long import few
+
 ROOT = Path(__file__).parents[2]
 _CONFTEST = """
 pytest_plugins = ["tests.processes", "tests.hangs"]
@@ -90,7 +92,7 @@ def test_a_test_that_hangs_leaves_none(tmp_path: Path) -> None:
     assert len(started) == 2 and not any(map(runs, started))
 
 
-@pytest.mark.parametrize("options", [(), ("-n", "1")], ids=["here", "in a worker"])
+@pytest.mark.parametrize("options", few([("-n", "1"), ()]), ids=few(["in a worker", "here"]))
 def test_a_test_that_hangs_leaves_its_stacks_in_the_log(tmp_path: Path, options: tuple[str, ...]) -> None:
     body = """
 def wait_for_nobody(program):

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+#: `make first-hour` and scripts/try_release.sh install the wheel as well, before each release.
+pytestmark = [pytest.mark.long, pytest.mark.timeout(600)]
 
 MOVE = """
 import pathlib

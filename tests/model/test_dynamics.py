@@ -10,6 +10,7 @@ import pytest
 from heptarm.errors import LimitError, ShapeError
 from heptarm.model.dynamics import (
     GRAVITY,
+    centrifugal_matrix,
     coriolis,
     coriolis_matrix,
     forward_dynamics,
@@ -102,6 +103,18 @@ def test_that_of_pinocchio(robot: RobotModel) -> None:
         assert np.abs(mass_matrix(robot, q) - (upper + np.triu(upper, 1).T)).max() < 1e-12
         assert np.abs(inverse_dynamics(robot, q, dq, ddq) - pin.rnea(model, data, q, dq, ddq)).max() < 1e-11
         assert np.abs(gravity(robot, q) - pin.computeGeneralizedGravity(model, data, q)).max() < 1e-11
+
+
+def test_centrifugal_torques_are_those_of_the_mass_matrix() -> None:
+    """By Christoffel's symbols: b[k, i] = dM[k, i]/dq[i] - dM[i, i]/dq[k] / 2."""
+    robot, h = ROBOTS["iiwa14"], 1e-6
+    q = random_q(robot, np.random.default_rng(23))
+    slopes = [
+        (mass_matrix(robot, q + h * one, load=LOAD) - mass_matrix(robot, q - h * one, load=LOAD)) / (2 * h)
+        for one in np.eye(7)
+    ]
+    wanted = [[slopes[i][k, i] - 0.5 * slopes[k][i, i] for i in range(7)] for k in range(7)]
+    assert np.abs(centrifugal_matrix(robot, q, load=LOAD) - wanted).max() < 1e-8
 
 
 @pytest.mark.parametrize("robot", ALL, ids=by_name)

@@ -10,6 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model, planning, shapes
+from heptarm.planning.constraints import constraint_from_text
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
@@ -127,6 +128,58 @@ def test_a_glass_stays_upright(wall: ha.CollisionModel) -> None:
     assert (
         tilts(planning.find_path(wall, start=LEFT, goal=RIGHT, timeout=60.0)) > 0.3
     )  # it would tilt otherwise
+
+
+def test_a_path_that_goes_on_elsewhere_keeps_the_direction_of_the_first_start(
+    wall: ha.CollisionModel,
+) -> None:
+    first = planning.find_path(wall, start=LEFT, goal=RIGHT, keep=ha.Upright("z", within=0.2), timeout=120.0)
+    (keep,) = first.keep
+    assert isinstance(keep, ha.Upright)
+    up = model.forward(IIWA, LEFT)[:3, 2]
+    np.testing.assert_allclose(keep.direction, up)  # type: ignore[arg-type]
+    tilted = max(first.curve, key=lambda q: -float(model.forward(IIWA, q)[:3, 2] @ up))
+    second = planning.find_path(wall, start=tilted, goal=RIGHT, keep=first.keep, timeout=120.0)
+    axes = model.forward_batch(IIWA, np.vstack([first.curve, second.curve]))[:, :3, 2]
+    assert np.arccos((axes @ up).min()) <= 0.2 * 1.002 and second.keep == first.keep
+    with pytest.raises(ha.NoPath, match=r"^start contradicts keep: the z axis .* turned by 0\.3\d\d rad"):
+        turned = ha.Upright("z", within=0.2, direction=Pose.from_rotvec((0, 0, 0), (0.3, 0, 0)).rotation @ up)
+        planning.find_path(wall, start=LEFT, goal=RIGHT, keep=turned)
+
+
+@pytest.mark.parametrize(
+    ("text", "keep"),
+    [
+        ("Upright('x', within=0.2)", ha.Upright("x", within=0.2)),
+        (" OnPlane((0.5, 0, -0.4), (0, 0, 2)) ", ha.OnPlane((0.5, 0, -0.4))),
+        ("OnLine([0, 0, 1], direction=[0, 1, 0])", ha.OnLine((0, 0, 1), (0, 1, 0))),
+        ("Workspace(((0, 0, 0), (1, 1, 1)))", ha.Workspace(((0, 0, 0), (1, 1, 1)))),
+    ],
+)
+def test_a_constraint_is_read_from_a_text(text: str, keep: Any) -> None:
+    assert constraint_from_text(text) == keep
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "z", "Upright", "Upright(z)", "Upright('z', size=1)", "OnPlane()", "Upright(*[1])", "Upright(**{})"]
+    + [
+        "ha.Upright()",
+        "open('x')",
+        "Upright(",
+        "Upright(" * 300,
+        "Upright('z', within=0.1 " + " " * 1000 + ")",
+    ],
+)
+def test_a_text_that_is_no_constraint_is_refused(text: str) -> None:
+    wanted = r"^keep\[1\] must be Upright, OnPlane, OnLine, Workspace as in Python"
+    with pytest.raises(ha.CommandRejected, match=wanted):
+        constraint_from_text(text, "keep[1]")
+
+
+def test_a_text_of_a_constraint_out_of_range_is_refused_as_the_constraint_is() -> None:
+    with pytest.raises(ha.LimitError, match="within must be"):
+        constraint_from_text("Upright('z', within=9)")
 
 
 def tips(path: ha.Path) -> Array:

@@ -321,6 +321,7 @@ class Scene:
         chain.release().perform()
 
 
+@pytest.mark.long  # tests/panel/test_model.py has what the controls call
 def test_handle_points_plans_and_gripper(browser: Any, own: tuple[Panel, PanelArm], tmp_path: Path) -> None:
     panel, model = own
     page = Page(browser, panel.url)

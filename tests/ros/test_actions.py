@@ -54,6 +54,14 @@ def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> No
     assert not result.success and "internal error" in result.message
 
 
+def test_the_reason_of_a_failure_is_logged_where_the_result_has_no_text(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    row = action(lambda: ActionResult(GoalOutcome.ABORTED, "the gripper does not reach its end"))
+    dispatcher().begin(row, None)(CLIENT)
+    assert [one.getMessage() for one in caplog.records] == ["~/anything: the gripper does not reach its end"]
+
+
 def test_names_of_actions_are_unique() -> None:
     assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 12
 

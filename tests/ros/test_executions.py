@@ -27,6 +27,7 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.result import Cause, MotionEvent
 from heptarm.values.state import State
 from tests.conftest import RunningCabinet
+from tests.long import few
 
 SPEED = 1.0  # streams and FRI answers by this machine's clock
 
@@ -81,7 +82,7 @@ class Recorder:
             assert self._changed.wait_for(what, PATIENCE), self.ends
 
 
-@pytest.fixture(params=["servo", "spline", "fri"])
+@pytest.fixture(params=few(["servo", "spline", "fri"], 2))
 def execution(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -134,6 +135,7 @@ def steadily(driver: Driver, recorder: Recorder, attempt: Callable[[], None]) ->
     raise AssertionError("no FRI session lasts")
 
 
+@pytest.mark.parametrize("execution", ["servo", "spline", "fri"], indirect=True)
 def test_goals_arrive_one_after_the_other(driver: Driver, recorder: Recorder) -> None:
     def there_and_back() -> None:
         # a busy machine's newest state may be older than the end of a goal

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from heptarm.errors import ShapeError
-from heptarm.ros.interface.motions import joint_target, pose_target
+from heptarm.ros.interface.motions import joint_target, partial_joints, pose_target
 from heptarm.ros.interface.names import PRESETS
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.pose import Pose
@@ -49,3 +49,12 @@ def test_every_driver_has_joint_states_and_the_action() -> None:
     for name, preset in PRESETS.items():
         types = {entry.type for entry in preset.entries}
         assert name == "heptarm" or {"sensor_msgs/JointState", "control_msgs/FollowJointTrajectory"} <= types
+
+
+def test_a_command_names_a_joint_once_in_whatever_spelling() -> None:
+    driver: Any = SimpleNamespace(
+        configuration=NodeConfiguration.of({"names": "lbr_stack", **PRESETS["lbr_stack"].defaults})
+    )
+    assert partial_joints(driver, ["A2", "lbr_A1"], [2.0, 1.0])[:2].tolist() == [1.0, 2.0]
+    with pytest.raises(ShapeError, match="appear once"):
+        partial_joints(driver, ["A1", "lbr_A1"], [2.0, 1.0])

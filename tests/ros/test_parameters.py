@@ -12,6 +12,7 @@ from heptarm import model
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, unknown_text
 from heptarm.ros.node.target_stream import TargetStream
+from heptarm.ros.trajectory.goal import Tolerance, TrajectoryGoal
 from heptarm.values.robot import robot
 from tests.conftest import RunningCabinet
 
@@ -38,6 +39,38 @@ def test_a_posture_is_seven_numbers() -> None:
     for text in ("0 0.5 0", "0 0 0 0 0 0 nan", "a b c d e f g", "0,0,0,0,0,0,0"):
         with pytest.raises(ShapeError, match=r"servo\.posture must be .* seven numbers"):
             NodeConfiguration.of({"servo.posture": text})
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"joint_names": [f"A{i}" for i in range(1, 7)]}, "seven different names, got A1, A2"),
+        ({"joint_names": ["A1"] * 7}, "seven different names, got A1, A1"),
+        ({"joint_names": []}, "seven different names, got none"),
+        ({"target": "sim://iiwa99"}, "target must be an address or a simulator"),
+        ({"target": "robot:port"}, "target must be an address or a simulator"),
+    ],
+)
+def test_what_no_other_attempt_mends_is_refused_before_the_first(
+    values: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ha.HeptarmError, match=words):
+        NodeConfiguration.of(values)
+
+
+@pytest.mark.parametrize("own", ["lbr_A", "A", "left_joint_"])
+def test_joints_of_lbr_stack_have_their_names_of_all_its_versions(own: str) -> None:
+    names = [f"{own}{i}" for i in range(1, 8)]
+    configuration = NodeConfiguration.of({"names": "lbr_stack", "joint_names": names})
+    for sent in ("lbr_A", "A", own):
+        assert configuration.own([f"{sent}{i}" for i in range(7, 0, -1)]) == tuple(reversed(names))
+    assert configuration.own(["A8", "x"]) == ("A8", "x")
+    assert NodeConfiguration.of({}).own(["lbr_A1", "A1"]) == ("lbr_A1", "A1"), "of lbr_stack alone"
+
+    goal = TrajectoryGoal(
+        tuple(f"A{i}" for i in range(1, 8)), (), goal_tolerance=(Tolerance("A7", position=0.1),)
+    ).renamed(configuration.own)
+    assert goal.joints == tuple(names) and goal.goal_tolerance == (Tolerance(names[6], position=0.1),)
 
 
 def test_twists_of_a_topic_follow_the_posture(cabinet: RunningCabinet) -> None:

@@ -365,29 +365,56 @@ def test_a_goal_that_cannot_be_understood_is_refused_with_moveits_code(
     assert constraints.code_of(error.value) is code
 
 
-def test_an_orientation_along_the_path_is_kept_upright_and_never_loosened(context: Any) -> None:
-    tilt = Pose.from_rotvec(np.zeros(3), np.array([0.1, 0.0, 0.0]))
-    quat = tuple((tilt @ Pose.of(np.zeros(3), FLANGE.quat)).quat.tolist())
+def test_what_holds_along_a_path_is_that_of_the_tool_frame_and_never_loosened(context: Any) -> None:
+    turned = tuple(
+        (Pose.from_rotvec(np.zeros(3), np.array([0.1, 0.0, 0.0])) @ Pose.of(np.zeros(3), FLANGE.quat)).quat
+    )
 
-    def kept(tolerances: tuple[float, float, float]) -> Any:
-        one = wanted(orientation_constraints=[orientation("flange", quat, tolerances)])
-        return constraints.keep_of(context, one, HOME)
+    def kept(**constraints_of_a_kind: Any) -> Any:
+        return constraints.keep_of(context, wanted(**constraints_of_a_kind))
 
-    keep = kept((0.5, 0.4, 2 * pi))
-    assert keep.axis == "z" and keep.within == pytest.approx(0.4 - 0.1)
-    assert constraints.keep_of(context, wanted(), HOME) is None
-    for tolerances, code in (
-        ((0.5, 0.4, 0.3), MoveItCode.INVALID_GOAL_CONSTRAINTS),
-        ((0.05, 0.05, pi), MoveItCode.START_STATE_VIOLATES_PATH_CONSTRAINTS),
+    (upright,) = kept(orientation_constraints=[orientation("flange", turned, (0.5, 0.4, 2 * pi))])
+    assert (upright.axis, upright.within) == ("z", 0.4)
+    np.testing.assert_allclose(upright.direction, Pose.of(np.zeros(3), turned).rotation[:, 2], atol=1e-12)
+    leaning = tuple(Pose.from_rotvec(np.zeros(3), np.array([0.0, 0.0, 0.5])).quat.tolist())
+    slab = position("tool", (0.5, 0.0, 0.4), [3.0, 0.2, 0.01], kind=1)
+    slab.constraint_region.primitive_poses[0].orientation = message(**dict(zip("xyzw", leaning)))
+    long, side, height = kept(position_constraints=[slab])
+    assert (long.within, side.within, height.within) == (1.0, 0.1, 0.005)
+    np.testing.assert_allclose(side.normal, [-np.sin(0.5), np.cos(0.5), 0.0], atol=1e-12)
+    np.testing.assert_allclose(height.point, [0.5, 0.0, 0.4])
+    bent = message(joint_name="A4", position=-1.4, tolerance_below=0.1, tolerance_above=9.0)
+    (ranges,) = kept(joint_constraints=[bent])
+    robot = context.arm.robot
+    np.testing.assert_allclose(ranges.joints[:, 3], [-1.5, robot.q_max[3]])
+    np.testing.assert_allclose(ranges.joints[:, 0], [robot.q_min[0], robot.q_max[0]])
+    assert kept() == []
+    for wrong, text in (
+        (
+            {"orientation_constraints": [orientation("flange", turned, (0.5, 0.4, 0.3))]},
+            "leave free one axis",
+        ),
+        (
+            {"position_constraints": [position("flange", (0.5, 0, 0.4), [1, 1, 1], kind=1)]},
+            "tool frame itself",
+        ),
+        ({"position_constraints": [position("tool", (0.5, 0, 0.4), [0.1])]}, "must be a box"),
+        ({"joint_constraints": [message(joint_name="finger", position=0.0)]}, "joint must be one of"),
+        ({"visibility_constraints": [message()]}, "got one of visibility"),
     ):
-        with pytest.raises(RequestRefused) as error:
-            kept(tolerances)
-        assert error.value.moveit is code
+        with pytest.raises(RequestRefused, match=text) as error:
+            kept(**wrong)
+        assert error.value.moveit is MoveItCode.INVALID_GOAL_CONSTRAINTS
 
 
 def test_errors_have_moveits_codes() -> None:
     assert constraints.code_of(NoPath("", reason="goal")) is MoveItCode.GOAL_IN_COLLISION
     assert constraints.code_of(NoPath("", reason="time")) is MoveItCode.TIMED_OUT
+    for name, code in (
+        ("start", MoveItCode.START_STATE_VIOLATES_PATH_CONSTRAINTS),
+        ("goal", MoveItCode.GOAL_VIOLATES_PATH_CONSTRAINTS),
+    ):
+        assert constraints.code_of(NoPath("", reason="constraint", parameter=name)) is code
     assert constraints.code_of(ShapeError("")) is MoveItCode.FAILURE
 
 

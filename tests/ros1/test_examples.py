@@ -45,7 +45,15 @@ def run_shell(script: Path) -> str:
     return run([sys.executable, "-m", "tests.ros1.shell", str(script)])
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
+#: The command line of ROS, MoveIt's interface, which the surface has, and a topic that test_node follows.
+IN_LONG_RUN = ("command_line.sh", "moveit_client.py", "servo.py")
+
+
+@pytest.mark.parametrize(
+    "example",
+    [pytest.param(one, marks=[pytest.mark.long] if one.name in IN_LONG_RUN else []) for one in EXAMPLES],
+    ids=lambda path: path.name,
+)
 def test_example(client: Client, example: Path) -> None:
     patience = ["60"] if example.name == "moveit_client.py" else []
     said = run_python(example, *patience) if example.suffix == ".py" else run_shell(example)
@@ -60,6 +68,7 @@ def test_example(client: Client, example: Path) -> None:
     assert expected[example.name] in said, said
 
 
+@pytest.mark.long  # the same calls as in the examples
 def test_the_guides_snippets(client: Client, tmp_path: Path) -> None:
     blocks = [match.groups() for match in BLOCK.finditer(GUIDE.read_text(encoding="utf-8"))]
     assert len(blocks) >= 4

@@ -45,6 +45,7 @@ def other(ros: None, spare: Stage, request: pytest.FixtureRequest) -> Iterator[C
     assert node.end() == 0, node.said
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 @pytest.mark.parametrize("other", ["libiiwa"], indirect=True)
 def test_a_program_for_libiiwa(other: Client) -> None:
     names.a_program_for_libiiwa(other)
@@ -54,6 +55,7 @@ def test_a_program_for_libiiwa(other: Client) -> None:
     follow("/other/iiwa_controller/follow_joint_trajectory", states)
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 @pytest.mark.parametrize("other", ["lbr_stack"], indirect=True)
 def test_a_program_for_lbr_stack(other: Client) -> None:
     names.a_program_for_lbr_stack(other)

@@ -32,6 +32,7 @@ def target(x: float, y: float, z: float) -> PointStamped:
     return message
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_it_reaches_targets_one_after_the_other_and_holds(client: Client, reach: None) -> None:
     home = list(ReachTask().home)
     states = collect("/joint_states", JointState)

@@ -30,6 +30,7 @@ from tests.conformance.stress import preempted_without_growth, refused_in_flight
 from tests.ros1.peer import Client, NodeProcess, collect, stamp, until
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 @pytest.mark.parametrize(
     ("count", "seconds"),
     [(50, 2.5), pytest.param(3000, 300.0, marks=[pytest.mark.long, pytest.mark.timeout(900)])],
@@ -41,6 +42,7 @@ def test_preemptions_one_after_the_other(
     preempted_without_growth(client, node.process.pid, count=count, seconds=seconds)
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 @pytest.mark.parametrize(
     "count", [200, pytest.param(10_000, marks=[pytest.mark.long, pytest.mark.timeout(1800)])]
 )
@@ -115,7 +117,7 @@ class Crowd:
             one.close()
 
 
-@pytest.mark.long  # every run has it with the node of ROS 2, whose messages take more of a processor
+@pytest.mark.long  # how much a processor can serve
 @pytest.mark.parametrize("seconds", [3.0, pytest.param(300.0, marks=pytest.mark.timeout(900))])
 def test_twenty_subscribers_at_200_hz(spare: Stage, crowd: NodeProcess, seconds: float) -> None:
     client = Client(spare, "/crowd/heptarm")
@@ -141,6 +143,7 @@ def test_twenty_subscribers_at_200_hz(spare: Stage, crowd: NodeProcess, seconds:
         members.close()
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_a_node_that_is_killed_in_mid_goal_and_its_successor(ros: None, spare: Stage) -> None:
     node = NodeProcess(spare.target, ns="/fate", watchdog=2.0)
     successor = None
@@ -196,6 +199,7 @@ def simulated(ros: None, spare: Stage) -> Iterator[list[float]]:
         assert code == 0, node.said
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 @pytest.mark.parametrize("rounds", [1, pytest.param(40, marks=[pytest.mark.long, pytest.mark.timeout(1800)])])
 def test_jumps_of_the_clock(simulated: list[float], rounds: int) -> None:
     states = collect("/jump/joint_states", JointState)

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import long, quiet, rests, step
 from tests.conformance.stage import Stage
-from tests.ros1.peer import Client, NodeProcess, call, collect, until
+from tests.ros1.peer import PATIENCE, Client, NodeProcess, call, collect, until
 
 CLIENT = """
 import actionlib, rospy, sys
@@ -86,6 +86,7 @@ def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
     assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_a_cabinet_without_power_and_back(other: Client) -> None:
     reports = collect("/diagnostics", DiagnosticArray)
     sent = other.send(long(other))
@@ -106,6 +107,7 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
     assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
+@pytest.mark.long  # every run has it with the node of ROS 2
 def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
     """The cabinet brakes the arm, the goal ends, and the node continues."""
     sent = other.send(step(other, time=9.0, size=6.0))
@@ -124,13 +126,21 @@ def step_anywhere(client: Client) -> TrajectoryGoal:
     return TrajectoryGoal(client.joints, (TrajectoryPoint(5.0, (0.0,) * 7),))
 
 
-def test_without_a_cabinet_or_with_a_wrong_parameter_it_waits_and_reports_it(ros: None, spare: Stage) -> None:
+@pytest.mark.long  # every run has it with the node of ROS 2
+def test_without_a_cabinet_it_waits_and_a_wrong_parameter_ends_it_with_one_line(
+    ros: None, spare: Stage
+) -> None:
     lonely = NodeProcess("127.0.0.1:9", name="lonely")
     wrong = NodeProcess(spare.target, name="wrong", servo__rate=-3)
+    twice = NodeProcess(spare.target, name="twice", joint_names="[A1, A1, A3, A4, A5, A6, A7]")
     lonely.waits_for("wait, the next attempt is in 2 s")
-    wrong.waits_for("servo.rate must be in [1, 500], got -3")
     assert lonely.end() == 0, lonely.said
-    assert wrong.end(signal.SIGTERM) == 0, wrong.said
+    for node, words in (
+        (wrong, "servo.rate must be in [1, 500], got -3"),
+        (twice, "joint_names must have seven different names"),
+    ):
+        assert node.process.wait(PATIENCE) == 1
+        assert words in node.said and "Traceback" not in node.said, node.said
 
 
 def test_the_arm_comes_to_rest_when_the_node_ends(other: Client, spare_node: NodeProcess) -> None:

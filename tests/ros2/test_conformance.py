@@ -1,6 +1,6 @@
 """Cases of conformance against the node: messages, executor, driver, cabinet, plant.
 
-Here every sixth case; another sixth runs against the node of ROS 1, and all of them against the runner alone.
+Here every twelfth case; another twelfth runs against the node of ROS 1, and all of them against the runner alone.
 `make conformance` runs all of them, with each path of execution.
 """
 

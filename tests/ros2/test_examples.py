@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.conformance.stage import ROOT
+from tests.long import longer
 from tests.retry import retry
 from tests.ros2 import shell
 from tests.ros2.peer import Client
@@ -37,7 +38,15 @@ def run(command: list[str]) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+#: MoveIt's interface, which test_moveit has, and a topic that test_node follows.
+IN_LONG_RUN = ("moveit_client.py", "servo.py")
+
+
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(one, marks=[pytest.mark.long] if one.name in IN_LONG_RUN else []) for one in SCRIPTS],
+    ids=lambda path: path.name,
+)
 def test_script(client: Client, script: Path) -> None:
     said = run([sys.executable, str(script), *(["60"] if script.name == "moveit_client.py" else [])])
     assert said.strip()
@@ -47,7 +56,7 @@ def test_script(client: Client, script: Path) -> None:
         assert "code 0" in said and "rejected" in said
 
 
-@pytest.mark.parametrize("number", range(len(SNIPPETS)))
+@pytest.mark.parametrize("number", range(longer(1, len(SNIPPETS))))
 def test_snippet_of_the_guide(client: Client, number: int) -> None:
     run([sys.executable, "-c", SNIPPETS[number]])
 
@@ -57,6 +66,7 @@ def test_the_command_line(client: Client) -> None:
     assert len(said) == 6 and "error_code=0" in said[3]
 
 
+@pytest.mark.long  # the same kinds as in the example's file
 def test_the_commands_of_the_guide(client: Client) -> None:
     blocks = [body for kind, body in BLOCK.findall(GUIDE) if kind == "sh" and "ros2 launch" not in body]
     assert len(shell.run(client.ros, "".join(blocks))) == 28

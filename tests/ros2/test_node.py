@@ -138,10 +138,12 @@ def test_an_integer_is_a_number_as_users_write_it(ros: Ros, spare: Stage, nodes:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"state_rate": 1000}, "state_rate must be in [1, 500], got 1000"),
+        ({"joint_names": ["A1", "A1"]}, "joint_names must have seven different names, got A1, A1"),
         *longer(
             [],
             [
+                ({"state_rate": 1000}, "state_rate must be in [1, 500], got 1000"),
+                ({"target": "sim://iiwa99"}, "target must be an address or a simulator"),
                 ({"state_rate": "fast"}, "state_rate must be a number, got 'fast'"),
                 ({"execution": "magic"}, "execution must be one of 'servo', 'spline', 'fri', got 'magic'"),
                 ({"joint_names": "A"}, "joint_names must be a list of strings, got 'A'"),

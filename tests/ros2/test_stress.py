@@ -41,6 +41,7 @@ def test_malformed_goals_twenty_in_flight(client: Client, node: NodeProcess, cou
     refused_in_flight(client, node.process.pid, count=count)
 
 
+@pytest.mark.long  # how much a processor can serve
 @pytest.mark.parametrize(
     "seconds", [3.0, pytest.param(300.0, marks=[pytest.mark.long, pytest.mark.timeout(900)])]
 )

@@ -18,7 +18,7 @@ from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
-from tests.long import longer
+from tests.long import few, longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, ready
 
@@ -174,7 +174,7 @@ def test_a_target_on_the_limits_is_reached_within_every_limit(kind: str) -> None
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("how", ["cancel", "stop_fast", "emergency stop"])
-@pytest.mark.parametrize("after", [100, 170, 220, 260, 300])
+@pytest.mark.parametrize("after", few([220, 100, 170, 260, 300], 2))
 def test_a_stop_on_the_way_to_the_limits_leaves_none(kind: str, how: str, after: int) -> None:
     plant, _ = towards_the_limits(kind)
     path = np.vstack([[CORNER] * 3, commands(plant, after)])
@@ -301,7 +301,7 @@ def test_behind_a_compliant_arm_at_its_limit_the_set_points_are_inside(push: flo
     assert (q.min() < plant.robot.q_min[3] - 1e-6) == (push < 0.0)
 
 
-@pytest.mark.parametrize("stiffness", [100.0, 1000.0, 5000.0])
+@pytest.mark.parametrize("stiffness", few([1000.0, 100.0, 5000.0]))
 def test_impedance_follows_a_motion_and_rests(stiffness: float) -> None:
     plant, ear = ready(), Ear()
     target = HERE + [0.5, 0, 0, 0.2, 0, 0, 0.5]

@@ -16,6 +16,7 @@ from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
+from tests.long import few
 from tests.sim.compliant import ASKEW, Arm
 
 NOWHERE = np.zeros(6)
@@ -151,13 +152,16 @@ def swing(force: Array, most: float = 20.0) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize(
     ("direction", "frequency", "amplitude", "bias"),
-    [
-        ("x", 1.0, 10.0, 0.0),
-        ("y", 5.0, 30.0, 0.0),
-        ("z", 15.0, 10.0, -20.0),
-        ("c", 2.0, 2.0, 0.5),
-        ("a", 6.0, 1.0, 0.0),
-    ],
+    few(
+        [
+            ("z", 15.0, 10.0, -20.0),
+            ("c", 2.0, 2.0, 0.5),
+            ("x", 1.0, 10.0, 0.0),
+            ("y", 5.0, 30.0, 0.0),
+            ("a", 6.0, 1.0, 0.0),
+        ],
+        2,
+    ),
 )
 def test_the_force_has_its_amplitude_and_frequency(
     direction: str, frequency: float, amplitude: float, bias: float

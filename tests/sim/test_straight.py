@@ -18,7 +18,7 @@ from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
-from tests.long import longer
+from tests.long import few, longer
 from tests.sim import motions
 from tests.sim.driving import READY, Ear, numbers, ready
 
@@ -211,7 +211,7 @@ def followed(plant: Plant, target: Callable[[], Pose], ticks: int) -> Array:
 OVERRIDES = {0: 0.3, 120: 1.0, 260: 0.0, 420: 0.6, 430: 1.0, 600: 0.05, 750: 1.0, 1000: 0.3, 1100: 1.0}
 
 
-@pytest.mark.parametrize("seed", [2, 12, *range(100, 100 + longer(0, 60))])
+@pytest.mark.parametrize("seed", few([2, 12, *range(100, 160)]))
 def test_a_change_of_the_override_keeps_every_axis_within_its_acceleration(seed: int) -> None:
     """Raising the override within a stream once took 12.3 rad/s² of an axis that may 10."""
     random = np.random.default_rng(seed)
@@ -235,7 +235,7 @@ def test_a_change_of_the_override_keeps_every_axis_within_its_acceleration(seed:
 @pytest.mark.parametrize(
     ("a7", "noise"),
     longer(
-        [(-150, 0.0), (-60, 0.0), (60, 0.0), (150, 0.0), (-60, 1e-9), (60, -1e-9)],
+        [(-150, 0.0), (60, 0.0), (60, -1e-9)],
         [(a7, noise) for a7 in (-150, -60, 60, 150) for noise in (0.0, 1e-9, -1e-9)],
     ),
 )
@@ -259,8 +259,13 @@ def moved(start: Pose, *by: float) -> Pose:
     ("degrees", "goal", "axis"),
     [
         ((0, 30, 0, -90, 0, 100, 0), lambda start: turned(start, b=60), 6),
-        ((0, 30, 0, -90, 0, 60, 150), lambda start: turned(start, a=60), 7),
-        (HOME, lambda start: moved(start, -0.4, 0, -0.1), 4),
+        *longer(
+            [],
+            [
+                ((0, 30, 0, -90, 0, 60, 150), lambda start: turned(start, a=60), 7),
+                (HOME, lambda start: moved(start, -0.4, 0, -0.1), 4),
+            ],
+        ),
         ((0, 45, 0, -90, 5, 10, 0), lambda start: turned(start, b=-30), 5),  # A5 turns over, and may not
     ],
 )
@@ -296,7 +301,7 @@ def test_an_emergency_stop_on_a_bent_line_keeps_every_axis_within_its_accelerati
     assert (rest[-1] == rest[-50]).all()
 
 
-@pytest.mark.parametrize("every", ["target", "target once"])
+@pytest.mark.parametrize("every", few(["target once", "target"]))
 def test_at_the_end_of_its_reach_it_rests_on_its_line(every: str) -> None:
     plant, ear, start = at(*HOME)
     goal = moved(start, 0.6, 0.0, 0.1)

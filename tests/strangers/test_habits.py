@@ -129,6 +129,7 @@ def test_an_application_with_the_habits_of_many_laboratories(tmp_path: Path) -> 
     assert "the application has ended, its threads have not: publisher;" in done.stderr
 
 
+@pytest.mark.long
 def test_an_error_in_its_constructor_is_named_with_its_place(tmp_path: Path) -> None:
     done = run(tmp_path, Failing=FAILING)
     assert done.returncode == 1
@@ -137,6 +138,7 @@ def test_an_error_in_its_constructor_is_named_with_its_place(tmp_path: Path) -> 
     assert "Reflection" not in last and "Failing.java:7" in done.stderr
 
 
+@pytest.mark.long
 def test_a_call_of_system_exit_is_reported(tmp_path: Path) -> None:
     done = run(tmp_path, Exiting=EXITING)
     assert done.returncode == 1, done.stderr

@@ -46,6 +46,7 @@ def test_a_server_of_text_moves_the_arm_and_answers_what_is_wrong() -> None:
     assert "waiting on port" in log
 
 
+@pytest.mark.long  # two of the projects run in every test
 def test_an_application_dials_the_pc_and_exchanges_binary_frames() -> None:
     log, said = driven("dial_out")
     assert said == [
@@ -60,6 +61,7 @@ def test_an_application_dials_the_pc_and_exchanges_binary_frames() -> None:
     assert "excluded: " in log and "the PC has ended it" in log
 
 
+@pytest.mark.long  # two of the projects run in every test
 def test_a_menu_is_operated_by_dialogs_and_user_keys() -> None:
     log, _ = driven("pad_menu")
     assert "search cancelled" in log
@@ -73,6 +75,7 @@ def test_a_menu_runs_alone_with_answers() -> None:
     assert "jobs done: null 1 null" in done.log
 
 
+@pytest.mark.long  # two of the projects run in every test
 def test_orders_come_by_signals_and_a_background_task_sends_the_state() -> None:
     log, said = driven("station_io")
     assert "2 orders are done" in log
@@ -81,6 +84,7 @@ def test_orders_come_by_signals_and_a_background_task_sends_the_state() -> None:
     assert re.fullmatch(r"A7 has been at (5\d|60) deg, 0 of \d+ datagrams lost", said[-1]), said
 
 
+@pytest.mark.long  # two of the projects run in every test
 def test_a_path_is_recorded_by_the_controller_and_by_a_thread() -> None:
     log, said = driven("recorder")
     assert re.search(r"\d+ lines in path\.log, \d+ in samples\.csv", log), log

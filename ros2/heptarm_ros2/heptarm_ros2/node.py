@@ -16,6 +16,7 @@ from rclpy.lifecycle import State as LifecycleState
 from rclpy.parameter import Parameter as RosParameter
 
 from heptarm.errors import HeptarmError
+from heptarm.fri import State as FriState
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.node import parameters
@@ -59,9 +60,11 @@ class HeptarmNode(LifecycleNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)  # a simulated clock may stand still, or jump
         for one in sorted(parameters.PARAMETERS, key=lambda one: one.name != "names"):
             self._declare(one)  # `names` first: it selects the defaults of the others
-        for one in parameters.joint_parameters(self.get_parameter("joint_names").value or []):
+        joints = self.get_parameter("joint_names").value or []
+        parameters.check_joint_names(joints)
+        for one in parameters.joint_parameters(joints):
             self._declare(one)
-        self.configuration = NodeConfiguration.of({})
+        self.configuration = NodeConfiguration.of(self._values())  # what it refuses no retry mends
         self._warn_of_unknown()
         if hasattr(self, "add_pre_set_parameters_callback"):  # Humble refuses an integer for a number
             self.add_pre_set_parameters_callback(self._before_set)
@@ -155,7 +158,8 @@ class HeptarmNode(LifecycleNode):
         try:
             self.configuration = NodeConfiguration.of(self._values())
             shared = (self, self.ros, self.configuration)
-            self._states, self._presets = StatePublisher(*shared), PresetPublisher(*shared)
+            self._states = StatePublisher(*shared)
+            self._presets = PresetPublisher(*shared, fri=self._fri_state)
             self._events = EventPublisher(*shared)
             self.driver = Driver(self.configuration, self)
         except HeptarmError as error:
@@ -237,6 +241,9 @@ class HeptarmNode(LifecycleNode):
     @property
     def _state_publishers(self) -> tuple[StatePublisher | PresetPublisher | TransformPublisher | None, ...]:
         return self._states, self._presets, self._transforms
+
+    def _fri_state(self) -> FriState | None:
+        return None if self.driver is None else self.driver.fri.newest
 
     # -------------------------------------------------------------------------- from the driver
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
+from heptarm.fri import State as FriState
 from heptarm.ros.interface.messages import RosAdapter, class_of
 from heptarm.ros.interface.names import PRESETS, NameRole, PresetName
 from heptarm.ros.interface.state_messages import preset_event, preset_message
@@ -14,10 +17,24 @@ from heptarm.values.state import State
 
 
 class PresetPublisher:
-    """Publishes states and events under the names that the parameter `names` adds."""
+    """Publishes states and events under the names that the parameter `names` adds.
 
-    def __init__(self, node: Node, ros: RosAdapter, configuration: NodeConfiguration) -> None:
-        self._node, self._ros, self._names = node, ros, configuration
+    Args:
+        node: publishes.
+        ros: types and time.
+        configuration: of the node.
+        fri: the newest message of the open FRI session; None: none is open.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        ros: RosAdapter,
+        configuration: NodeConfiguration,
+        *,
+        fri: Callable[[], FriState | None],
+    ) -> None:
+        self._node, self._ros, self._names, self._fri = node, ros, configuration, fri
         preset = PRESETS[configuration.values["names"]]
         self._publishers = [(entry, self._publisher(entry)) for entry in preset.published()]
         self._events = [(entry, self._publisher(entry)) for entry in preset.events()]
@@ -35,7 +52,7 @@ class PresetPublisher:
         for entry, publisher in self._publishers:
             if publisher.get_subscription_count() == 0:
                 continue
-            message = preset_message(self._ros, entry, publisher.msg_type, state, self._names)
+            message = preset_message(self._ros, entry, publisher.msg_type, state, self._names, self._fri())
             if message is not None:
                 publisher.publish(message)
 

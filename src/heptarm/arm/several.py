@@ -32,7 +32,7 @@ from heptarm.arm.verbs import camera_feed
 from heptarm.errors import CollisionForeseen, CommandRejected, HeptarmError, ModeConflict, ShapeError, Timeout
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
-from heptarm.values.checks import flag, instance, shown, within
+from heptarm.values.checks import choice, flag, instance, shown, within
 from heptarm.values.clearance import WorldOfArms
 from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
@@ -107,15 +107,7 @@ class Arms(Sealed):
         Raises:
             CommandRejected: there is none; the text lists them.
         """
-        if name not in self._arms:
-            known = ", ".join(self._arms)
-            raise CommandRejected(
-                f"name must be one of {known}, got {shown(name)}",
-                parameter="name",
-                value=name,
-                allowed=known,
-            )
-        return self._arms[name]
+        return choice(name, "name", self._arms)
 
     def __repr__(self) -> str:
         """Short form."""
@@ -188,7 +180,7 @@ def connect_all(*targets: str, settings: Mapping[str, Any] | None = None, **name
         ConnectFailed: one does not answer; others as `connect`. The text names the arm.
         CommandRejected: no target, or two arms of one name.
     """
-    pairs = [*((instance(one, str, "targets"), one) for one in targets), *named.items()]
+    pairs = [*((instance(target, str, "targets"), target) for target in targets), *named.items()]
     if not pairs or len({name for name, _ in pairs}) < len(pairs):
         raise CommandRejected(
             "targets must be one or more arms of different names, got "
@@ -528,18 +520,18 @@ def _of_each(
         return [], []
     barrier = threading.Barrier(len(these))
 
-    def act(one: Any) -> _Answer:
+    def act(arm: Any) -> _Answer:
         barrier.wait()
-        return action(one)
+        return action(arm)
 
     answers: list[_Answer] = []
     errors: list[HeptarmError] = []
     with ThreadPoolExecutor(len(these), thread_name_prefix="heptarm-together") as pool:
-        for one, future in [(one, pool.submit(act, one)) for one in these]:
+        for arm, future in [(arm, pool.submit(act, arm)) for arm in these]:
             try:
                 answers.append(future.result())
             except HeptarmError as error:
-                errors.append(_of(one.name, error) if isinstance(one, Arm) else error)
+                errors.append(_of(arm.name, error) if isinstance(arm, Arm) else error)
     return answers, errors
 
 

@@ -912,7 +912,7 @@ class ArmVerbs(Sealed):
         try:
             yield
         finally:
-            self._breaks = tuple(one for one in self._breaks if one is not rule)
+            self._breaks = tuple(other for other in self._breaks if other is not rule)
 
     def _terms(
         self,
@@ -1002,6 +1002,8 @@ class ArmVerbs(Sealed):
         self._tooling.check_until(parts)
         terms = StreamTerms(
             replace(message, until=ends),
+            request=request,
+            ceiling=self._speed,
             period=request.period,
             watchdog=request.watchdog_time,
             boundary=self._foresight.boundary(),

@@ -242,7 +242,7 @@ def _searched(design: _Design) -> tuple[float, float]:
         left = 0.0
         for axis in range(_AXES):
             moves = np.abs(some.dq[:, axis]) > MOVING
-            columns = [one[:, axis] for one in curve] + [some.dq[:, axis], some.ddq[:, axis]]
+            columns = [term[:, axis] for term in curve] + [some.dq[:, axis], some.ddq[:, axis]]
             rows = np.column_stack([*columns, torques[:, axis, :4]])[moves]
             aim = some.excess[moves, axis]
             off = aim - rows @ np.linalg.lstsq(rows, aim, rcond=None)[0]
@@ -272,27 +272,31 @@ def _gauss_newton(
         held = expected + design.by_load @ x[_LOAD_AT]
         rows = _rows(design, x, transition, stribeck, held)
         normal, right = np.diag(prior**-2.0), np.zeros(len(x))
-        for one in rows:
-            weighted = one.columns * (trust[one.chosen] / noise[one.kind, one.axis] ** 2)[:, None]
-            normal[np.ix_(one.places, one.places)] += weighted.T @ one.columns
-            right[one.places] += weighted.T @ one.aim
+        for block in rows:
+            weighted = block.columns * (trust[block.chosen] / noise[block.kind, block.axis] ** 2)[:, None]
+            normal[np.ix_(block.places, block.places)] += weighted.T @ block.columns
+            right[block.places] += weighted.T @ block.aim
         inverse = _inverse(normal)
         x = inverse @ right
         off = np.zeros((2, _AXES, len(windows.t)))
-        for one in rows:
-            left = one.aim - one.columns @ x[one.places]
-            off[one.kind, one.axis, one.chosen] = left
+        for block in rows:
+            left = block.aim - block.columns @ x[block.places]
+            off[block.kind, block.axis, block.chosen] = left
             usual = 1.4826 * float(np.median(np.abs(left)))
-            noise[one.kind, one.axis] = max(usual, 0.1 * least[one.axis])
+            noise[block.kind, block.axis] = max(usual, 0.1 * least[block.axis])
         trust = 1.0 / (1.0 + np.max((off / (_TRUSTED * noise[:, :, None])) ** 2, axis=(0, 1)) ** 2)
         steps = np.clip(x[_SHAPE_AT], [-0.5 * transition, -0.5 * stribeck], [transition, stribeck])
         transition, stribeck = np.clip(np.add([transition, stribeck], steps), *bounds).tolist()
     parts = np.zeros((len(design.parts), len(x)))
-    for one in rows:
-        each = np.zeros((len(windows.t), len(one.places)))
-        left = trust[one.chosen] * off[one.kind, one.axis, one.chosen] / noise[one.kind, one.axis] ** 2
-        each[one.chosen] = one.columns * left[:, None]
-        parts[:, one.places] += np.add.reduceat(each, design.parts, axis=0)
+    for block in rows:
+        each = np.zeros((len(windows.t), len(block.places)))
+        left = (
+            trust[block.chosen]
+            * off[block.kind, block.axis, block.chosen]
+            / noise[block.kind, block.axis] ** 2
+        )
+        each[block.chosen] = block.columns * left[:, None]
+        parts[:, block.places] += np.add.reduceat(each, design.parts, axis=0)
     many = len(parts) / max(1, len(parts) - 1)
     covariance = inverse @ (np.diag(prior**-2.0) + many * parts.T @ parts) @ inverse
     # with few parts the scatter may be small by chance: at least what white noise gives
@@ -339,7 +343,7 @@ def _rows(design: _Design, x: Array, transition: float, stribeck: float, held: A
             sum(by * (other[k] - curve[k])[:, axis] for k, by in enumerate(factors)) / (0.01 * speed)
             for other, speed in ((faster, transition), (longer, stribeck))
         ]
-        rows = np.column_stack([*(one[:, axis] for one in columns), design.by_load[:, axis], *by_shape])
+        rows = np.column_stack([*(column[:, axis] for column in columns), design.by_load[:, axis], *by_shape])
         moves = np.abs(windows.dq[:, axis]) > MOVING
         places = np.concatenate([own[:5], load, shape])
         found.append(_Rows(0, axis, places, rows[moves], windows.excess[moves, axis], moves))

@@ -78,11 +78,11 @@ class Validation(Value):
     def __str__(self) -> str:
         """Errors of all predictions beside the noise."""
         rows = {
-            "torques": " ".join(f"{one:.3f}" for one in self.torque) + " Nm off",
-            "noise": " ".join(f"{one:.3f}" for one in self.noise) + " Nm",
-            "ratio": " ".join(f"{one:.2f}" for one in self.ratio),
-            "motors": " ".join(f"{one:.3f}" for one in self.motor) + " Nm off",
-            "deflection": " ".join(f"{1e6 * one:.1f}" for one in self.deflection) + " µrad off",
+            "torques": " ".join(f"{value:.3f}" for value in self.torque) + " Nm off",
+            "noise": " ".join(f"{value:.3f}" for value in self.noise) + " Nm",
+            "ratio": " ".join(f"{value:.2f}" for value in self.ratio),
+            "motors": " ".join(f"{value:.3f}" for value in self.motor) + " Nm off",
+            "deflection": " ".join(f"{1e6 * value:.1f}" for value in self.deflection) + " µrad off",
         }
         return lines(f"Prediction of {self.source or 'samples'}", rows)
 
@@ -104,7 +104,7 @@ class ArmFit(Value):
     def __str__(self) -> str:
         """The numbers, the prediction, and the remarks."""
         return "\n".join(
-            [str(self.arm), str(self.validation), *(f"  not known: {one}" for one in self.remarks)]
+            [str(self.arm), str(self.validation), *(f"  not known: {remark}" for remark in self.remarks)]
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
@@ -142,11 +142,11 @@ def simulator(
             touches the arm all the time, or its robot is unknown.
         ShapeError: a wrong shape.
     """
-    samples, named = _samples(run, "run")
-    model = _model(robot, named)
+    samples, named = samples_of(run, "run")
+    model = model_of(robot, named)
     fall = array(acceleration, 3, "acceleration")
     found = estimate_arm(samples, model, acceleration=fall)
-    other = samples if validation is None else _samples(validation, "validation")[0]
+    other = samples if validation is None else samples_of(validation, "validation")[0]
     tried = validate(found.arm, other, declared=declared, acceleration=fall)
     contradictions = (*found.arm.contradictions, *tried.contradictions)
     if commissioning is not None:
@@ -169,7 +169,7 @@ def validate(
         CommandRejected: the recording cannot be used.
     """
     model = instance(arm, FittedArm, "arm").model
-    samples, _ = _samples(run, "run")
+    samples, _ = samples_of(run, "run")
     delay, fall = float(arm.value("state_delay", 0.0)[0]), array(acceleration, 3, "acceleration")
     windows = aligned_windows(samples, model, delay=delay, acceleration=fall).thinned(_MOST)
     used = None if declared is None else instance(declared, Body, "declared")
@@ -199,7 +199,7 @@ def _rms(values: Array) -> Array:
     return frozen(np.sqrt((values**2).mean(axis=0)))
 
 
-def _samples(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
+def samples_of(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
     """Samples of a recording, and the name of its robot; empty: unknown."""
     if isinstance(run, ArmSamples):
         return run, ""
@@ -207,7 +207,12 @@ def _samples(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
     return ArmSamples.of(instance(recording, RecordedData, name)), recording.facts.get("robot", "")
 
 
-def _model(given: RobotModel | str | None, named: str) -> RobotModel:
+def model_of(given: RobotModel | str | None, named: str) -> RobotModel:
+    """The robot that is given, or that a recording names.
+
+    Raises:
+        CommandRejected: none is known.
+    """
     if given is not None:
         return robot(given) if isinstance(given, str) else instance(given, RobotModel, "robot")
     found = known_robot(named) if named else None
@@ -226,11 +231,11 @@ def _differences(file: Path) -> tuple[str, ...]:
         report = json.loads(read_text(file, name="commissioning"))
         date, steps = report["date"], report["steps"]
         return tuple(
-            f"commissioning of {date}: {step['step']}: {one['quantity']}: expected {one['expected']}, measured "
-            f"{one['measured']}"
+            f"commissioning of {date}: {step['step']}: {comparison['quantity']}: expected {comparison['expected']}, "
+            f"measured {comparison['measured']}"
             for step in steps
-            for one in step["comparisons"]
-            if not one["agrees"]
+            for comparison in step["comparisons"]
+            if not comparison["agrees"]
         )
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, CommandRejected):

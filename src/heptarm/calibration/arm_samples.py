@@ -105,7 +105,7 @@ class ArmSamples(Value):
         stamps = np.asarray(run[f"{prefix}stamp"], dtype=np.float64)
         times = (stamps - stamps[0]) * 1e-9
         rows = [np.asarray(run[f"{prefix}{name}"], dtype=np.float64) for name in _NAMES]
-        good = np.isfinite(times) & np.logical_and.reduce([np.isfinite(one).all(axis=1) for one in rows])
+        good = np.isfinite(times) & np.logical_and.reduce([np.isfinite(row).all(axis=1) for row in rows])
         good &= np.r_[True, np.diff(np.maximum.accumulate(times)) > 0.0]
         if good.sum() < 2 or not np.any(rows[-1][good]):
             raise CommandRejected(
@@ -113,7 +113,7 @@ class ArmSamples(Value):
                 parameter="run",
                 hint="record an FRI session, whose cycles have them",
             )
-        q, q_cmd, tau, tau_ext, tau_cmd = (one[good] for one in rows)
+        q, q_cmd, tau, tau_ext, tau_cmd = (row[good] for row in rows)
         return ArmSamples(
             times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=_written(run.path)
         )
@@ -173,7 +173,7 @@ class Windows:
         """Some of the windows."""
         rows = {name: getattr(self, name) for name in self.__slots__}
         kept = ("offsets", "centre", "q_noise", "tau_noise")
-        return Windows(**{name: one if name in kept else one[chosen] for name, one in rows.items()})
+        return Windows(**{name: row if name in kept else row[chosen] for name, row in rows.items()})
 
     def thinned(self, most: int) -> Windows:
         """At most so many windows, evenly over time."""

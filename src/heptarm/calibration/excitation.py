@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,17 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.arm.verbs import ArmVerbs
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings
 from heptarm.errors import CollisionForeseen, CommandRejected, OutsideWorkspace
-from heptarm.model.kinematics import forward
-from heptarm.values.checks import Array, Value, array, callback, frozen, instance, integer, within
+from heptarm.values.checks import Array, Value, array, frozen, instance, integer, within
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.robot import RobotModel
 from heptarm.values.text import lines
-
-_log = logging.getLogger("heptarm.calibration")
 
 #: Default duration [s], fraction of each axis' maximum in the fastest motion, largest distance from the start [rad].
 SECONDS, SPEED, REACH = 60.0, 0.4, 0.6
@@ -70,13 +67,9 @@ class ExcitationPlan(Value):
 
     def __str__(self) -> str:
         """What moves, how far, how fast, and for how long."""
-        off = np.degrees(self.postures - self.postures[0])
-        moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(7))
-        pairs = zip("xyz", self.low, self.high, strict=True)
-        box = ", ".join(f"{axis} {low:.2f} to {high:.2f}" for axis, low, high in pairs)
         rows = {
-            "moves": f"{moves} deg",
-            "flange": f"in the postures {box} m in the base; between them it moves on arcs",
+            "moves": f"{swings(self.postures, self.postures[0])} deg",
+            "flange": f"in the postures {box_text(self.low, self.high)}; between them it moves on arcs",
             "speed": f"{self.speeds.min():.1%} to {self.speeds.max():.0%} of each axis' maximum",
             "collisions": "none foreseen" if self.is_checked else "not checked: set arm.collision_check",
             "duration": f"{self.duration:.0f} s, {len(self.speeds)} motions",
@@ -145,8 +138,8 @@ def excitation(
     far = array(
         np.broadcast_to(np.asarray(reach, dtype=np.float64), 7) if np.ndim(reach) == 0 else reach, 7, "reach"
     )
-    for index, one in enumerate(far.tolist()):
-        within(one, f"reach[{index}]", 0.05, 3.0, unit="rad")
+    for index, angle in enumerate(far.tolist()):
+        within(angle, f"reach[{index}]", 0.05, 3.0, unit="rad")
     postures, speeds, duration = [np.asarray(arm.state.q_cmd)], list[float](), 0.0
     tried, goes_back = 0, False
     random = np.random.default_rng(integer(seed, "seed", 0, 2**31))
@@ -155,8 +148,8 @@ def excitation(
         posture, part = next_posture(
             model, postures[0], postures[-1], reach=far, turn=len(speeds), random=random
         )
-        goal, one = (postures[0], fastest) if goes_back else (posture, part * fastest)
-        taken = _duration(arm, postures[-1], goal, speed=one, collision_check=collision_check)
+        goal, top = (postures[0], fastest) if goes_back else (posture, part * fastest)
+        taken = _duration(arm, postures[-1], goal, speed=top, collision_check=collision_check)
         if taken is None:
             tried += 1
             if tried > _TRIES:
@@ -169,18 +162,11 @@ def excitation(
             continue
         tried = 0
         postures.append(goal)
-        speeds.append(one)
+        speeds.append(top)
         duration += taken
-    places = np.array([forward(model, q)[:3, 3] for q in postures])
-    return ExcitationPlan(
-        model,
-        frozen(np.array(postures)),
-        frozen(speeds),
-        duration,
-        frozen(places.min(axis=0)),
-        frozen(places.max(axis=0)),
-        collision_check is not None or arm.collision_check is not None,
-    )
+    is_checked = collision_check is not None or arm.collision_check is not None
+    box = flange_box(model, postures)
+    return ExcitationPlan(model, frozen(np.array(postures)), frozen(speeds), duration, *box, is_checked)
 
 
 def _duration(
@@ -229,9 +215,7 @@ def record_excitation(
             hint="make a new one with calibration.excitation(arm)",
         )
     recorder = arm.record(path, rate=_RATE, overwrite=overwrite)
-    _log.info("%s", made)
-    if confirm is not None and not callback(confirm, "confirm")(made):
-        raise CommandRejected("identifying the arm was not confirmed: nothing was moved", parameter="confirm")
+    agree(made, confirm, "identifying the arm")
     with recorder:
         for motion in made.motions:
             arm.move(motion, mode=Position())

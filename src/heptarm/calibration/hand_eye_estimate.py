@@ -21,8 +21,9 @@ import numpy.typing as npt
 from heptarm.calibration.board import Sighting
 from heptarm.calibration.tip import student
 from heptarm.errors import CommandRejected, ShapeError, require
-from heptarm.values.camera import intrinsic
-from heptarm.values.checks import Array, Value, finite_entries, flag, frozen, instance, numbers, shown, word
+from heptarm.io.targets import save_camera, saved_targets
+from heptarm.values.camera import MountedCamera, intrinsic, lens_distortion
+from heptarm.values.checks import Array, Value, flag, frozen, instance, shown, word
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.text import lines
 
@@ -38,6 +39,8 @@ _LOST, _LOST_ANGLE = 0.01, math.radians(1.0)
 _ROBUST = 1.0
 #: The worst view is suspect if its distances are larger by this factor than the median.
 _SUSPECT = 4.0
+#: Standard deviation of an offset that a detector gives all corners of all views, which turns the camera [pixels].
+_DETECTOR = 0.05
 #: Parameters: camera and board, then focal lengths, centre, and two terms of radial distortion.
 _POSES, _LENS = 12, 6
 _NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -161,6 +164,40 @@ class HandEyeEstimate(Value):
         }
         return lines(f"Camera on the {self.frame} from {len(self.residuals)} views", rows)
 
+    def save(self, target: str, name: str) -> MountedCamera:
+        """Save the camera with a saved target, from which `saved_camera` reads it.
+
+        Raises:
+            CommandRejected: there is no such target; nothing is changed.
+        """
+        made = MountedCamera(name, self.frame, self.pose, self.matrix, self.distortion)
+        save_camera(target, made)
+        return made
+
+
+def saved_camera(target: str, name: str) -> MountedCamera:
+    """A camera that was measured and saved: for the arguments `pose`, `frame` and `matrix` of `Arm.camera`.
+
+    Args:
+        target: name of a saved target.
+        name: of the camera.
+
+    Raises:
+        CommandRejected: there is no such target, or it has no such camera.
+    """
+    found = saved_targets().get(target)
+    known = {} if found is None else {one.name: one for one in found.cameras}
+    if name not in known:
+        listed = ", ".join(known) or "none"
+        raise CommandRejected(
+            f"name must be that of a camera of the saved target {shown(target)}, which has {listed}; got {shown(name)}",
+            parameter="name",
+            value=name,
+            allowed=listed,
+            hint="heptarm calibrate eye --save NAME --target TARGET",
+        )
+    return known[name]
+
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
@@ -178,11 +215,11 @@ class HandEyeModel:
     def __init__(self, flanges: Sequence[Pose], points: Sequence[Array], frame: str) -> None:
         # board to camera: inverse of the camera @ inverse of the flange @ board, or with the flange itself
         given = [pose.inverse() if frame == "flange" else pose for pose in flanges]
-        counts = [len(one) for one in points]
+        counts = [len(view) for view in points]
         self.places = np.repeat(np.arange(len(given)), counts)
-        self._turns = np.array([one.rotation for one in given])
-        self._shifts = np.array([one.xyz for one in given])
-        self._points = np.concatenate([np.asarray(one) for one in points])
+        self._turns = np.array([pose.rotation for pose in given])
+        self._shifts = np.array([pose.xyz for pose in given])
+        self._points = np.concatenate([np.asarray(view) for view in points])
 
     def seen(self, guess: HandEyeGuess) -> tuple[Array, Array]:
         """Pixels of all corners, shape (n, 2), and their distances along the optical axis, shape (n,) [m]."""
@@ -277,19 +314,15 @@ def estimate_hand_eye(
         MissingExtra: OpenCV or SciPy is not installed.
     """
     word(frame, "frame", FRAMES)
-    rest = finite_entries(numbers(distortion, "distortion"), "distortion")
-    if rest.shape != (5,):
-        raise ShapeError(
-            f"distortion must have five numbers, k1 k2 p1 p2 k3, got the shape {rest.shape}",
-            parameter="distortion",
-            value=distortion,
-        )
+    rest = lens_distortion(distortion)
     is_refined = matrix is None if refine is None else flag(refine, "refine")
     given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
-    _check_turns([one.flange for one in given])
+    _check_turns([view.flange for view in given])
     lens = first_matrix(given) if matrix is None else intrinsic(matrix)
-    seen = [_board_pose(one.sighting, lens, rest) for one in given]
-    camera = _closed_form([one.flange if frame == "flange" else one.flange.inverse() for one in given], seen)
+    seen = [_board_pose(view.sighting, lens, rest) for view in given]
+    camera = _closed_form(
+        [view.flange if frame == "flange" else view.flange.inverse() for view in given], seen
+    )
     first = given[0].flange if frame == "flange" else given[0].flange.inverse()
     guess = HandEyeGuess(
         camera,
@@ -297,8 +330,8 @@ def estimate_hand_eye(
         np.array([lens[0, 0], lens[1, 1], lens[0, 2], lens[1, 2], rest[0], rest[1]]),
         (float(rest[2]), float(rest[3]), float(rest[4])),
     )
-    model = HandEyeModel([one.flange for one in given], [one.sighting.points for one in given], frame)
-    pixels = np.concatenate([one.sighting.pixels for one in given])
+    model = HandEyeModel([view.flange for view in given], [view.sighting.points for view in given], frame)
+    pixels = np.concatenate([view.sighting.pixels for view in given])
     count = _POSES + (_LENS if is_refined else 0)
     for loss in ("huber", "linear"):  # a wrong corner spoils the first steps otherwise
         guess = _solved(model, pixels, guess, count, loss)
@@ -310,8 +343,8 @@ def _checked(views: Sequence[HandEyeView], fewest: int) -> list[HandEyeView]:
         raise ShapeError(
             f"views must be a sequence of views, got {shown(views)}", parameter="views", value=views
         )
-    for index, one in enumerate(views):
-        instance(one, HandEyeView, f"views[{index}]")
+    for index, view in enumerate(views):
+        instance(view, HandEyeView, f"views[{index}]")
     if len(views) < fewest:
         raise ShapeError(
             f"views must be at least {fewest}, got {len(views)}",
@@ -328,7 +361,7 @@ def _check_turns(flanges: Sequence[Pose]) -> None:
     Raises:
         CommandRejected: they do.
     """
-    turns = np.array([(flanges[0].inverse() @ one).rotvec for one in flanges])
+    turns = np.array([(flanges[0].inverse() @ flange).rotvec for flange in flanges])
     _, strengths, axes = np.linalg.svd(turns - turns.mean(axis=0), full_matrices=True)
     rms = strengths / math.sqrt(len(flanges))
     if rms[0] < _TURNED:
@@ -340,7 +373,7 @@ def _check_turns(flanges: Sequence[Pose]) -> None:
             hint="turn it by 20 to 40 degrees about different axes",
         )
     if rms[1] < _TURNED:
-        axis = ", ".join(f"{one:.2f}" for one in axes[0])
+        axis = ", ".join(f"{number:.2f}" for number in axes[0])
         raise CommandRejected(
             f"the flange turns about one axis only, ({axis}) of the flange: along it the camera is not known",
             parameter="views",
@@ -352,8 +385,8 @@ def _check_turns(flanges: Sequence[Pose]) -> None:
 def first_matrix(views: Sequence[HandEyeView]) -> Array:
     """Intrinsic matrix from the views alone (Zhang, 2000, by OpenCV)."""
     cv: Any = require("cv2", extra="vision")
-    points = [one.sighting.points.astype(np.float32) for one in views]
-    pixels = [one.sighting.pixels.astype(np.float32).reshape(-1, 1, 2) for one in views]
+    points = [view.sighting.points.astype(np.float32) for view in views]
+    pixels = [view.sighting.pixels.astype(np.float32).reshape(-1, 1, 2) for view in views]
     size = views[0].sighting.size
     flags = cv.CALIB_FIX_K3 | cv.CALIB_ZERO_TANGENT_DIST
     return np.asarray(cv.calibrateCamera(points, pixels, size, None, None, flags=flags)[1], float)
@@ -421,7 +454,7 @@ def _judged(
     off, slopes = seen - pixels, model.jacobian(guess, count)
     n, places = int(model.places[-1]) + 1, model.places
     each = [slopes[places == view].reshape(-1, count) for view in range(n)]
-    whole = np.add.reduce([one.T @ one for one in each])
+    whole = np.add.reduce([block.T @ block for block in each])
     shifts, residuals, predicted, on_board = [], [], [], []
     for view, slope in enumerate(each):
         here = np.ravel(off[places == view])
@@ -446,6 +479,8 @@ def _judged(
             hint="take more views, from more directions, with the board larger in the pictures",
         )
     fx, fy, cx, cy, k1, k2 = guess.lens
+    turned = guess.camera.rotation[:, :2] * _DETECTOR / np.array([fy, fx])
+    sigma[3:6] = np.sqrt(np.square(sigma[3:6]) + np.square(turned).sum(axis=1))
     return HandEyeEstimate(
         guess.camera,
         frame,

@@ -27,11 +27,12 @@ from heptarm.calibration.hand_eye_estimate import (
     estimate_hand_eye,
     first_matrix,
 )
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings
 from heptarm.errors import CommandRejected, MissingExtra, NoPath, OutsideWorkspace, Unreachable
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
 from heptarm.values.camera import intrinsic
-from heptarm.values.checks import Array, Value, callback, frozen, instance, integer, within
+from heptarm.values.checks import Array, Value, frozen, instance, integer, within
 from heptarm.values.clearance import PlanningWorld
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
@@ -79,21 +80,18 @@ class HandEyePlan(Value):
     @staticmethod
     def of(robot: RobotModel, purpose: str, postures: Sequence[Array], speed: float) -> HandEyePlan:
         """A plan of postures."""
-        places = np.array([forward(robot, q)[:3, 3] for q in postures])
-        low, high = frozen(places.min(axis=0)), frozen(places.max(axis=0))
-        return HandEyePlan(robot, purpose, frozen(np.array(postures)), speed, low, high)
+        return HandEyePlan(robot, purpose, frozen(np.array(postures)), speed, *flange_box(robot, postures))
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motions, if they are PTP."""
+        return tuple(ptp(q) for q in self.postures)
 
     def __str__(self) -> str:
         """What moves, how far and how fast."""
-        off = np.degrees(self.postures - self.postures[-1])
-        moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(7))
-        box = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}"
-            for axis, low, high in zip("xyz", self.low, self.high, strict=True)
-        )
         rows = {
-            "moves": f"{moves} deg",
-            "flange": f"in the postures {box} m in the base",
+            "moves": f"{swings(self.postures, self.postures[-1])} deg",
+            "flange": f"in the postures {box_text(self.low, self.high)}",
             "speed": f"at most {self.speed:.0%} of each axis' maximum",
             "postures": f"{len(self.postures) - 1}, and back",
         }
@@ -112,6 +110,8 @@ def hand_eye(
     distortion: npt.ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0),
     refine: bool | None = None,
     confirm: Callable[[HandEyePlan], bool] | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    on_picture: Callable[[npt.NDArray[np.uint8], Sighting | None], object] | None = None,
 ) -> HandEyeEstimate:
     """Measure where a camera is, on the flange or beside the arm. The arm moves, and returns.
 
@@ -131,6 +131,8 @@ def hand_eye(
         distortion: see `estimate_hand_eye`.
         refine: see `estimate_hand_eye`.
         confirm: called with each plan; nothing moves unless it returns true. None: it moves.
+        progress: called after each picture with the board in it with their number and that of all.
+        on_picture: called with each picture and what was found in it; None: the board is not seen.
 
     Raises:
         CommandRejected: the camera does not see the board; it was not confirmed; too few postures can be reached; the
@@ -144,7 +146,14 @@ def hand_eye(
     known = (
         instance(camera, CameraStream, "camera", hint="arm.camera(...)").matrix if matrix is None else matrix
     )
-    seen = _Viewer(arm, camera, board)
+
+    def note(pixels: npt.NDArray[np.uint8], sighting: Sighting | None) -> None:
+        if on_picture is not None:
+            on_picture(pixels, sighting)
+        if progress is not None and sighting is not None:
+            progress(len(seen.views), wanted)
+
+    seen = _Viewer(arm, camera, board, note)
     start = arm.wait_for_rest().q_cmd
     seen.look()
     if not seen.views:
@@ -171,8 +180,15 @@ def hand_eye(
 class _Viewer:
     """Takes pictures of a resting arm, and keeps those in which the board is seen."""
 
-    def __init__(self, arm: ArmVerbs, camera: CameraStream, board: Board) -> None:
+    def __init__(
+        self,
+        arm: ArmVerbs,
+        camera: CameraStream,
+        board: Board,
+        note: Callable[[npt.NDArray[np.uint8], Sighting | None], object],
+    ) -> None:
         self._arm, self._camera, self._board = arm, camera, board
+        self._note = note
         self.views: list[HandEyeView] = []
 
     def look(self) -> None:
@@ -181,6 +197,7 @@ class _Viewer:
         sighting = self._board.find(picture.pixels)
         if sighting is not None:
             self.views.append(HandEyeView(picture.flange, sighting))
+        self._note(picture.pixels, sighting)
         _log.info("view %d: %d corners", len(self.views), 0 if sighting is None else len(sighting))
 
 
@@ -202,7 +219,7 @@ class _Mover:
         confirm: Callable[[HandEyePlan], bool] | None,
     ) -> None:
         self._arm, self._speed, self._avoid = arm, speed, avoid
-        self._confirm = confirm if confirm is None else callback(confirm, "confirm")
+        self._confirm = confirm
 
     def visit(self, purpose: str, postures: Sequence[Array], start: Array, look: Callable[[], None]) -> None:
         """Move through postures that can be reached, look from each, and return to the start.
@@ -218,11 +235,7 @@ class _Mover:
                 hint="begin with more room around the arm, farther from the limits of its joints",
             )
         plan = HandEyePlan.of(self._arm.robot, purpose, [*postures, start], self._speed)
-        _log.info("%s", plan)
-        if self._confirm is not None and not self._confirm(plan):
-            raise CommandRejected(
-                "measuring the camera was not confirmed: nothing else was moved", parameter="confirm"
-            )
+        agree(plan, self._confirm, "measuring the camera")
         for q in postures:
             try:
                 motion = self._motion(q)
@@ -296,11 +309,11 @@ def _chosen(
         flat = slopes.reshape(-1, parameters)
         return np.asarray(flat.T @ flat)
 
-    known = np.add.reduce([information(one.flange) for one in views]) + _PRIOR * np.eye(parameters)
+    known = np.add.reduce([information(view.flange) for view in views]) + _PRIOR * np.eye(parameters)
     each = [information(Pose.from_matrix(forward(robot, q))) for q in postures]
     chosen: list[Array] = []
     while postures and len(chosen) < count:
-        best = int(np.argmax([np.linalg.slogdet(known + one)[1] for one in each]))
+        best = int(np.argmax([np.linalg.slogdet(known + added)[1] for added in each]))
         known = known + each.pop(best)
         chosen.append(postures.pop(best))
     return chosen

@@ -79,8 +79,8 @@ class KinematicFit(Value):
         """Offsets with their standard deviations, and how much better the points fit."""
         pairs = zip(self.offset, self.sigma_offset, self.is_known, strict=True)
         offsets = [
-            f"{np.degrees(one):.3f} ± {np.degrees(sigma):.3f}" if known else "not known"
-            for one, sigma, known in pairs
+            f"{np.degrees(angle):.3f} ± {np.degrees(sigma):.3f}" if known else "not known"
+            for angle, sigma, known in pairs
         ]
         rows = {
             "offsets": "  ".join(offsets) + " deg",
@@ -141,8 +141,8 @@ def _checked(q: npt.ArrayLike, points: npt.ArrayLike) -> tuple[Array, Array]:
             value=float(spread[axis]),
             hint="measure postures in which all joints are far apart",
         )
-    for index, one in enumerate(joints):
-        within(float(np.abs(one).max()), f"|q[{index}]|", 0.0, 2.0 * np.pi, unit="rad")
+    for index, posture in enumerate(joints):
+        within(float(np.abs(posture).max()), f"|q[{index}]|", 0.0, 2.0 * np.pi, unit="rad")
     return joints, places
 
 

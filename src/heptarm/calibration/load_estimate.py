@@ -60,14 +60,14 @@ def _parameters_of(body: Body) -> Array:
 
 
 #: Bodies of one point each, whose parameters are a basis: the torques of any load are sums of theirs.
-_POINTS = 0.1 * np.array(
+POINTS = 0.1 * np.array(
     [
         *([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0]),
         *([0, -1, 0], [0, 0, -1], [1, 1, 0], [1, 0, 1], [0, 1, 1]),
     ]
 )
-_BASIS = tuple(Body(1.0, point) for point in _POINTS)
-_TO_PARAMETERS = np.linalg.inv(np.array([_parameters_of(one) for one in _BASIS]))
+_BASIS = tuple(Body(1.0, point) for point in POINTS)
+TO_PARAMETERS = np.linalg.inv(np.array([_parameters_of(body) for body in _BASIS]))
 
 
 def load_regressor(
@@ -90,7 +90,7 @@ def load_regressor(
     Returns:
         Shape (7, 10): by mass, first moments x y z [kg m], inertia about the flange xx yy zz xy xz yz [kg m²].
     """
-    rows = (array(one, _AXES, name)[None] for one, name in ((q, "q"), (dq, "dq"), (ddq, "ddq")))
+    rows = (array(values, _AXES, name)[None] for values, name in ((q, "q"), (dq, "dq"), (ddq, "ddq")))
     return np.asarray(load_regressors(model, *rows, acceleration=acceleration)[0])
 
 
@@ -99,8 +99,8 @@ def load_regressors(
 ) -> Array:
     """`load_regressor` of many moments, unchecked: arrays of shape (n, 7) to shape (n, 7, 10)."""
     bare = inverse_dynamics_rows(model, q, dq, ddq, acceleration=acceleration)
-    each = [inverse_dynamics_rows(model, q, dq, ddq, load=one, acceleration=acceleration) for one in _BASIS]
-    return np.asarray(np.einsum("pb,bnj->njp", _TO_PARAMETERS, np.array(each) - bare))
+    each = [inverse_dynamics_rows(model, q, dq, ddq, load=body, acceleration=acceleration) for body in _BASIS]
+    return np.asarray(np.einsum("pb,bnj->njp", TO_PARAMETERS, np.array(each) - bare))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,8 +210,8 @@ class IdentifiedLoad(Value):
             "mass": self.comparison,
             "com": f"{com} mm from the flange (declared {declared})",
             "inertia": inertia,
-            "offsets": " ".join(f"{one:.2f}" for one in self.offset) + " Nm",
-            "residual": " ".join(f"{one:.2f}" for one in self.residual) + " Nm",
+            "offsets": " ".join(f"{value:.2f}" for value in self.offset) + " Nm",
+            "residual": " ".join(f"{value:.2f}" for value in self.residual) + " Nm",
         }
         return lines(f"Load of the {self.robot.title}", rows)
 
@@ -318,7 +318,7 @@ def _load_design(model: RobotModel, samples: LoadSamples, acceleration: npt.Arra
 
 def _sensor_design(held: Array) -> Array:
     """Torques by offsets and gains of the sensors, shape (7 n, 14), of the torques that they measure, shape (7 n,)."""
-    each = [np.concatenate([np.eye(_AXES), np.diag(one)], axis=1) for one in held.reshape(-1, _AXES)]
+    each = [np.concatenate([np.eye(_AXES), np.diag(row)], axis=1) for row in held.reshape(-1, _AXES)]
     return np.concatenate(each)
 
 
@@ -469,7 +469,7 @@ def _numeric_jacobian(function: Callable[[Array], Array], at: Array) -> Array:
     """Derivatives by central differences, shape (m, n)."""
     step = 1e-6
     columns = [
-        (function(at + step * one) - function(at - step * one)) / (2.0 * step) for one in np.eye(len(at))
+        (function(at + step * unit) - function(at - step * unit)) / (2.0 * step) for unit in np.eye(len(at))
     ]
     return np.column_stack(columns)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,9 +19,9 @@ from heptarm.calibration.load_estimate import (
     load_regressor,
     predicted_sigma,
 )
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings
 from heptarm.errors import CollisionForeseen, CommandRejected, MissingExtra, StaleState
-from heptarm.model.kinematics import forward
-from heptarm.values.checks import Array, Value, callback, frozen, instance, within, word
+from heptarm.values.checks import Array, Value, frozen, instance, within, word
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
@@ -30,8 +29,6 @@ from heptarm.values.pose import deg
 from heptarm.values.robot import Body, RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import lines
-
-_log = logging.getLogger("heptarm.calibration")
 
 #: What is measured: "rests" mass and centre of mass; "short" the inertia too, from the motions between the rests.
 Excitation = Literal["rests", "short"]
@@ -92,15 +89,10 @@ class LoadPlan(Value):
 
     def __str__(self) -> str:
         """What moves, how far, how fast, and for how long."""
-        off = np.degrees(self.postures - self.postures[0])
-        moves = ", ".join(f"A{i + 1} {off[:, i].min():+.0f} to {off[:, i].max():+.0f}" for i in range(3, 7))
-        box = ", ".join(
-            f"{axis} {low:.2f} to {high:.2f}"
-            for axis, low, high in zip("xyz", self.low, self.high, strict=True)
-        )
+        moves = swings(self.postures, self.postures[0], range(3, 7))
         rows = {
             "moves": f"{moves} deg; A1 to A3 stay",
-            "flange": f"in the rests {box} m in the base; between them it moves on arcs",
+            "flange": f"in the rests {box_text(self.low, self.high)}; between them it moves on arcs",
             "speed": f"at most {self.speed:.0%} of each axis' maximum",
             "rests": f"{len(self.postures)} of {self.seconds:g} s",
             "duration": "" if math.isnan(self.duration) else f"{self.duration:.0f} s",
@@ -142,17 +134,8 @@ def load_plan(
             value=float(sigma[0]),
             hint="begin with A4 and A6 bent, for example ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))",
         )
-    places = np.array([forward(arm.robot, q)[:3, 3] for q in postures])
-    made = LoadPlan(
-        arm.robot,
-        excitation,
-        frozen(postures),
-        limit,
-        pause,
-        math.nan,
-        frozen(places.min(axis=0)),
-        frozen(places.max(axis=0)),
-    )
+    box = flange_box(arm.robot, postures)
+    made = LoadPlan(arm.robot, excitation, frozen(postures), limit, pause, math.nan, *box)
     return _timed(arm, made)
 
 
@@ -163,7 +146,7 @@ def _postures(model: RobotModel, start: Array) -> Array:
     for row, offsets in zip(result[1:], _OFFSETS[1:], strict=True):
         for axis, offset in zip(range(3, 7), deg(*offsets), strict=True):
             down, up = low[axis] - start[axis], high[axis] - start[axis]
-            fitting = [one for one in (offset, -offset) if down <= one <= up]
+            fitting = [angle for angle in (offset, -offset) if down <= angle <= up]
             row[axis] += fitting[0] if fitting else np.clip(offset, min(down, 0.0), max(up, 0.0))
     return result
 
@@ -191,6 +174,7 @@ def load(
     plan: LoadPlan | None = None,
     declared: Body | None = None,
     confirm: Callable[[LoadPlan], bool] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> IdentifiedLoad:
     """Measure mass, centre of mass and, if planned, inertia of what is on the flange. The arm moves, and returns.
 
@@ -202,6 +186,7 @@ def load(
         plan: what moves, from `load_plan`; None: its defaults.
         declared: load data that the cabinet uses; None: those of the attached tool and workpiece.
         confirm: called with the plan; nothing moves unless it returns true. None: it moves.
+        progress: called after each rest with their number and that of all.
 
     Raises:
         CommandRejected: it was not confirmed; the posture is not suited; something touched the arm; there is no load.
@@ -222,18 +207,18 @@ def load(
     first, single = _rest(arm, made.seconds)
     rests = [first]
     check_rating(arm.robot, *_apparent(arm.robot, rests[0], used))
-    _log.info("%s", made)
-    if confirm is not None and not callback(confirm, "confirm")(made):
-        raise CommandRejected("measuring the load was not confirmed: nothing was moved", parameter="confirm")
+    agree(made, confirm, "measuring the load")
     moments: list[LoadSamples] = []
     for index, motion in enumerate(made.motions):
-        with _recorded(arm) as states:
+        with recorded(arm) as states:
             arm.move(motion, speed=made.speed, mode=Position())
             arm.wait_for_rest()
         if made.excitation == "short":
             moments += _moments(states, single)
         if index + 1 < len(made.postures):
             rests.append(_rest(arm, made.seconds)[0])
+        if progress is not None:
+            progress(len(rests), len(made.postures))
     return estimate_load(_thinned(rests, moments), robot=arm.robot, declared=used)
 
 
@@ -262,7 +247,7 @@ def _rest(arm: ArmVerbs, seconds: float) -> tuple[LoadSamples, Array]:
     )
     single = tau_ext.std(axis=0)
     means = (q.mean(axis=0), tau.mean(axis=0), tau_ext.mean(axis=0), single / math.sqrt(len(rows)))
-    return LoadSamples(*(one[None] for one in means)), single
+    return LoadSamples(*(mean[None] for mean in means)), single
 
 
 def _apparent(model: RobotModel, rest: LoadSamples, used: Body | None) -> tuple[float, float]:
@@ -279,7 +264,7 @@ def _apparent(model: RobotModel, rest: LoadSamples, used: Body | None) -> tuple[
 
 
 @contextmanager
-def _recorded(arm: ArmVerbs) -> Iterator[list[State]]:
+def recorded(arm: ArmVerbs) -> Iterator[list[State]]:
     """The states of a block, complete at its end."""
     states: list[State] = []
     pushed = arm.states(size=100_000)
@@ -312,7 +297,7 @@ def _moments(states: list[State], single: Array) -> list[LoadSamples]:
             continue
         noise = single / math.sqrt(near.sum())
         row = (c[0], tau[near].mean(axis=0), tau_ext[near].mean(axis=0), noise, c[1], 2.0 * c[2])
-        found.append(LoadSamples(*(one[None] for one in row)))
+        found.append(LoadSamples(*(entry[None] for entry in row)))
     return found
 
 
@@ -320,6 +305,6 @@ def _thinned(rests: list[LoadSamples], moments: list[LoadSamples]) -> LoadSample
     """All samples as one; of very many moments some."""
     step = max(1, math.ceil(len(moments) / _MOMENTS))
     result = rests[0]
-    for one in (*rests[1:], *moments[::step]):
-        result = result.joined(one)
+    for moment in (*rests[1:], *moments[::step]):
+        result = result.joined(moment)
     return result

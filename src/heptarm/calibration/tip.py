@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,7 +87,7 @@ class TcpEstimate(Value):
         rows = {
             "tip": f"x {x:.2f} ± {sx:.2f}  y {y:.2f} ± {sy:.2f}  z {z:.2f} ± {sz:.2f} mm from the flange",
             "orientation": self._orientation(),
-            "residuals": " ".join(f"{1e3 * one:.2f}" for one in self.residuals) + " mm",
+            "residuals": " ".join(f"{1e3 * residual:.2f}" for residual in self.residuals) + " mm",
             "spread": _mm(self.spread),
             "worst": worst,
         }
@@ -155,64 +155,99 @@ def tcp(
         CommandRejected: the poses differ too little, or one misses the fixed point; the text names the pose.
         LimitError: a value outside its range.
     """
-    given = _checked(poses, "poses")
+    given = checked_poses(poses, "poses", FEWEST, "touch the same point with the flange tilted differently")
     allowed = within(tolerance, "tolerance", 0.0, 0.1, above=True, unit="m")
     if along is not None and len(aligned):
         raise CommandRejected(
             "along and aligned both give the orientation", parameter="along", hint="give one of them"
         )
-    if len(given) < FEWEST:
-        raise ShapeError(
-            f"poses must be at least {FEWEST}, got {len(given)}",
-            parameter="poses",
-            value=len(given),
-            hint="touch the same point with the flange tilted differently",
-        )
-    turns, places = np.array([one.rotation for one in given]), np.array([one.xyz for one in given])
-    _check_differ(turns)
+    turns, places = np.array([pose.rotation for pose in given]), np.array([pose.xyz for pose in given])
     matrix = np.concatenate([np.concatenate([turn, -np.eye(3)], axis=1) for turn in turns])
     found = np.linalg.lstsq(matrix, -places.ravel(), rcond=None)[0]
     missed = (matrix @ found + places.ravel()).reshape(-1, 3)
+    made = estimate_of(Pose.of(found[:3]), found[3:], matrix, missed, tolerance=allowed)
+    if along is None and not len(aligned):
+        return made
+    if along is not None:
+        freedom = 3 * len(given) - 6
+        pointing = math.hypot(made.spread * student(freedom), *_sigma(matrix, made.spread))
+        quat, sigma_angle = _along(along, found[:3], found[3:], pointing)
+    else:
+        quat, sigma_angle = _aligned(checked_poses(aligned, "aligned"), world)
+    return replace(made, pose=Pose.of(found[:3], quat), sigma_angle=sigma_angle)
+
+
+def estimate_of(
+    pose: Pose,
+    point: Array,
+    matrix: Array,
+    missed: Array,
+    *,
+    tolerance: float,
+    fewest: int = FEWEST,
+    common: float = 0.0,
+    what: str = "pose",
+) -> TcpEstimate:
+    """The estimate of a tip from the residuals of least squares.
+
+    Args:
+        pose: flange to tip.
+        point: that it touched, shape (3,) [m].
+        matrix: of the least squares, shape (k n, m): k rows of each of n poses, the tip in the first three columns.
+        missed: by how much the tip misses what it touches in each pose, shape (n, k) [m].
+        tolerance: the most of that [m].
+        fewest: number of poses up to which none can be left out.
+        common: standard deviation of an error that all rows have in common [m].
+        what: a pose is called in errors.
+
+    Raises:
+        CommandRejected: the poses differ too little, or one contradicts the others; the text names it.
+    """
+    count, each = missed.shape
+    _check_differ(matrix)
     residuals = np.linalg.norm(missed, axis=1)
-    spread = _spread(missed, 3 * len(given) - 6)
-    worst, without = _worst(matrix, missed)
-    if residuals.max() > allowed:
+    spread = math.sqrt(float((missed**2).sum()) / (count * each - matrix.shape[1]))
+    worst, without = _worst(matrix, missed, fewest)
+    if residuals.max() > tolerance:
         raise CommandRejected(
-            f"pose {worst + 1} contradicts the others: the tip misses the fixed point by up to "
-            f"{_mm(residuals.max())}, and {_mm(allowed)} are allowed",
+            f"{what} {worst + 1} contradicts the others: the tip misses the fixed point by up to "
+            f"{_mm(residuals.max())}, and {_mm(tolerance)} are allowed",
             parameter=f"poses[{worst}]",
             value=float(residuals.max()),
-            allowed=f"[0, {allowed:g}] m",
-            hint=f"measure pose {worst + 1} again, or leave it out",
+            allowed=f"[0, {tolerance:g}] m",
+            hint=f"measure {what} {worst + 1} again, or leave it out",
         )
-    covariance = spread**2 * np.linalg.inv(matrix.T @ matrix)
-    sigma = np.sqrt(np.diagonal(covariance)) * student(3 * len(given) - 6)
-    tip, point = found[:3], found[3:]
-    quat, sigma_angle = np.array([0.0, 0.0, 0.0, 1.0]), math.nan
-    if along is not None:
-        pointing = math.hypot(spread * student(3 * len(given) - 6), *sigma)
-        quat, sigma_angle = _along(along, tip, point, pointing)
-    elif len(aligned):
-        quat, sigma_angle = _aligned(_checked(aligned, "aligned"), world)
+    sigma = np.hypot(_sigma(matrix, spread), common * np.linalg.pinv(matrix).sum(axis=1))
     return TcpEstimate(
-        Pose.of(tip, quat),
-        frozen(point),
-        frozen(sigma[:3]),
-        sigma_angle,
-        frozen(residuals),
-        spread,
-        worst + 1,
-        without,
+        pose, frozen(point), frozen(sigma[:3]), math.nan, frozen(residuals), spread, worst + 1, without
     )
 
 
-def _checked(poses: Sequence[Pose], name: str) -> list[Pose]:
+def _sigma(matrix: Array, spread: float) -> Array:
+    """Standard deviations of the unknowns of least squares whose rows have a spread."""
+    covariance = spread**2 * np.linalg.inv(matrix.T @ matrix)
+    return np.asarray(np.sqrt(np.diagonal(covariance)) * student(len(matrix) - matrix.shape[1]))
+
+
+def checked_poses(poses: Sequence[Pose], name: str, fewest: int = 0, hint: str = "") -> list[Pose]:
+    """Poses that a person gave.
+
+    Raises:
+        ShapeError: they are not poses, or too few.
+    """
     if isinstance(poses, Pose) or not isinstance(poses, Sequence):
         raise ShapeError(
             f"{name} must be a sequence of poses, got {shown(poses)}", parameter=name, value=poses
         )
-    for index, one in enumerate(poses):
-        check_pose(one, f"{name}[{index}]")
+    for index, pose in enumerate(poses):
+        check_pose(pose, f"{name}[{index}]")
+    if len(poses) < fewest:
+        raise ShapeError(
+            f"{name} must be at least {fewest}, got {len(poses)}",
+            parameter=name,
+            value=len(poses),
+            hint=hint,
+        )
     return list(poses)
 
 
@@ -220,18 +255,20 @@ def _mm(value: float) -> str:
     return f"{1e3 * float(value):.2f} mm"
 
 
-def _check_differ(turns: Array) -> None:
+def _check_differ(matrix: Array) -> None:
     """Refuse poses that differ too little to know the tip along some direction.
 
     Raises:
         CommandRejected: they do; the text has the direction.
     """
-    off = turns - turns.mean(axis=0)
-    moments, axes = np.linalg.eigh(np.einsum("nij,nik->jk", off, off))
+    # what is known of the tip, whatever the other unknowns are
+    whole = matrix.T @ matrix
+    others = whole[:3, 3:] @ np.linalg.inv(whole[3:, 3:]) @ whole[3:, :3]
+    moments, axes = np.linalg.eigh(whole[:3, :3] - others)
     least = math.sqrt(max(float(moments[0]), 1e-12))
     if 1.0 / least > _AMPLIFICATION:
         blind = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
-        direction = ", ".join(fixed(one, 2) for one in blind)
+        direction = ", ".join(fixed(component, 2) for component in blind)
         raise CommandRejected(
             f"the poses differ too little: they amplify errors of pointing {1.0 / least:.0f} times along "
             f"({direction}) of the flange, and {_AMPLIFICATION:g} times are allowed",
@@ -242,25 +279,20 @@ def _check_differ(turns: Array) -> None:
         )
 
 
-def _spread(missed: Array, freedom: int) -> float:
-    """Standard deviation of pointing along an axis [m]."""
-    return math.sqrt(float((missed**2).sum()) / freedom) if freedom > 0 else math.nan
-
-
-def _worst(matrix: Array, missed: Array) -> tuple[int, float]:
+def _worst(matrix: Array, missed: Array, fewest: int) -> tuple[int, float]:
     """The pose that the others predict least, from 0, and the spread without it [m]."""
-    count = len(missed)
+    count, each = missed.shape
     hat = matrix @ np.linalg.pinv(matrix)
     apart = []
     for index in range(count):
-        rows = slice(3 * index, 3 * index + 3)
+        rows = slice(each * index, each * (index + 1))
         # the squared error that goes when this pose is left out
-        free = np.eye(3) - hat[rows, rows]
+        free = np.eye(each) - hat[rows, rows]
         apart.append(float(missed[index] @ np.linalg.pinv(free, rcond=1e-9) @ missed[index]))
     worst = int(np.argmax(apart))
     left = float((missed**2).sum()) - apart[worst]
-    freedom = 3 * (count - 1) - 6
-    return worst, math.sqrt(max(left, 0.0) / freedom) if count > FEWEST else math.nan
+    freedom = each * (count - 1) - matrix.shape[1]
+    return worst, math.sqrt(max(left, 0.0) / freedom) if count > fewest else math.nan
 
 
 def student(freedom: int) -> float:
@@ -319,9 +351,9 @@ def _aligned(aligned: Sequence[Pose], world: Pose) -> tuple[Array, float]:
     check_pose(world, "world")
     each = [Pose.of(np.zeros(3), (pose.inverse() @ world).quat) for pose in aligned]
     # the mean of quaternions is the eigenvector of their outer products (Markley et al., 2007)
-    quats = np.array([one.quat for one in each])
+    quats = np.array([pose.quat for pose in each])
     mean = Pose.of(np.zeros(3), np.linalg.eigh(quats.T @ quats)[1][:, -1])
-    off = np.array([mean.angle_to(one) for one in each])
+    off = np.array([mean.angle_to(pose) for pose in each])
     if len(each) == 1:
         return mean.quat, math.nan
     freedom = 3 * (len(each) - 1)
@@ -358,7 +390,7 @@ def record_poses(
         if not confirm(f"{remark}{number}: bring the tip to the fixed point"):
             raise CommandRejected(f"{number} was not confirmed: nothing is changed", parameter="confirm")
         pose = _still_pose(arm, timeout)
-        near = [index for index, one in enumerate(found) if one.angle_to(pose) < _APART]
+        near = [index for index, other in enumerate(found) if other.angle_to(pose) < _APART]
         if near:
             apart = math.degrees(found[near[0]].angle_to(pose))
             remark = f"this pose is only {apart:.1f} deg from pose {near[0] + 1}, tilt the flange more; "

@@ -71,7 +71,7 @@ class Measurement:
     @property
     def latency(self) -> Array:
         """Receipt to answer of every answered message [s]."""
-        return np.array([one.latency for one in self.messages if one.is_answered])
+        return np.array([message.latency for message in self.messages if message.is_answered])
 
 
 def bench(
@@ -186,9 +186,9 @@ def _measure(client: Client, lost: int, missed: int, before: int) -> Measurement
     stats, states = client.stats, client.history()
     messages = states[-max(1, min(len(states), stats.received - before)) :]
     period = messages[-1].period
-    late = sum(one.latency > period for one in messages)
+    late = sum(message.latency > period for message in messages)
     good = messages[-1].quality >= Quality.GOOD and lost + missed + late <= _FAILED_FRACTION * len(messages)
-    usual = float(np.percentile([one.latency for one in messages], 99))
+    usual = float(np.percentile([message.latency for message in messages], 99))
     why = cause(stats, period, client.refused, late=usual)
     return Measurement(messages, lost, missed, period, why, good)
 
@@ -227,7 +227,7 @@ def _lines(measured: Measurement, plot: Path | None) -> list[str]:
 
 
 def _micros(latency: Array) -> str:
-    median, late, later, longest = (1e6 * one for one in (*_percentiles(latency), latency.max(initial=0.0)))
+    median, late, later, longest = (1e6 * time for time in (*_percentiles(latency), latency.max(initial=0.0)))
     return f"{median:.0f} us median, {late:.0f} us 99 %, {later:.0f} us 99.9 %, {longest:.0f} us longest"
 
 
@@ -239,8 +239,8 @@ def _percentiles(latency: Array) -> tuple[float, float, float]:
 
 
 def _fractions(measured: Measurement) -> dict[str, float]:
-    seen = [one.quality for one in measured.messages]
-    return {one.name.lower(): seen.count(one) / len(seen) for one in Quality if one in seen}
+    seen = [message.quality for message in measured.messages]
+    return {quality.name.lower(): seen.count(quality) / len(seen) for quality in Quality if quality in seen}
 
 
 def draw(measured: Measurement, path: Path) -> None:
@@ -268,20 +268,22 @@ def draw(measured: Measurement, path: Path) -> None:
     left.set_ylabel("answers")
     left.legend(fontsize=9, framealpha=1.0)
     begin = measured.messages[0].received
-    times = np.array([(one.received - begin) * 1e-9 for one in measured.messages])
-    delays = np.array([1e6 * one.latency if one.is_answered else np.nan for one in measured.messages])
+    times = np.array([(message.received - begin) * 1e-9 for message in measured.messages])
+    delays = np.array(
+        [1e6 * message.latency if message.is_answered else np.nan for message in measured.messages]
+    )
     right.plot(times, delays, ".", markersize=1.5, color="steelblue", rasterized=True)
     right.axhline(1e6 * measured.period, color="black", linewidth=0.8, linestyle=":")
     right.text(0.0, 1e6 * measured.period, " one period", fontsize=8, va="bottom")
     for quality, colour in _COLOURS.items():
-        spans = np.array([one.quality == quality for one in measured.messages])
+        spans = np.array([message.quality == quality for message in measured.messages])
         if spans.any():
             across = right.get_xaxis_transform()
             right.fill_between(
                 times, 0, 1, where=spans, color=colour, alpha=0.2, transform=across, label=quality.name
             )
             right.legend(frameon=False, fontsize=9)
-    gaps = np.flatnonzero(np.diff([one.sequence for one in measured.messages]) > 1)
+    gaps = np.flatnonzero(np.diff([message.sequence for message in measured.messages]) > 1)
     right.plot(times[gaps], np.full(len(gaps), 1e6 * measured.period), "x", color="firebrick")
     right.set_yscale("log")
     right.set_xlabel("time [s]")

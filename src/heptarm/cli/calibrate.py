@@ -18,10 +18,10 @@ from heptarm.calibration.excitation import SECONDS as EXCITED
 from heptarm.calibration.excitation import SPEED as FASTEST
 from heptarm.calibration.load_motion import SECONDS, SPEED
 from heptarm.calibration.tip import TOLERANCE
-from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, Model
-from heptarm.cli.output import confirm as ask_person
+from heptarm.calibration.touching import TOUCHES
+from heptarm.cli.options import Access, CommandTarget, Model
 from heptarm.cli.output import emit
-from heptarm.errors import CommandRejected, NotReady
+from heptarm.errors import CommandRejected
 from heptarm.io.targets import saved_target
 from heptarm.model.kinematics import forward
 from heptarm.panel.points import PointList
@@ -75,11 +75,25 @@ def tcp(
         float, Parameter(help="The most by which a pose may miss the fixed point [m].")
     ] = TOLERANCE,
     frame: Annotated[str, Parameter(help="Frame of the tool that the tip becomes.")] = "tcp",
+    surface: Annotated[
+        str,
+        Parameter(
+            help="The arm touches this surface instead, a level plane or a sphere: plane:X,Y,Z or sphere:X,Y,Z,RADIUS "
+            "in the base [m]. Begin with the tip 2 to 50 mm over it, and a tool frame near the tip."
+        ),
+    ] = "",
+    tip_radius: Annotated[
+        float, Parameter(help="Radius of a round tip, whose middle is found; with --surface [m].")
+    ] = 0.0,
+    touches: Annotated[int, Parameter(help="Number of contacts with --surface.")] = TOUCHES,
+    dry_run: Annotated[
+        bool,
+        Parameter(name="--dry-run", negative="", help="Show what would move with --surface; move nothing."),
+    ] = False,
     save: Save = "",
-    target: CommandTarget = NO_TARGET,
-    as_json: Json = False,
+    access: Access = _ACCESS,
 ) -> int:
-    """Measure the tip of a tool: bring it to one fixed point in several poses, and confirm each.
+    """Measure the tip of a tool: bring it to one fixed point in several poses, and confirm each; or touch a surface.
 
     For example:
 
@@ -88,6 +102,8 @@ def tcp(
         heptarm calibrate tcp --along z,x --guide compliance --save gripper --target lab1
 
         heptarm calibrate tcp --points points.json
+
+        heptarm calibrate tcp --surface plane:0.6,0,0.2 --tip-radius 0.004 --save pen --target lab1
     """
     axes = tuple(part.strip() for part in along.split(",")) if along else ()
     if len(axes) not in (0, 2):
@@ -100,12 +116,34 @@ def tcp(
             parameter="points",
             hint="leave them out, or use calibration.tcp(..., along=...) in Python",
         )
-    place = _saved_as(save, target)
-    if points is not None:
+    if surface and (axes or guide != "none" or points is not None):
+        raise CommandRejected(
+            "the arm touches a surface by itself, so along, guide and points have no effect with it",
+            parameter="surface",
+            value=surface,
+            hint="leave them out",
+        )
+    if not surface and (tip_radius or dry_run):
+        raise CommandRejected(
+            "tip-radius and dry-run are of a surface that the arm touches",
+            parameter="surface",
+            hint="give --surface, or leave them out",
+        )
+    target, place = access.target, saved_as(save, access.target)
+    if surface:
+        known = calibration.KnownSurface.parse(surface)
+        with target.connect(control=not dry_run, state_rate=_RATE) as arm:
+            plan = calibration.touch_plan(arm, known, tip_radius=tip_radius, touches=touches)
+            if dry_run:
+                print(plan)
+                return 0
+            found = calibration.touch_tcp(arm, plan=plan, confirm=access.consent(arm), tolerance=tolerance)
+            old: Tool | KnownTool | str = arm.tools.get(save, save)
+    elif points is not None:
         taught = _taught(points, robot(model))
         found = calibration.tcp(taught, tolerance=tolerance)
         saved = saved_target(place) if place else None
-        named = {one.name: one for one in saved.tools} if saved is not None else {}
+        named = {tool.name: tool for tool in saved.tools} if saved is not None else {}
         old: Tool | KnownTool | str = named.get(save, save)
     else:
         with target.connect(control=guide != "none") as arm, _guiding(arm, guide) as confirm:
@@ -118,7 +156,7 @@ def tcp(
         found = calibration.tcp(about, along=extra or None, tolerance=tolerance)
     if place:
         found.save(place, old, frame=frame)
-    if as_json:
+    if access.as_json:
         emit(
             {"tcp": found.pose.array.tolist(), "sigma_m": found.sigma.tolist(), "point": found.point.tolist()}
             | {"sigma_rad": found.sigma_angle, "residuals_m": found.residuals.tolist(), "worst": found.worst}
@@ -126,7 +164,7 @@ def tcp(
         )
     else:
         print(found)
-        print(_outcome(save, place))
+        print(outcome("tool", save, place))
     return 0
 
 
@@ -156,17 +194,15 @@ def load(
 
         heptarm calibrate load --inertia --speed 0.4 --save gripper --target lab1
     """
-    place = _saved_as(save, access.target)
+    place = saved_as(save, access.target)
     with access.target.connect(control=not dry_run, state_rate=_RATE) as arm:
         plan = calibration.load_plan(
             arm, excitation="short" if inertia else "rests", speed=speed, seconds=seconds
         )
-        print(plan, file=sys.stderr if access.as_json else sys.stdout, flush=True)
         if dry_run:
+            print(plan)
             return 0
-        if not (arm.is_virtual or access.yes or ask_person(f"Move the real {arm.robot.title} like this?")):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        found = calibration.load(arm, plan=plan)
+        found = calibration.load(arm, plan=plan, confirm=access.consent(arm))
         old = arm.tools.get(save, save)
     if place:
         found.save(place, old)
@@ -179,7 +215,7 @@ def load(
         )
     else:
         print(found)
-        print(_outcome(save, place))
+        print(outcome("tool", save, place))
     return 0
 
 
@@ -235,14 +271,12 @@ def arm(
             plan = calibration.excitation(
                 one, seconds=seconds, speed=speed, reach=reach, collision_check=world
             )
-            print(plan, file=sys.stderr if access.as_json else sys.stdout, flush=True)
             if dry_run:
+                print(plan)
                 return 0
-            if not (
-                one.is_virtual or access.yes or ask_person(f"Move the real {one.robot.title} like this?")
-            ):
-                raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-            run = calibration.record_excitation(one, record, plan=plan, overwrite=overwrite)
+            run = calibration.record_excitation(
+                one, record, plan=plan, confirm=access.consent(one), overwrite=overwrite
+            )
             declared = one.load
     else:
         declared = None
@@ -254,8 +288,8 @@ def arm(
     if access.as_json:
         emit(
             {
-                one.name: {"value": one.value.tolist(), "sigma": one.sigma.tolist()}
-                for one in found.arm.numbers
+                numbers.name: {"value": numbers.value.tolist(), "sigma": numbers.sigma.tolist()}
+                for numbers in found.arm.numbers
             }
             | {"ratio": found.validation.ratio.tolist(), "contradictions": list(found.arm.contradictions)}
             | {"remarks": list(found.remarks), "saved": "" if save is None else str(save)}
@@ -266,30 +300,31 @@ def arm(
     return 0
 
 
-def _saved_as(tool: str, target: CommandTarget) -> str:
-    """Name of the saved target that gets a tool; empty: nothing is to be saved.
+def saved_as(name: str, target: CommandTarget) -> str:
+    """Name of the saved target that gets a tool or a camera; empty: nothing is to be saved.
 
     Raises:
         CommandRejected: the target is not a saved one, so that nothing could be saved: before anything moves.
     """
-    if not tool:
+    if not name:
         return ""
-    Tool(tool)  # its name is checked before anything is measured
+    Tool(name)  # the name is checked before anything is measured
     text = target_from_env() if target.text is None else target.text
     if saved_target(text) is None:
         raise CommandRejected(
-            f"{text} is not a saved target, so that no tool can be saved with it",
+            f"{text} is not a saved target, so that nothing can be saved with it",
             parameter="save",
-            value=tool,
+            value=name,
             hint="heptarm targets add NAME ADDRESS, then --target NAME",
         )
     return text
 
 
-def _outcome(tool: str, place: str) -> str:
+def outcome(what: str, name: str, place: str) -> str:
+    """What became of a result: a "tool" or a "camera" of a name, in the entry of a place, a saved target, if any."""
     if place:
-        return f"saved as the tool {tool} of {place}"
-    return "nothing is changed; --save TOOL saves it with a saved target"
+        return f"saved as the {what} {name} of {place}"
+    return f"nothing is changed; --save {what.upper()} saves it with a saved target"
 
 
 def _taught(file: Path, model: RobotModel) -> list[Pose]:

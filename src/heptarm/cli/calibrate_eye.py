@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -10,9 +9,10 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from heptarm import calibration
+from heptarm.arm.devices.camera import opened_camera
 from heptarm.calibration.hand_eye_motion import SPEED, VIEWS
+from heptarm.cli.calibrate import outcome, saved_as
 from heptarm.cli.options import Access, Json, Overwrite
-from heptarm.cli.output import confirm as ask_person
 from heptarm.cli.output import emit
 from heptarm.cli.record import (
     CameraFrame,
@@ -23,7 +23,7 @@ from heptarm.cli.record import (
     camera_settings,
     numbers_of,
 )
-from heptarm.errors import CommandRejected, require
+from heptarm.errors import CommandRejected
 from heptarm.values.camera import Camera
 from heptarm.values.files import refuse_existing, unwritable
 
@@ -105,6 +105,13 @@ def eye(
         Path | None, Parameter(name=("--out", "-o"), help="Also write the result to this file, JSON.")
     ] = None,
     overwrite: Overwrite = False,
+    save: Annotated[
+        str,
+        Parameter(
+            name="--save",
+            help="Save the result as this camera of the saved target. Default: it is only printed.",
+        ),
+    ] = "",
     access: Access = _ACCESS,
 ) -> int:
     """Measure where a camera is, on the flange or beside the arm, with a board that it sees.
@@ -131,21 +138,16 @@ def eye(
         )
     if out is not None:
         refuse_existing(out, overwrite=overwrite, name="out")
+    place = saved_as(save, access.target)
     matrix = _matrix(lens)
     own: dict[str, Any] = {} if camera == _SIMULATED else {"frame": frame}
-    source: Any = Camera(**settings) if camera == _SIMULATED else _opened(camera)
-    shown_on = sys.stderr if access.as_json else sys.stdout
+    source: Any = Camera(**settings) if camera == _SIMULATED else opened_camera(camera)
     with (
         access.target.connect(control=True, state_rate=200.0) as arm,
         closing(arm.camera(source, **own)) as pictures,
     ):
-
-        def confirm(plan: calibration.HandEyePlan) -> bool:
-            print(plan, file=shown_on, flush=True)
-            return arm.is_virtual or access.yes or ask_person(f"Move the real {arm.robot.title} like this?")
-
         found = calibration.hand_eye(
-            arm, pictures, made, views=views, speed=speed, matrix=matrix, confirm=confirm
+            arm, pictures, made, views=views, speed=speed, matrix=matrix, confirm=access.consent(arm)
         )
     result = {
         "frame": found.frame,
@@ -158,14 +160,17 @@ def eye(
         "rms_pixels": found.rms,
         "views": len(found.residuals),
         "suspect": found.is_suspect,
+        "saved": bool(place),
     }
+    if place:
+        found.save(place, save)
     if out is not None:
         _write(out, result)
     if access.as_json:
         emit(result)
     else:
         print(found)
-        print(f"written to {out}" if out is not None else "nothing is changed; -o FILE writes it to a file")
+        print(outcome("camera", save, place) if out is None or place else f"written to {out}")
     return 0
 
 
@@ -186,20 +191,3 @@ def _matrix(text: str) -> list[list[float]] | None:
         text, "lens", ",", float, form="FX,FY,CX,CY in pixels, such as 600,600,320,240"
     )
     return [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
-
-
-def _opened(camera: str) -> Any:
-    """What reads the next picture of a camera of this computer.
-
-    Raises:
-        CommandRejected: it cannot be opened.
-    """
-    opened = require("cv2", extra="vision").VideoCapture(int(camera) if camera.isdigit() else camera)
-    if not opened.isOpened():
-        raise CommandRejected(
-            f"the camera {camera!r} cannot be opened",
-            parameter="camera",
-            value=camera,
-            hint="give its number, from 0, the address of a stream, or sim for a simulated one",
-        )
-    return opened.read

@@ -129,12 +129,12 @@ def check(
                 f"{len(chosen)} scenarios on {arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"
             )
 
-        def ended(one: Outcome) -> None:
+        def ended(outcome: Outcome) -> None:
             if as_json:
-                emit(one.data)
+                emit(outcome.data)
             else:
-                style = _STYLES[one.verdict]
-                console.print(f"[{style}]{one.verdict.value:8}[/] {one.scenario.name}")
+                style = _STYLES[outcome.verdict]
+                console.print(f"[{style}]{outcome.verdict.value:8}[/] {outcome.scenario.name}")
 
         outcome = testing.run(
             arm,
@@ -156,14 +156,25 @@ def check(
 
 def _list(chosen: tuple[Scenario, ...], as_json: bool) -> None:
     if as_json:
-        for one in chosen:
-            emit({"scenario": one.name, "title": one.title, "risk": one.risk.value, "space_m": one.space})
+        for scenario in chosen:
+            emit(
+                {
+                    "scenario": scenario.name,
+                    "title": scenario.title,
+                    "risk": scenario.risk.value,
+                    "space_m": scenario.space,
+                }
+            )
         return
     table = Table(box=None, pad_edge=False)
     for name in ("scenario", "shows", "risk"):
         table.add_column(name, overflow="fold")
-    for one in chosen:
-        table.add_row(one.name, escape(one.title), f"{one.risk.value}{', simulator' if one.virtual else ''}")
+    for scenario in chosen:
+        table.add_row(
+            scenario.name,
+            escape(scenario.title),
+            f"{scenario.risk.value}{', simulator' if scenario.virtual else ''}",
+        )
     Console().print(table)
 
 

@@ -54,12 +54,12 @@ def run(
         table = Table(box=None, pad_edge=False)
         for name in ("step", "settles", "moves"):
             table.add_column(name, overflow="fold")
-        for one in chosen:
-            moves = one.movement
+        for step in chosen:
+            moves = step.movement
             text = "" if moves is None else f"{moves.what}, {moves.far}, {moves.fast}"
             if as_json:
-                emit({"step": one.name, "question": one.question, "moves": text})
-            table.add_row(one.name, escape(one.question), escape(text))
+                emit({"step": step.name, "question": step.question, "moves": text})
+            table.add_row(step.name, escape(step.question), escape(text))
         if not as_json:
             Console().print(table)
         return 0

@@ -107,15 +107,15 @@ def demo(
     if plot is not None:
         _draw(recorder, steps, plot, title)
     if as_json:
-        for one in steps:
+        for step in steps:
             emit(
                 {
-                    "motion": one.name,
-                    "duration_s": one.end - one.begin,
-                    "residual_rad": one.residual,
-                    "cause": one.cause,
+                    "motion": step.name,
+                    "duration_s": step.end - step.begin,
+                    "residual_rad": step.residual,
+                    "cause": step.cause,
                 }
-                | {"text": one.text, "as_designed": one.as_designed}
+                | {"text": step.text, "as_designed": step.as_designed}
             )
     else:
         console = Console()
@@ -123,7 +123,7 @@ def demo(
         console.print(_table(steps))
         where = f"plotted in {plot}" if plot else "not plotted: for that, pip install 'heptarm[viz]'"
         print(f"{len(recorder.q)} states, {where}")
-    return 0 if all(one.as_designed for one in steps) else 1
+    return 0 if all(step.as_designed for step in steps) else 1
 
 
 def _timed(arm: Arm, name: str, wanted: Cause, work: Callable[[], Result]) -> DemoStep:
@@ -238,13 +238,13 @@ def _draw(recorder: _Recorder, steps: list[DemoStep], path: Path, title: str) ->
 def _shade(upper: Axes, lower: Axes, steps: list[DemoStep], zero: float) -> None:
     """Bands for the motions, with their names above."""
     top = upper.get_xaxis_transform()
-    for index, one in enumerate(steps):
-        begin, end = one.begin - zero, one.end - zero
-        if one.cause == "refused":
+    for index, step in enumerate(steps):
+        begin, end = step.begin - zero, step.end - zero
+        if step.cause == "refused":
             upper.axvline(begin, color="firebrick", linestyle=":", linewidth=1.2)
             upper.text(begin, 0.90, " refused", transform=top, color="firebrick", fontsize=8, va="top")
             continue
         for axes in (upper, lower):
             axes.axvspan(begin, end, color="0.5", alpha=0.10 if index % 2 else 0.05, linewidth=0)
-        label = one.name.split(" to ")[0].split(" in ")[0].replace(", ", "\n").replace(" under way", "")
+        label = step.name.split(" to ")[0].split(" in ")[0].replace(", ", "\n").replace(" under way", "")
         upper.text((begin + end) / 2, 0.985, label, transform=top, fontsize=8, ha="center", va="top")

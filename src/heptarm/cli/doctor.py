@@ -429,7 +429,7 @@ def _listening(settings: Look, port: int) -> Iterator[CheckResult]:
         state = client.state
         while time.monotonic() - began < settings.seconds:
             time.sleep(0.05)
-            state = max(state, client.state, key=lambda one: one.session)
+            state = max(state, client.state, key=lambda state: state.session)
         yield _messages(client, client.events())
         if state.session >= SessionState.COMMANDING_WAIT and state.mode is not CommandMode.NO_COMMAND:
             yield CheckResult(
@@ -546,7 +546,7 @@ def _quality(client: Client) -> Iterator[CheckResult]:
 def _latency(client: Client) -> tuple[float, float, float]:
     """Median, 99 % and longest latency since the quality was good [s]: the first answers are always slow."""
     states = client.history()
-    first = next((i for i, one in enumerate(states) if one.quality >= Quality.GOOD), 0)
+    first = next((i for i, state in enumerate(states) if state.quality >= Quality.GOOD), 0)
     delays = [state.latency for state in states[first:]]
     return float(np.median(delays)), float(np.percentile(delays, 99)), max(delays)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import sys
+import zipfile
 from pathlib import Path
 from typing import Annotated
 from xml.sax.saxutils import escape
@@ -22,6 +24,9 @@ from heptarm.wire.messages import MAJOR, MINOR
 _PROJECT = "RoboticsAPI.data.xml"
 #: Options of Sunrise that a Workbench may lack, and what is refused without them.
 OPTIONS = {"servoing": "arm.servo", "fri": "arm.fri", "hand-guiding": "ha.hand_guide"}
+#: The sources as one file for the import of Workbench, and the class that prints their check sum.
+ARCHIVE = "heptarm-sources.zip"
+_SETTINGS, _SUM = "heptarm/core/session/ServerSettings.java", 'SOURCES = ""'
 _KEY = re.compile(r'(id="heptarm\.key" [^>]*? value=)""')
 
 
@@ -85,17 +90,20 @@ def install_cabinet(
         _set_key(out / _PROJECT, key)
         if not file.exists():
             write_key_file(file, key)
-    files = sorted(str(path.relative_to(out)) for path in out.rglob("*.java"))
+    files = sorted(path.relative_to(out / "src").as_posix() for path in out.rglob("*.java"))
+    check_sum = _seal(out, files)
     protocol = f"{MAJOR}.{MINOR}"
     if as_json:
         data = {"out": str(out), "files": len(files), "protocol": protocol, "version": __version__}
+        data |= {"archive": str(out / ARCHIVE), "sources": check_sum}
         data |= {"without": list(left_out)}
         emit(data | {"key_file": str(file) if key else ""})
         return 0
     print(f"{len(files)} Java sources and the project's data are in {out}.")
+    print(f"{out / ARCHIVE} has all sources in one file; their check sum is {check_sum}.")
     print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
     if left_out:
-        refused = " and ".join(f"{OPTIONS[one]} (option {one})" for one in left_out)
+        refused = " and ".join(f"{OPTIONS[option]} (option {option})" for option in left_out)
         print(f"They compile without the packages of these options, and refuse {refused}.")
     if not key:
         risk = "without a key, any program that reaches the cabinet's port can move the robot"
@@ -109,6 +117,22 @@ def install_cabinet(
             print(f"Store it for the cabinet: heptarm key set --target ADDRESS --key-file {file}")
     print(f"Continue with the steps in {out / 'INSTALL.md'}.")
     return 0
+
+
+def _seal(out: Path, files: list[str]) -> str:
+    """Write the check sum of the sources into them, and all of them into one file; returns the check sum."""
+    digest = hashlib.sha256()
+    for name in files:
+        digest.update(f"{name}\n".encode() + (out / "src" / name).read_bytes())
+    check_sum = digest.hexdigest()[:12]
+    settings = out / "src" / _SETTINGS
+    settings.write_text(
+        settings.read_text(encoding="utf-8").replace(_SUM, f'SOURCES = "{check_sum}"'), encoding="utf-8"
+    )
+    with zipfile.ZipFile(out / ARCHIVE, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in files:
+            archive.write(out / "src" / name, name)
+    return check_sum
 
 
 def _options(text: str) -> tuple[str, ...]:

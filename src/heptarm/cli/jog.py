@@ -12,12 +12,12 @@ from cyclopts import Parameter
 
 from heptarm.arm.arm import Arm
 from heptarm.cli.options import Access
-from heptarm.cli.output import confirm, emit
+from heptarm.cli.output import emit
 from heptarm.devices.device import DeviceInput, InputDevice
 from heptarm.devices.gamepad import gamepad
 from heptarm.devices.keyboard import HELP, keyboard
 from heptarm.devices.spacemouse import spacemouse
-from heptarm.errors import HeptarmError, NotReady
+from heptarm.errors import HeptarmError
 from heptarm.model.velocity import Elbow
 from heptarm.skills.teleoperation import RATE, SCALE, TURN_SCALE, teleoperate
 from heptarm.values.checks import within
@@ -66,8 +66,7 @@ def jog(
     """
     limit = None if seconds is None else within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
     with access.target.connect() as arm:
-        if not (arm.is_virtual or access.yes or confirm(f"Jog the real {arm.robot.title}?")):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        access.ask_first(arm, f"Jog the real {arm.robot.title}?")
         opened = _DEVICES[device]()
         try:
             if not access.as_json:

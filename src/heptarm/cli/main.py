@@ -58,13 +58,14 @@ CALIBRATIONS = {
     "eye": "calibrate_eye:eye",
     "board": "calibrate_eye:board",
 }
+BRIDGES = {"libiiwa": "bridge:libiiwa", "kst": "bridge:kst"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
 #: Groups that are commands themselves, and where they are.
 _APPS = {"sim": "sim:app"}
 _GROUPS = {
     **{"sim": SIMULATIONS, "move": MOVES, "plan": PLANS, "calibrate": CALIBRATIONS},
-    **{"key": KEYS, "targets": TARGETS, "rl": LEARNING},
+    **{"key": KEYS, "targets": TARGETS, "rl": LEARNING, "bridge": BRIDGES},
 }
 
 app = App(
@@ -80,7 +81,7 @@ def _summary(place: str) -> str:
     """First line of a command's docstring, read from its source."""
     module, function = place.split(":")
     tree = ast.parse(Path(__file__).parent.joinpath(*module.split(".")).with_suffix(".py").read_bytes())
-    (found,) = (one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == function)
+    (found,) = (node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == function)
     return (ast.get_docstring(found) or "").partition("\n")[0]
 
 
@@ -116,12 +117,16 @@ _calibrate = App(
 )
 _keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
 _targets = App(name="targets", help="List, save and remove robots that have a name.")
+_bridges = App(
+    name="bridge", help="Let programs of other projects, unchanged, control an arm through heptarm's cabinet."
+)
 _learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
 app.command(_add(_move, MOVES, listed=_words == ["move"]))
 app.command(_add(_plans, PLANS, listed=_words == ["plan"]))
 app.command(_add(_calibrate, CALIBRATIONS, listed=_words == ["calibrate"]))
 app.command(_add(_keys, KEYS, listed=_words == ["key"]))
 app.command(_add(_targets, TARGETS, listed=_words == ["targets"]))
+app.command(_add(_bridges, BRIDGES, listed=_words == ["bridge"]))
 app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))
 
 

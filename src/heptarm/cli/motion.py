@@ -22,10 +22,9 @@ from heptarm.cli.options import (
     Overwrite,
     Speed,
 )
-from heptarm.cli.output import confirm, emit, state_data
+from heptarm.cli.output import emit, state_data
 from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
-from heptarm.errors import NotReady
 from heptarm.record.recording import load
 from heptarm.values.checks import within
 from heptarm.values.files import refuse_existing
@@ -128,8 +127,7 @@ def _move(motion: Motion, options: MoveOptions) -> int:
             preview = arm.plan(motion, speed=options.speed)
             emit({"ok": True} | preview_data(preview)) if options.as_json else print(preview)
             return 0
-        if not (arm.is_virtual or options.yes or confirm(f"Move the real {title} at {percent} speed?")):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        options.ask_first(arm, f"Move the real {title} at {percent} speed?")
         with progress(arm):
             result = arm.move(motion, speed=options.speed)
         state = arm.wait_for_rest()
@@ -167,10 +165,7 @@ def servo(
     hertz = within(frequency, "frequency", 0.0, 5.0, above=True, unit="Hz")
     seconds = within(duration, "duration", 0.0, 86400.0, above=True, unit="s")
     with access.target.connect() as arm:
-        if not (
-            arm.is_virtual or access.yes or confirm(f"Swing A{index + 1} of the real {arm.robot.title}?")
-        ):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        access.ask_first(arm, f"Swing A{index + 1} of the real {arm.robot.title}?")
         direction, lag = np.eye(7)[index], 0.0
         with (
             progress(arm, seconds=seconds),
@@ -221,11 +216,9 @@ def teach(
     refuse_existing(out.with_suffix(".npz"), overwrite=overwrite, name="out")
     mode = compliance(free, frame="base") if free else None
     with access.target.connect() as arm:
-        asked = free and not (arm.is_virtual or access.yes)
-        if asked and not confirm(
-            f"The real {arm.robot.title} becomes compliant for {limit:g} s. Does a person hold it?"
-        ):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        if free:
+            question = f"The real {arm.robot.title} becomes compliant for {limit:g} s. Does a person hold it?"
+            access.ask_first(arm, question)
         if not access.as_json:
             how = "it is compliant now" if free else "hold the enabling switch of the hand guiding device"
             print(f"guide the arm: {how}")
@@ -284,8 +277,7 @@ def replay(
     """
     trajectory = _trajectory(file, arm_of, rate)
     with access.target.connect() as arm:
-        if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
-            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+        access.ask_first(arm, f"Move the real {arm.robot.title} along {file}?")
         with progress(arm, seconds=trajectory.duration / speed_scaling):
             done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
     if access.as_json:

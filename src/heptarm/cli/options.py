@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from heptarm.errors import CommandRejected
+from heptarm.cli.output import confirm
+from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.robot import ROBOTS, robot
 
 if TYPE_CHECKING:
@@ -209,6 +212,25 @@ class Access:
     yes: Yes = False
     target: CommandTarget = NO_TARGET
     as_json: Json = False
+
+    def ask_first(self, arm: Arm, question: str) -> None:
+        """Ask the person beside a real arm; nobody is asked about a virtual one, or after `--yes`.
+
+        Raises:
+            NotReady: the person does not agree.
+        """
+        if not (arm.is_virtual or self.yes or confirm(question)):
+            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+
+    def consent(self, arm: Arm) -> Callable[[object], bool]:
+        """What shows a plan, and asks a person before a real robot moves like that; it raises NotReady after a no."""
+
+        def ask(plan: object) -> bool:
+            print(plan, file=sys.stderr if self.as_json else sys.stdout, flush=True)
+            self.ask_first(arm, f"Move the real {arm.robot.title} like this?")
+            return True
+
+        return ask
 
 
 @Parameter(name="*")

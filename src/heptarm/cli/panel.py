@@ -87,8 +87,8 @@ def panel(
         return _play(play, options, as_json=as_json)
     with ExitStack() as stack:
         models: list[PanelArm] = []
-        for text, one in target.each():
-            arm = stack.enter_context(one.connect(control=False, state_rate=STATE_RATE))
+        for text, own in target.each():
+            arm = stack.enter_context(own.connect(control=False, state_rate=STATE_RATE))
             alone = replace(options, scene="", gripper="")  # these are the first arm's
             models.append(model_of(arm, text, alone if models else options))
         page = Panel(models, options)

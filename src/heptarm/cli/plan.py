@@ -12,11 +12,11 @@ from cyclopts import Parameter
 from heptarm.cli.options import NO_TARGET, CommandTarget, Degrees, FrameOfPose, Json, Overwrite, Speed
 from heptarm.cli.output import emit
 from heptarm.errors import ShapeError
+from heptarm.planning.constraints import constraint_from_text
 from heptarm.planning.search import TIMEOUT
 from heptarm.values.frames import BASE
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import Motion
-from heptarm.values.motion.planned_path import Upright
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose
 
@@ -138,12 +138,13 @@ def plan_to(
         int,
         Parameter(help="Joint positions that the search reaches after a path was found, for faster paths."),
     ] = 0,
-    upright: Annotated[
-        float | None,
+    keep: Annotated[
+        tuple[str, ...],
         Parameter(
-            help="The z axis of the tool frame is turned by at most so much on the path [rad], --deg [deg]."
+            help="Constraint along the path as in Python, such as \"Upright('z', within=0.3)\", OnPlane(...), "
+            "OnLine(...) or Workspace(...) [m], [rad]; may be repeated."
         ),
-    ] = None,
+    ] = (),
     options: PlanOptions = _OPTIONS,
 ) -> int:
     """Around the bodies of --scene and --box, to joint positions or a pose.
@@ -162,16 +163,16 @@ def plan_to(
         )
     angles = _angles(goal if len(goal) == 7 else goal[3:], options)
     to = np.array(angles) if len(goal) == 7 else Pose.xyz_abc(*goal[:3], *angles)
-    keep = None if upright is None else Upright("z", within=_angles((upright,), options)[0])
+    kept = [constraint_from_text(one) for one in keep]
     with options.target.connect(control=False) as arm:
         world = CollisionModel(arm.robot.name, scene=options.scene, boxes=options.box)
         path = arm.find_path(
-            to, avoid=world, keep=keep, speed=options.speed, timeout=timeout, improve=improve, seed=seed
+            to, avoid=world, keep=kept, speed=options.speed, timeout=timeout, improve=improve, seed=seed
         )
         preview = arm.plan(path, speed=options.speed)
     found = {
         "path": str(path),
-        "points": [one.q.tolist() for one in path.points],
+        "points": [point.q.tolist() for point in path.points],
         "clearance_m": None if path.clearance is None else path.clearance.distance,
         "states": path.stats.states,
         "seconds": path.stats.seconds,
@@ -219,11 +220,17 @@ def preview_data(preview: ProgramPreview) -> dict[str, Any]:
         "end_xyz": preview.end.xyz.tolist(),
         "end_quat": preview.end.quat.tolist(),
         "closest": {
-            name: {"axis": one.axis, "fraction": one.fraction, "t_s": one.t} for name, one in closest.items()
+            name: {"axis": place.axis, "fraction": place.fraction, "t_s": place.t}
+            for name, place in closest.items()
         },
         "checked": preview.is_checked,
         "collisions": [
-            {"first": one.clearance.first, "second": one.clearance.second, "t_s": one.t, "motion": one.motion}
-            for one in preview.collisions
+            {
+                "first": touch.clearance.first,
+                "second": touch.clearance.second,
+                "t_s": touch.t,
+                "motion": touch.motion,
+            }
+            for touch in preview.collisions
         ],
     }

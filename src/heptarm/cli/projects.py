@@ -102,7 +102,7 @@ def _rows(found: Survey, seconds: float) -> list[_Row]:
     rows = {name: _Row(name, _Outcome.COMPILES) for name in found.compiled}
     rows |= {name: _Row(name, _Outcome.FAILS, text) for name, text in found.failed}
     if seconds > 0.0:
-        rows |= {one.main: _tried(one, seconds) for one in found.applications}
+        rows |= {application.main: _tried(application, seconds) for application in found.applications}
     return [rows[name] for name in sorted(rows)]
 
 

@@ -193,7 +193,7 @@ def _record_fri(
 def _names(groups: object) -> set[str]:
     """Names of the flags that are set."""
     kind = type(groups)
-    return {one.name for one in kind if one & groups and one.name}  # type: ignore[attr-defined]
+    return {group.name for group in kind if group & groups and group.name}  # type: ignore[attr-defined]
 
 
 def convert(
@@ -210,7 +210,7 @@ def convert(
     files = convert_recording(run, out, overwrite=overwrite)
     count = len(run.pictures)
     if as_json:
-        found = {"files": [str(one) for one in files], "states": len(run), "pictures": count}
+        found = {"files": [str(file) for file in files], "states": len(run), "pictures": count}
         emit(found | {"complete": run.complete})
     elif not out.suffix:
         print(f"{count} pictures in {out}")

@@ -21,20 +21,24 @@ Name = Annotated[str, Parameter(help="Name of the target, such as lab1.")]
 def show(*, as_json: Json = False) -> int:
     """List the saved targets: address, key, tool, speed, and when each was last used."""
     found = saved_targets()
-    for one in found.values():
-        used = "never" if one.last_used is None else f"{datetime.fromtimestamp(one.last_used):%Y-%m-%d %H:%M}"
+    for target in found.values():
+        used = (
+            "never"
+            if target.last_used is None
+            else f"{datetime.fromtimestamp(target.last_used):%Y-%m-%d %H:%M}"
+        )
         if as_json:
             emit(
-                {"name": one.name, "address": one.address, "key": _key(one), "tool": one.tool}
-                | {"speed": one.speed, "flange": one.flange}
-                | {"last_used": None if one.last_used is None else used}
+                {"name": target.name, "address": target.address, "key": _key(target), "tool": target.tool}
+                | {"speed": target.speed, "flange": target.flange}
+                | {"last_used": None if target.last_used is None else used}
             )
             continue
-        more = [f"key: {_key(one) or 'none'}"]
-        more += [f"tool: {one.tool}"] if one.tool else []
-        more += [f"speed: {one.speed:g}"] if one.speed is not None else []
-        more += [f"flange: {one.flange}"] if one.flange else []
-        print(f"{one.name:12} {one.address:24} {', '.join(more)}; last used: {used}")
+        more = [f"key: {_key(target) or 'none'}"]
+        more += [f"tool: {target.tool}"] if target.tool else []
+        more += [f"speed: {target.speed:g}"] if target.speed is not None else []
+        more += [f"flange: {target.flange}"] if target.flange else []
+        print(f"{target.name:12} {target.address:24} {', '.join(more)}; last used: {used}")
     if not found and not as_json:
         print("no targets are saved; `heptarm targets add lab1 172.31.1.147` saves one")
     return 0

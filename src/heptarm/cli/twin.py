@@ -76,16 +76,17 @@ def twin(
                 "alike": found.is_alike,
                 "parts_s": None if isnan(found.parts) else found.parts,
                 "deviations": [
-                    asdict(one) | {"parts": None if one.is_inside else one.parts} for one in found.deviations
+                    asdict(deviation) | {"parts": None if deviation.is_inside else deviation.parts}
+                    for deviation in found.deviations
                 ],
                 "motions": [
                     {
-                        "id": one.recorded.id,
-                        "recorded": one.recorded.cause,
-                        "simulated": "" if one.simulated is None else one.simulated.cause,
-                        "refusal": one.refusal,
+                        "id": motion.recorded.id,
+                        "recorded": motion.recorded.cause,
+                        "simulated": "" if motion.simulated is None else motion.simulated.cause,
+                        "refusal": motion.refusal,
                     }
-                    for one in found.motions
+                    for motion in found.motions
                 ],
                 "notes": list(found.notes),
                 "files": {name: str(path) for name, path in files.items() if path is not None},

@@ -120,7 +120,7 @@ class Gamepad(Sealed):
     ) -> None:
         self.name = name
         self._source = source
-        self._ranges = {code: one for code, one in ranges.items() if one.low < one.high}
+        self._ranges = {code: axis for code, axis in ranges.items() if axis.low < axis.high}
         self._zone = within(dead_zone, "dead_zone", 0.0, 0.9)
         self._axes = np.zeros(6)
         self._held: set[str] = set()

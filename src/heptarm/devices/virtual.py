@@ -82,7 +82,7 @@ class RecordedDevice(Sealed):
         clock: Clock | None = None,
     ) -> None:
         self._times = [finite(time, "time", unit="s") for time, _ in inputs]
-        self._inputs = [instance(one, DeviceInput, "inputs") for _, one in inputs]
+        self._inputs = [instance(reading, DeviceInput, "inputs") for _, reading in inputs]
         if not self._times or sorted(self._times) != self._times:
             raise CommandRejected(
                 "inputs must be at least one, at ascending times",
@@ -144,13 +144,13 @@ class RecordingDevice(Sealed):
 
     def read(self) -> DeviceInput:
         """What the device reports now; raises as it does."""
-        one = self._device.read()
+        reading = self._device.read()
         now = self._clock.nanos()
         self._began = now if self._began is None else self._began
         if self._file is not None:
-            line = [(now - self._began) * 1e-9, one.twist.tolist(), sorted(one.buttons)]
+            line = [(now - self._began) * 1e-9, reading.twist.tolist(), sorted(reading.buttons)]
             self._file.write(json.dumps(line) + "\n")
-        return one
+        return reading
 
     def close(self) -> None:
         """Close the file and the device; calling it again has no effect."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
 from heptarm.values.checks import Array, Value
+from heptarm.values.fitted_arm import FittedArm
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, symmetric
 from heptarm.values.shape import ORIGIN
@@ -68,6 +69,7 @@ class TreeJoint(Value):
         effort: largest torque or force [Nm or N]; inf: none.
         damping: viscous [Nms/rad or Ns/m].
         armature: inertia of the drive about the axis [kg m² or kg].
+        friction: Coulomb friction [Nm or N].
     """
 
     name: str
@@ -80,6 +82,7 @@ class TreeJoint(Value):
     effort: float = inf
     damping: float = 0.0
     armature: float = 0.0
+    friction: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,13 +115,16 @@ class TreeBody(Value):
         return bool(self.parent) and self.mass == 0.0 and not self.shapes and self.joint is None
 
 
-def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBody, ...]:
+def tree_of(
+    robot: RobotModel, *, tool: Tool | None, scene: str, fitted: FittedArm | None = None
+) -> tuple[TreeBody, ...]:
     """The bodies of an arm, a tool and a scene, each behind the one that it is fixed to.
 
     Args:
         robot: the robot, with its media flange.
         tool: on the flange; None: none.
         scene: name of a ready scene, or a file (MJCF); empty: none.
+        fitted: whose friction and rotors the joints of the arm have; None: those of the simulator.
 
     Raises:
         CommandRejected: there is no such scene, or it has what no format but MuJoCo's knows; or a scene and the tool
@@ -143,12 +149,13 @@ def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBo
             hint="leave out the tool, or choose a scene without one",
         )
     bodies = [TreeBody(BASE, "", ORIGIN, shapes=tuple(_shapes(model, 0)))]
-    bodies += (_body(model, index, robot) for index in range(1, model.nbody))
+    found = [_body(model, index, robot) for index in range(1, model.nbody)]
+    bodies += found if fitted is None else _measured(found, fitted)
     site = model.site(FLANGE)
     last = _name(model, int(site.bodyid[0]))
     bodies.append(TreeBody(FLANGE, last, Pose.of(site.pos, np.roll(site.quat, -1))))
     bodies += _tool(tool) if tool is not None else []
-    names = [one.name for one in bodies]
+    names = [body.name for body in bodies]
     doubled = next((name for name in names if names.count(name) > 1), "")
     if doubled:
         raise CommandRejected(
@@ -158,6 +165,21 @@ def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBo
             hint="rename the tool or its frame",
         )
     return tuple(bodies)
+
+
+def _measured(bodies: Sequence[TreeBody], fitted: FittedArm) -> Iterator[TreeBody]:
+    """Bodies whose arm has the friction and the rotors that were identified, as far as they are known."""
+    known = {"damping": "viscous", "friction": "coulomb", "armature": "rotor"}
+    names = [f"A{axis + 1}" for axis in range(7)]
+    for body in bodies:
+        if body.joint is None or body.joint.name not in names:
+            yield body
+            continue
+        axis = names.index(body.joint.name)
+        values: dict[str, Any] = {
+            one: float(fitted[name].value[axis]) for one, name in known.items() if name in fitted
+        }
+        yield replace(body, joint=replace(body.joint, **values))
 
 
 def poses_in_base(bodies: Sequence[TreeBody]) -> dict[str, Pose]:
@@ -178,7 +200,7 @@ def _name(model: mujoco.MjModel, body: int) -> str:
 def _body(model: mujoco.MjModel, index: int, robot: RobotModel) -> TreeBody:
     turn = Pose.of((0.0, 0.0, 0.0), np.roll(model.body_iquat[index], -1)).rotation
     name = _name(model, index)
-    joints = [int(model.body_jntadr[index]) + one for one in range(int(model.body_jntnum[index]))]
+    joints = [int(model.body_jntadr[index]) + offset for offset in range(int(model.body_jntnum[index]))]
     if len(joints) > 1:
         raise CommandRejected(
             f"the body {name!r} of the scene has {len(joints)} joints, and other formats know one for each body",
@@ -221,6 +243,7 @@ def _joint(model: mujoco.MjModel, index: int, robot: RobotModel) -> TreeJoint:
         high,
         damping=float(model.dof_damping[dof]),
         armature=float(model.dof_armature[dof]),
+        friction=float(model.dof_frictionloss[dof]),
     )
     if index >= len(robot.dq_max):  # the arm's joints come first
         return made
@@ -272,10 +295,10 @@ def _tool(tool: Tool) -> list[TreeBody]:
     """A tool as a body on the flange, and its frames."""
     colour = np.array([0.45, 0.47, 0.5, 1.0])
     shapes = []
-    for one in tool.shapes:
-        radius, length, _ = one.size.tolist()
-        size = 0.5 * one.size if one.kind == "box" else np.array([radius, 0.5 * length, 0.0])
-        shapes.append(TreeShape(one.kind, size, one.pose, colour, collides=True, is_drawn=True))
+    for shape in tool.shapes:
+        radius, length, _ = shape.size.tolist()
+        size = 0.5 * shape.size if shape.kind == "box" else np.array([radius, 0.5 * length, 0.0])
+        shapes.append(TreeShape(shape.kind, size, shape.pose, colour, collides=True, is_drawn=True))
     name = tool.name.replace("/", "_").replace(" ", "_")
     body = TreeBody(name, FLANGE, ORIGIN, tool.mass, tool.com, symmetric(tool.inertia), None, tuple(shapes))
     frames = [TreeBody(f"{name}_{frame}".replace(" ", "_"), name, pose) for frame, pose in tool.frames]

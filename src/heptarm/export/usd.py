@@ -126,7 +126,7 @@ def _shape(name: str, shape: TreeShape) -> list[str]:
         inner += [
             f"int[] faceVertexCounts = [{counts}]",
             f"int[] faceVertexIndices = [{', '.join(map(str, shape.faces.ravel().tolist()))}]",
-            f"point3f[] points = [{', '.join(_vector(one) for one in shape.vertices)}]",
+            f"point3f[] points = [{', '.join(_vector(vertex) for vertex in shape.vertices)}]",
             'uniform token subdivisionScheme = "none"',
         ]
     else:

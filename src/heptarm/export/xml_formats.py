@@ -42,9 +42,9 @@ def _text(root: ET.Element) -> str:
 
 
 def _add(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
-    one = ET.SubElement(parent, tag, attributes)
-    one.text = text or None
-    return one
+    element = ET.SubElement(parent, tag, attributes)
+    element.text = text or None
+    return element
 
 
 def _pieces(shape: TreeShape) -> Iterator[TreeShape]:
@@ -57,6 +57,11 @@ def _pieces(shape: TreeShape) -> Iterator[TreeShape]:
     for kind, z in parts:
         pose = shape.pose @ Pose.of((0.0, 0.0, z))
         yield TreeShape(kind, shape.size, pose, shape.colour, shape.collides, shape.is_drawn)
+
+
+def _joint_type(joint: TreeJoint) -> str:
+    """What URDF and SDF call a joint with one axis."""
+    return "prismatic" if joint.kind == "slide" else "revolute" if isfinite(joint.low) else "continuous"
 
 
 def _purposes(shape: TreeShape) -> list[str]:
@@ -130,14 +135,13 @@ def _urdf_joint(root: ET.Element, body: TreeBody) -> None:
         child, pose = f"{body.name}_axis", body.pose @ Pose.of(joint.anchor)
         _add(root, "link", name=child)
         _urdf_link(root, f"{body.name}_joint", "fixed", child, body.name, Pose.of(-joint.anchor))
-    is_limited = isfinite(joint.low)
-    kind = "prismatic" if joint.kind == "slide" else "revolute" if is_limited else "continuous"
+    kind = _joint_type(joint)
     made = _urdf_link(root, joint.name, kind, body.parent, child, pose)
     _add(made, "axis", xyz=numbers(joint.axis))
-    limits = {"lower": joint.low, "upper": joint.high} if is_limited or kind == "prismatic" else {}
+    limits = {"lower": joint.low, "upper": joint.high} if kind != "continuous" else {}
     limits |= {"velocity": joint.speed, "effort": joint.effort}
     _add(made, "limit", **{key: number(np.clip(value, -_MUCH, _MUCH)) for key, value in limits.items()})
-    _add(made, "dynamics", damping=number(joint.damping))
+    _add(made, "dynamics", damping=number(joint.damping), friction=number(joint.friction))
 
 
 def _urdf_link(root: ET.Element, name: str, kind: str, parent: str, child: str, pose: Pose) -> ET.Element:
@@ -176,11 +180,11 @@ def sdf(name: str, bodies: Sequence[TreeBody], meshes: str) -> str:
                 _add(inertia, key, value)
         for index, shape in enumerate(body.shapes):
             for purpose in _purposes(shape):
-                one = _add(link, purpose, name=f"{purpose}_{index}")
-                _sdf_pose(one, shape.pose)
-                _sdf_geometry(_add(one, "geometry"), shape, meshes)
+                element = _add(link, purpose, name=f"{purpose}_{index}")
+                _sdf_pose(element, shape.pose)
+                _sdf_geometry(_add(element, "geometry"), shape, meshes)
                 if purpose == "visual":
-                    material = _add(one, "material")
+                    material = _add(element, "material")
                     _add(material, "ambient", numbers(shape.colour))
                     _add(material, "diffuse", numbers(shape.colour))
         _sdf_joint(model, body)
@@ -201,10 +205,10 @@ def _sdf_geometry(geometry: ET.Element, shape: TreeShape, meshes: str) -> None:
     elif shape.kind == "ellipsoid":
         _add(_add(geometry, "ellipsoid"), "radii", numbers(shape.size))
     else:
-        one = _add(geometry, shape.kind)
-        _add(one, "radius", number(radius))
+        element = _add(geometry, shape.kind)
+        _add(element, "radius", number(radius))
         if shape.kind != "sphere":
-            _add(one, "length", number(2.0 * half))
+            _add(element, "length", number(2.0 * half))
 
 
 def _sdf_joint(model: ET.Element, body: TreeBody) -> None:
@@ -216,8 +220,7 @@ def _sdf_joint(model: ET.Element, body: TreeBody) -> None:
         _add(fixed, "parent", body.parent or "world")
         _add(fixed, "child", body.name)
         return
-    kind = "prismatic" if joint.kind == "slide" else "revolute" if isfinite(joint.low) else "continuous"
-    made = _add(model, "joint", name=joint.name, type=kind)
+    made = _add(model, "joint", name=joint.name, type=_joint_type(joint))
     if joint.anchor.any():
         _sdf_pose(made, Pose.of(joint.anchor))
     _add(made, "parent", body.parent)
@@ -230,7 +233,9 @@ def _sdf_joint(model: ET.Element, body: TreeBody) -> None:
     ):  # fmt: skip
         if isfinite(value):
             _add(limit, key, number(value))
-    _add(_add(axis, "dynamics"), "damping", number(joint.damping))
+    dynamics = _add(axis, "dynamics")
+    _add(dynamics, "damping", number(joint.damping))
+    _add(dynamics, "friction", number(joint.friction))
 
 
 # ----------------------------------------------------------------------------------------------------- MJCF
@@ -255,17 +260,19 @@ def mjcf(name: str, bodies: Sequence[TreeBody], meshes: str) -> str:
     made = {BASE: _add(root, "worldbody")}
     for body in bodies:
         if body.parent:
-            made[body.name] = one = _add(made[body.parent], "body", name=body.name, **_mjcf_place(body.pose))
+            made[body.name] = element = _add(
+                made[body.parent], "body", name=body.name, **_mjcf_place(body.pose)
+            )
             if body.mass > 0.0:
                 entries = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
                 _add(
-                    one,
+                    element,
                     "inertial",
                     pos=numbers(body.com),
                     mass=number(body.mass),
                     fullinertia=numbers(entries),
                 )
-            _mjcf_joint(one, body.joint)
+            _mjcf_joint(element, body.joint)
         for shape in body.shapes:
             _mjcf_shape(made[body.name], shape)
     return _text(root)
@@ -286,7 +293,8 @@ def _mjcf_joint(body: ET.Element, joint: TreeJoint | None) -> None:
         limits["actuatorfrcrange"] = f"{number(-joint.effort)} {number(joint.effort)}"
     _add(
         body, "joint", name=joint.name, type=joint.kind, axis=numbers(joint.axis), pos=numbers(joint.anchor),
-        damping=number(joint.damping), armature=number(joint.armature), **limits,
+        damping=number(joint.damping), armature=number(joint.armature), frictionloss=number(joint.friction),
+        **limits,
     )  # fmt: skip
 
 

@@ -49,20 +49,20 @@ def private_folder(place: Path) -> Path:
         OSError: it cannot be made; PermissionError: one of them is another user's, or anybody may write to it.
     """
     known = (settings_folder(), state_folder(), runtime_folder())
-    root = next((one for one in known if one == place or one in place.parents), place)
+    root = next((folder for folder in known if folder == place or folder in place.parents), place)
     root.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     between = [parent for parent in place.parents if root in parent.parents or parent == root]
-    for one in (*reversed(between), place):
-        one.mkdir(mode=0o700, exist_ok=True)
-        if is_private(one):
+    for folder in (*reversed(between), place):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        if is_private(folder):
             continue
-        if not _is_ours(one):
+        if not _is_ours(folder):
             text = "its folder is another user's: remove it, or make it yours with chown"
-            raise PermissionError(errno.EACCES, text, str(one))
-        if one.stat().st_mode & stat.S_IWOTH:
+            raise PermissionError(errno.EACCES, text, str(folder))
+        if folder.stat().st_mode & stat.S_IWOTH:
             text = "anybody can write to its folder: look what is in it, then chmod 700"
-            raise PermissionError(errno.EACCES, text, str(one))
-        one.chmod(stat.S_IMODE(one.stat().st_mode) & ~_OTHERS)
+            raise PermissionError(errno.EACCES, text, str(folder))
+        folder.chmod(stat.S_IMODE(folder.stat().st_mode) & ~_OTHERS)
     return place
 
 

@@ -74,7 +74,7 @@ class PlanBox:
         newest: PlanOutline | None = None
         with contextlib.suppress(OSError):
             _put(self._folder / _CARD, self._robots)
-            for file in sorted(self._folder.glob(f"*{_SUFFIX}"), key=lambda one: one.stat().st_mtime_ns):
+            for file in sorted(self._folder.glob(f"*{_SUFFIX}"), key=lambda path: path.stat().st_mtime_ns):
                 newest = _read(file) or newest
                 file.unlink()
         return newest
@@ -145,5 +145,5 @@ def _read(file: Path) -> PlanOutline | None:
         return None
     count = len(plan.t)
     shapes = plan.t.shape == (count,) and plan.q.shape == (count, 7) and plan.path.shape == (count, 3)
-    finite = all(np.isfinite(one).all() for one in (plan.t, plan.q, plan.path, plan.touches))
+    finite = all(np.isfinite(array).all() for array in (plan.t, plan.q, plan.path, plan.touches))
     return plan if count and shapes and finite else None

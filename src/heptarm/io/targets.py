@@ -14,6 +14,11 @@ The file is heptarm/targets.toml in the folder of the user's settings, one table
     com = [0.0, 0.0, 0.06]
     frames.tcp = [0.0, 0.0, 0.15, 0.0, 0.0, 0.0, 1.0]
 
+    [lab1.cameras.wrist]         # a camera that was measured
+    frame = "flange"
+    pose = [0.06, 0.0, 0.04, 0.0, 0.0, 0.0, 1.0]
+    matrix = [[600.0, 0.0, 320.0], [0.0, 600.0, 240.0], [0.0, 0.0, 1.0]]
+
 When a target was last used is the time of a file of its name in the folder beside it.
 """
 
@@ -30,6 +35,7 @@ from typing import Any
 
 from heptarm.errors import CommandRejected
 from heptarm.io.folders import private_folder, settings_folder
+from heptarm.values.camera import MountedCamera
 from heptarm.values.checks import shown
 from heptarm.values.files import read_text
 from heptarm.values.pose import Pose
@@ -51,6 +57,9 @@ _KEYS = ("address", "key_file", "tool", "speed", "flange")
 #: The table of tools of a target, and what each of them may have: no shapes, which only a program knows.
 _TOOLS = "tools"
 _TOOL_KEYS = ("mass", "com", "inertia", "frames")
+#: The table of cameras of a target, and what each of them may have.
+_CAMERAS = "cameras"
+_CAMERA_KEYS = ("frame", "pose", "matrix", "distortion")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +74,7 @@ class SavedTarget:
         speed: ceiling of the speed of all motions, (0, 1]; None: 0.25 of a real robot, 1 of a simulator.
         flange: media flange of the robot: "plain", "touch", or its height [m]; "": not stated.
         tools: tools that arms of this target know by name.
+        cameras: cameras that were measured.
     """
 
     name: str
@@ -74,6 +84,7 @@ class SavedTarget:
     speed: float | None = None
     flange: str = ""
     tools: tuple[Tool, ...] = ()
+    cameras: tuple[MountedCamera, ...] = ()
 
     @property
     def last_used(self) -> float | None:
@@ -135,14 +146,15 @@ def _read(name: str, table: Any) -> SavedTarget:
             parameter=name,
             hint='write address = "172.31.1.147" below its name',
         )
-    _refuse_unknown(table, (*_KEYS, _TOOLS), where, name)
+    _refuse_unknown(table, (*_KEYS, _TOOLS, _CAMERAS), where, name)
     values = {key: table[key] for key in _KEYS if key in table}
-    tools = table.get(_TOOLS, {})
-    if not isinstance(tools, dict):
-        raise CommandRejected(
-            f"{where}: tools must be tables", parameter=name, hint=f"write [{name}.tools.NAME]"
-        )
-    values[_TOOLS] = tuple(_read_tool(one, content, where) for one, content in tools.items())
+    for kind, read in ((_TOOLS, _read_tool), (_CAMERAS, _read_camera)):
+        entries = table.get(kind, {})
+        if not isinstance(entries, dict):
+            raise CommandRejected(
+                f"{where}: {kind} must be tables", parameter=name, hint=f"write [{name}.{kind}.NAME]"
+            )
+        values[kind] = tuple(read(one, content, where) for one, content in entries.items())
     if isinstance(values.get("flange"), float):  # a height may be a number
         values["flange"] = f"{values['flange']:g}"
     return check_target(SavedTarget(name, **values), where)
@@ -171,6 +183,23 @@ def _read_tool(name: str, table: Any, where: str) -> Tool:
     except (CommandRejected, AttributeError, TypeError) as error:
         raise CommandRejected(
             f"{where}: {error}", parameter=name, hint="a frame is x y z qx qy qz qw, in metres"
+        ) from None
+
+
+def _read_camera(name: str, table: Any, where: str) -> MountedCamera:
+    """A camera of an entry of the file."""
+    where = f"camera {name} of {where}"
+    if not isinstance(table, dict):
+        raise CommandRejected(f"{where} must be a table", parameter=name)
+    _refuse_unknown(table, _CAMERA_KEYS, where, name)
+    try:
+        pose = Pose.of(table["pose"][:3], table["pose"][3:])
+        return MountedCamera(name, **{**table, "pose": pose})
+    except (CommandRejected, KeyError, TypeError) as error:
+        raise CommandRejected(
+            f"{where}: {error}",
+            parameter=name,
+            hint="it has frame, pose (x y z qx qy qz qw, in metres) and matrix",
         ) from None
 
 
@@ -232,8 +261,10 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
             raise CommandRejected(
                 f"there is a target {target.name}", parameter="name", hint="replace it with --replace"
             )
-        kept = saved_targets()[target.name].tools  # measured ones would be lost otherwise
-        target = dataclasses.replace(target, tools=target.tools or kept)
+        kept = saved_targets()[target.name]  # what was measured would be lost otherwise
+        target = dataclasses.replace(
+            target, tools=target.tools or kept.tools, cameras=target.cameras or kept.cameras
+        )
         remove_target(target.name)
     lines = [f"[{target.name}]", f"address = {_text(target.address)}"]
     lines += [
@@ -245,6 +276,8 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
         lines.append(f"speed = {float(target.speed)!r}")
     for tool in target.tools:
         lines += ["", *_tool_lines(target.name, tool)]
+    for camera in target.cameras:
+        lines += ["", *_camera_lines(target.name, camera)]
     _write(_joined(_content(), lines))
 
 
@@ -256,25 +289,49 @@ def save_tool(target: str, tool: Tool) -> None:
     Raises:
         CommandRejected: there is no such target, or the file cannot be changed.
     """
-    known = saved_targets()
-    if target not in known:
+    _save(target, _TOOLS, tool.name, _tool_lines(target, tool))
+
+
+def save_camera(target: str, camera: MountedCamera) -> None:
+    """Save a camera with a saved target, in place of one of its name; what else is in the file stays as it is.
+
+    Raises:
+        CommandRejected: there is no such target, or the file cannot be changed.
+    """
+    _save(target, _CAMERAS, camera.name, _camera_lines(target, camera))
+
+
+def _save(target: str, kind: str, name: str, lines: list[str]) -> None:
+    """Save a table of tools or cameras of a target.
+
+    Raises:
+        CommandRejected: there is no such target, or the file cannot be changed.
+    """
+    if target not in saved_targets():
         raise CommandRejected(
             f"there is no target {target}",
             parameter="target",
             value=target,
             hint="save it first: heptarm targets add NAME ADDRESS",
         )
-    text = _joined(_without(target, tool.name), _tool_lines(target, tool))
+    text = _joined(_without(target, kind, name), lines)
     try:
         tomllib.loads(text)
     except ValueError:  # such as one that a person has written as an inline table
         raise CommandRejected(
-            f"the tool {tool.name} of the target {target} in {targets_file()} cannot be replaced: it has no table of "
-            "its own",
-            parameter="tool",
-            hint=f"remove it with an editor, or write it as [{target}.{_TOOLS}.{tool.name}]",
+            f"{kind}.{name} of the target {target} in {targets_file()} cannot be replaced: it has no table of its own",
+            parameter=kind.removesuffix("s"),
+            hint=f"remove it with an editor, or write it as [{target}.{kind}.{name}]",
         ) from None
     _write(text)
+
+
+def _camera_lines(target: str, camera: MountedCamera) -> list[str]:
+    """A camera as lines of the file."""
+    table = ".".join(map(_text, (target, _CAMERAS, camera.name)))
+    numbers = {"pose": camera.pose.array, "matrix": camera.matrix, "distortion": camera.distortion}
+    rows = (f"{key} = {value.tolist()}" for key, value in numbers.items())
+    return [f"[{table}]", f"frame = {_text(camera.frame)}", *rows]
 
 
 def _tool_lines(target: str, tool: Tool) -> list[str]:
@@ -290,13 +347,13 @@ def _joined(text: str, lines: list[str]) -> str:
     return (f"{before}\n\n" if before else "") + "\n".join(lines) + "\n"
 
 
-def _without(target: str, tool: str | None = None) -> str:
-    """The text of the file without the tables of a target, or without that of one of its tools."""
+def _without(target: str, *entry: str) -> str:
+    """The text of the file without the tables of a target, or without one of them: "tools" or "cameras", and a name."""
     kept, inside = [], False
     for line in _content().splitlines():
         if line.lstrip().startswith("["):
             path = _path(line)
-            inside = path[:1] == [target] if tool is None else path[:3] == [target, _TOOLS, tool]
+            inside = path[: 1 + len(entry)] == [target, *entry]
         if not inside:
             kept.append(line)
     return "\n".join(kept).strip("\n") + "\n" if any(kept) else ""

@@ -1,4 +1,4 @@
-"""TCP transport to a cabinet, listener for the cabinet's side, and warm-up of the send path."""
+"""TCP transport to a cabinet, and listener for the cabinet's side."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ SEND_TIMEOUT = 2.0
 #: A flag of recv(2).
 MSG_DONTWAIT: int = getattr(socket, "MSG_DONTWAIT", 0)  # without it, the patience bounds the wait
 _NO_DATA = (errno.EAGAIN, errno.EWOULDBLOCK, errno.ETIMEDOUT)
-_WARM_UP_BYTES = 4096
 
 
 def connect(host: str, port: int, *, timeout: float = 5.0) -> TcpTransport:
@@ -172,39 +171,6 @@ def listening(*, host: str = "127.0.0.1", port: int = 0) -> Iterator[TcpListener
         yield listener
     finally:
         listener.close()
-
-
-class WarmUpConnection:
-    """TCP connection from this process to itself, which keeps the caches of the send path warm.
-
-    Where the system allows no such connection, nothing is sent.
-    """
-
-    __slots__ = ("_far", "_near")
-
-    def __init__(self) -> None:
-        self._near: socket.socket | None = None
-        self._far: socket.socket | None = None
-        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", 0)) as server:
-            self._near = socket.create_connection(server.getsockname())
-            self._near.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._near.setblocking(False)
-            self._far = server.accept()[0]
-            self._far.setblocking(False)
-
-    def send(self, data: bytes) -> None:
-        """Send data and receive it again."""
-        if self._near is None or self._far is None:
-            return
-        with contextlib.suppress(OSError):
-            self._near.send(data)
-            self._far.recv(_WARM_UP_BYTES)
-
-    def close(self) -> None:
-        """Close the connection. Closing twice is allowed."""
-        for end in (self._near, self._far):
-            if end is not None:
-                end.close()
 
 
 def _interval(seconds: float) -> bytes | int:

@@ -21,6 +21,7 @@ from heptarm.model.batch import (
     solve_batch,
 )
 from heptarm.model.dynamics import (
+    centrifugal_matrix,
     coriolis,
     coriolis_matrix,
     forward_dynamics,
@@ -34,6 +35,7 @@ from heptarm.model.kinematics import forward, jacobian, jacobian_derivative, man
 __all__ = [
     "RedundancyBatch",
     "arm_angle",
+    "centrifugal_matrix",
     "coriolis",
     "coriolis_matrix",
     "forward",

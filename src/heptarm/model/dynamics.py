@@ -98,6 +98,20 @@ def coriolis_matrix(
     return values_of(found).reshape(7, 7)
 
 
+def centrifugal_matrix(robot: RobotModel, q: npt.ArrayLike, *, load: Body | None = None) -> Array:
+    """Matrix B(q) of the centrifugal torques B dq²: column i has the torques of joint i turning alone at 1 rad/s.
+
+    Args:
+        robot: the robot.
+        q: joint positions, shape (7,) [rad].
+        load: on the flange.
+
+    Returns:
+        Shape (7, 7) [Nm s²/rad²].
+    """
+    return np.column_stack([coriolis(robot, q, alone, load=load) for alone in np.eye(7)])
+
+
 def coriolis(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike, *, load: Body | None = None) -> Array:
     """Coriolis and centrifugal torques C(q, dq) dq, shape (7,) [Nm]; arguments as for `coriolis_matrix`."""
     return _torques(robot, q, _joints(dq, "dq"), _STILL, _WEIGHTLESS, load)

@@ -286,7 +286,7 @@ def blockage(robot: RobotModel, q: Array, twist: Array) -> Slowdown:
     dq = _damped(j, twist)[0]
     achieved = float(np.clip((j @ dq) @ twist / max(float(twist @ twist), _TINY**2), 0.0, 1.0))
     singular = FREE if achieved > 0.995 else Slowdown("singularity", achieved)
-    return min((singular, *path.slowdowns(dq)), key=lambda one: one.factor)
+    return min((singular, *path.slowdowns(dq)), key=lambda slowdown: slowdown.factor)
 
 
 def limited_twist(twist: Array, speed: float, turn_speed: float) -> Array:
@@ -444,7 +444,7 @@ class VelocityPath:
         Returns:
             What slows them down most.
         """
-        least = min((FREE, *held, *self.slowdowns(dq)), key=lambda one: one.factor)
+        least = min((FREE, *held, *self.slowdowns(dq)), key=lambda slowdown: slowdown.factor)
         change = least.factor * dq - self.dq
         excess = float(np.max(np.abs(change) / (self._acceleration * max(dt, _TINY))))
         new = self.dq + change / max(excess, 1.0)

@@ -90,12 +90,12 @@ class DrawnWorld:
         self._carried_handles = [
             self._scene.add_mesh_simple(
                 f"{self._root}/flange/carried/{number}",
-                *solid(int(GEOMS[one.kind]), mujoco_size(one.kind, one.size)),
+                *solid(int(GEOMS[shape.kind]), mujoco_size(shape.kind, shape.size)),
                 color=_TOOL,
                 position=pose.xyz,
                 wxyz=wxyz(pose),
             )
-            for number, (one, pose) in enumerate(shapes)
+            for number, (shape, pose) in enumerate(shapes)
         ]
 
     def show(self, q: Array) -> None:
@@ -193,9 +193,9 @@ class DrawnGhost:
             mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
             handle.position, handle.wxyz = self._data.geom_xpos[index].copy(), quat.copy()
 
-    def _translucent(self, one: DrawnShape) -> Any:
-        node = f"{self._root}/{one.index}"
-        return self._scene.add_mesh_simple(node, one.vertices, one.faces, color=_GHOST, opacity=0.35)
+    def _translucent(self, shape: DrawnShape) -> Any:
+        node = f"{self._root}/{shape.index}"
+        return self._scene.add_mesh_simple(node, shape.vertices, shape.faces, color=_GHOST, opacity=0.35)
 
     def _draw_path(self, plan: PlanOutline | None) -> None:
         for handle in self._lines:

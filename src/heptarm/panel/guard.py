@@ -71,10 +71,10 @@ def free_port(host: str, port: int) -> int:
     """
     integer(port, "port", 0, LAST_PORT)
     check_printable(host, "host")
-    for one in range(port, LAST_PORT + 1):
+    for candidate in range(port, LAST_PORT + 1):
         try:
-            with socket.create_server((host, one), family=_family(host)):
-                return one if port else 0
+            with socket.create_server((host, candidate), family=_family(host)):
+                return candidate if port else 0
         except OSError as error:
             if remedy := shortage(error):
                 raise CommandRejected("the panel has no socket to listen on", hint=remedy) from error

@@ -21,11 +21,12 @@ from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionEr
 from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
+from heptarm.panel.wizard import Wizard, WizardSettings
+from heptarm.planning.search import Keep
 from heptarm.sim.collision import CollisionModel
 from heptarm.values.checks import Array, Value, within
 from heptarm.values.io import SignalValue
 from heptarm.values.motion.planned_path import Path as PlannedPath
-from heptarm.values.motion.planned_path import PathConstraint
 from heptarm.values.pose import Pose
 from heptarm.values.state import GROUP_NAMES, Safety, State
 
@@ -133,8 +134,10 @@ class PanelArm:
         folder: where recordings go.
         gripper: that its buttons open and close; None: there is none.
         scene: bodies around which it plans paths, as of `heptarm.CollisionModel`; empty: none.
+        target: what the arm is connected to; a saved one gets what the wizard measures.
 
     Attributes:
+        wizard: measures tool, load and camera.
         plan: that a ghost of the arm shows; None: there is none.
     """
 
@@ -148,6 +151,7 @@ class PanelArm:
         folder: Path = Path(),
         gripper: Gripper | None = None,
         scene: str = "",
+        target: str = "",
     ) -> None:
         self.arm = arm
         self._scene = scene
@@ -155,6 +159,7 @@ class PanelArm:
         self._world: CollisionModel | None = None
         self._found: tuple[PlannedPath, float] | None = None
         self.gripper = gripper
+        self.wizard = Wizard(arm, target, show=self.show_plan, report=self.report)
         self.plan: PlanOutline | None = None
         self._plan_since = 0.0
         self._gripping = threading.Lock()
@@ -227,7 +232,9 @@ class PanelArm:
         before, self._stops = self._stops, safety.stops
         new = [] if before is None else [reason for reason in safety.stops if reason not in before]
         if new:
-            remedies = [one.remedy for one in self._reasons(safety) if one.what in map(str.capitalize, new)]
+            remedies = [
+                reason.remedy for reason in self._reasons(safety) if reason.what in map(str.capitalize, new)
+            ]
             self._last_stop = Advice(
                 ", ".join(new).capitalize(), remedies[0] if remedies else "", "warning", time.time()
             )
@@ -418,7 +425,7 @@ class PanelArm:
         *,
         places: Mapping[str, Pose],
         speed: float = 0.1,
-        keep: PathConstraint | None = None,
+        keep: Keep = (),
     ) -> None:
         """Find a path to a pose of the motion frame, around the bodies of the scene, and show it; nothing moves.
 
@@ -426,7 +433,7 @@ class PanelArm:
             goal: in the base.
             places: where free bodies of the scene are in the base, by name.
             speed: fraction of the full speed, (0, 1].
-            keep: constraint along the path; None: none.
+            keep: constraints along the path.
 
         Raises:
             NoPath: none was found; the text has the bodies in the way.
@@ -470,6 +477,11 @@ class PanelArm:
         for name, pose in places.items():
             self._world.place(name, pose)
         return self._world
+
+    def measure(self, kind: str, settings: WizardSettings) -> None:
+        """Begin to measure tool, load or camera; see `Wizard.begin`."""
+        self._check_allowed()
+        self.wizard.begin(kind, settings)
 
     # ----------------------------------------------------------------------------------- gripper
 
@@ -635,6 +647,7 @@ class PanelArm:
 
     def close(self) -> None:
         """End jogging and recording; the arm itself stays open."""
+        self.wizard.close()
         self._jogger.close()
         self._end_recording()
 
@@ -642,5 +655,5 @@ class PanelArm:
 def groups_for(offered: object) -> tuple[str, ...]:
     """The groups of a state that the panel subscribes to: all that a cabinet offers."""
     kind = type(offered)
-    names = {one.name for one in kind if one & offered}  # type: ignore[attr-defined]
+    names = {group.name for group in kind if group & offered}  # type: ignore[attr-defined]
     return tuple(name for name in GROUP_NAMES if name.upper() in names)

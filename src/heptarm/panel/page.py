@@ -13,13 +13,18 @@ from typing import Any
 
 import numpy as np
 
+from heptarm import calibration
+from heptarm.calibration.board import KINDS as BOARDS
 from heptarm.errors import HeptarmError
 from heptarm.panel import texts
 from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import HISTORY, PanelArm, Readout
+from heptarm.panel.wizard import KINDS, WizardSettings
+from heptarm.planning.constraints import constraint_from_text
+from heptarm.values.camera import FRAMES
 from heptarm.values.frames import BASE, FLANGE, TOOL
-from heptarm.values.motion.planned_path import Upright
+from heptarm.values.motion.planned_path import OnPlane, PathConstraint, Upright
 from heptarm.values.pose import Pose
 
 #: How often a held button asks again [Hz].
@@ -110,6 +115,8 @@ class ArmPage:
                 self._make_program()
             with tabs.add_tab("IO, tools"):
                 self._make_signals()
+            with tabs.add_tab("Calibrate"):
+                self._make_wizard()
             if model.has_operator:
                 with tabs.add_tab("Operator"):
                     self._make_operator()
@@ -157,6 +164,7 @@ class ArmPage:
         if not model.may_control:
             return
         self._name_buttons(readout)
+        self._write_wizard()
         _put(self._list, texts.program(model.points, self._chosen.value, readout.running))
         for name, handle in self._outputs.items():
             if name in values:
@@ -302,6 +310,12 @@ class ArmPage:
         self._upright = self._gui.add_checkbox(
             "Keep the tool upright", initial_value=False, visible=False, hint="on the path around bodies"
         )
+        self._level = self._gui.add_checkbox(
+            "Keep its height", initial_value=False, visible=False, hint="likewise"
+        )
+        self._also = self._gui.add_text(
+            "Also keep", "", visible=False, hint="likewise, as in Python: OnLine((0.5, 0, 0.4), (0, 1, 0))"
+        )
         self._drive = self._gui.add_button("Drive the path", color="orange", visible=False)
         self._drive.on_click(self._runner(lambda: self.model.drive(places=self._world.places)))
         self._follows.visible = False
@@ -341,13 +355,19 @@ class ArmPage:
         tcp = self.model.poll().tcp
         if tcp is not None:
             self._gizmo.position, self._gizmo.wxyz = tcp.xyz, wxyz(tcp)
-        for one in (self._gizmo, self._go, self._follows, self._plan_path, self._upright):
-            one.visible = shown
+        paths = (self._plan_path, self._upright, self._level, self._also)
+        for control in (self._gizmo, self._go, self._follows, *paths):
+            control.visible = shown
         self._world.name_bodies(visible=shown)
         self.model.goal = None
 
     def _find_path(self) -> None:
-        keep = Upright("z") if self._upright.value else None
+        keep: list[PathConstraint] = [Upright("z")] if self._upright.value else []
+        tcp = self.model.poll().tcp
+        if self._level.value and tcp is not None:
+            keep.append(OnPlane(tcp.xyz))
+        if self._also.value.strip():
+            keep.append(constraint_from_text(self._also.value, "Also keep"))
         self.model.plan_to(self._gizmo_pose(), places=self._world.places, speed=self._fraction(), keep=keep)
 
     async def _on_gizmo(self, event: Any) -> None:
@@ -443,7 +463,7 @@ class ArmPage:
             "Attach", lambda: model.attach_tool("" if self._tool.value == _NONE else self._tool.value)
         )
         self._inputs = gui.add_html("")
-        outputs = [one for one in arm.io.signals.values() if one.is_output][: texts.MOST_SIGNALS]
+        outputs = [signal for signal in arm.io.signals.values() if signal.is_output][: texts.MOST_SIGNALS]
         for signal in outputs:
             if signal.kind == "boolean":
                 handle = gui.add_checkbox(signal.name, initial_value=False)
@@ -464,6 +484,76 @@ class ArmPage:
                 self._do(lambda: self.model.set_output(name, handle.value))
 
         return put
+
+    # ------------------------------------------------------------------------------------ wizard
+
+    def _make_wizard(self) -> None:
+        gui, wizard = self._gui, self.model.wizard
+        self._grid()
+        self._measured = gui.add_dropdown("Measure", tuple(KINDS.values()))
+        self._measured.on_update(lambda _: self._show_settings())
+        usual, board = WizardSettings(), calibration.Board()
+        self._count = gui.add_number("Poses", usual.count, min=0, max=100, step=1, hint="0: the usual number")
+        self._surface = gui.add_text("Surface [m]", usual.surface, hint="plane:X,Y,Z or sphere:X,Y,Z,RADIUS")
+        self._radius = gui.add_number("Tip radius [mm]", 0.0, min=0.0, max=100.0, step=0.1)
+        self._inertia = gui.add_checkbox("Inertia, too", initial_value=False, hint="at 30 % or more")
+        self._camera = gui.add_text("Camera", usual.camera, hint="its number, a stream, or sim")
+        self._mounted = gui.add_dropdown("Camera on the", FRAMES[::-1])
+        self._board = gui.add_dropdown("Board", tuple(BOARDS))
+        self._columns = gui.add_number("Columns", board.columns, min=1, max=30, step=1)
+        self._rows = gui.add_number("Rows", board.rows, min=1, max=30, step=1)
+        self._square = gui.add_number("Square [mm]", 1e3 * board.square, min=1.0, max=1000.0, step=0.1)
+        self._measuring = gui.add_slider("Speed [%] ", 1, 100, 1, _SLOW)
+        self._steps = gui.add_html("")
+        self._seen = gui.add_image(np.zeros((3, 4, 3), np.uint8), visible=False, format="jpeg")
+        self._button("Begin", self._begin, color="blue")
+        self._button("Go on", wizard.go_on, color="orange")
+        self._button("Give up", wizard.give_up, color="red")
+        self._saved = gui.add_text("Save as", "", hint="name of the tool or camera of the saved target")
+        self._wide()
+        self._button("Save result", lambda: wizard.save(self._saved.value), color="green")
+        self._shown: Any = None
+        self._show_settings()
+
+    def _kind(self) -> str:
+        return next(kind for kind, text in KINDS.items() if text == self._measured.value)
+
+    def _show_settings(self) -> None:
+        kind = self._kind()
+        for needed, handles in (
+            ("poses touch camera", (self._count,)),
+            ("touch", (self._surface, self._radius)),
+            ("load", (self._inertia,)),
+            ("camera", (self._camera, self._mounted, self._board, self._columns, self._rows, self._square)),
+            ("touch load camera", (self._measuring,)),
+        ):
+            for handle in handles:
+                handle.visible = kind in needed.split()
+
+    def _begin(self) -> None:
+        board = calibration.Board(
+            int(self._columns.value), int(self._rows.value), self._square.value / 1e3, self._board.value
+        )
+        settings = WizardSettings(
+            count=int(self._count.value),
+            surface=self._surface.value,
+            tip_radius=self._radius.value / 1e3,
+            inertia=self._inertia.value,
+            speed=self._measuring.value / 100,
+            camera=self._camera.value,
+            frame=self._mounted.value,
+            board=board,
+        )
+        self.model.measure(self._kind(), settings)
+
+    def _write_wizard(self) -> None:
+        step = self.model.wizard.step
+        _put(self._steps, texts.wizard(step))
+        if step.picture is not self._shown:
+            self._shown = step.picture
+            self._seen.visible = step.picture is not None
+            if step.picture is not None:
+                self._seen.image = step.picture
 
     # ---------------------------------------------------------------------------------- operator
 

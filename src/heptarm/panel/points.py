@@ -182,9 +182,9 @@ class PointList:
             robot = known_robot(file.get("robot", ""))  # what is mounted on it moves no joint
             if robot is None or robot.base_name != self._robot.base_name:
                 raise ValueError(f"its robot is {shown(file.get('robot'))}, this one is {self._robot.name!r}")
-            for number, one in enumerate(file["points"], 1):
+            for number, entry in enumerate(file["points"], 1):
                 where = f"point {number}: "
-                found.add(_point(one))
+                found.add(_point(entry))
         except HeptarmError as error:
             error.text = f"{where}{error.text}"
             raise
@@ -198,13 +198,13 @@ class PointList:
         return [self._points[self.index(name)].motion() for name in names]
 
 
-def _point(one: dict[str, Any]) -> TaughtPoint:
+def _point(entry: dict[str, Any]) -> TaughtPoint:
     return TaughtPoint(
-        name=str(one["name"]),
-        q=one["q"],
-        pose=Pose.of(one["pose"]["xyz"], one["pose"]["quat"]),
-        tool=str(one.get("tool", "")),
-        straight={"lin": True, "ptp": False}[one["move"]],
+        name=str(entry["name"]),
+        q=entry["q"],
+        pose=Pose.of(entry["pose"]["xyz"], entry["pose"]["quat"]),
+        tool=str(entry.get("tool", "")),
+        straight={"lin": True, "ptp": False}[entry["move"]],
     )
 
 

@@ -338,6 +338,7 @@ def model_of(
         may_control=options.may_control,
         folder=options.recordings,
         scene=options.scene,
+        target=target,
     )
 
 

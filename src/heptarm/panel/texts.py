@@ -11,6 +11,7 @@ import numpy as np
 from heptarm.io.plan_box import PlanOutline
 from heptarm.panel.model import Advice, Readout
 from heptarm.panel.points import PointList
+from heptarm.panel.wizard import WizardStep
 from heptarm.values.checks import Array
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -91,7 +92,7 @@ def safety(readout: Readout) -> str:
 
     They take the same place whether they are few or many: no button below moves from under somebody's finger.
     """
-    boxes = [_box(one, "warn") for one in readout.stands]
+    boxes = [_box(stand, "warn") for stand in readout.stands]
     if not readout.is_connected:
         boxes = [
             _box(Advice("The connection to the cabinet is lost", "Check the cabinet; then Recover."), "bad")
@@ -177,6 +178,34 @@ def wrench(state: State | None) -> str:
         f'{np.linalg.norm(load.force):.1f}</span> <span class="unit">N</span> {doubt}'
         f'<div class="six">{_six("Fx Fy Fz", load.force, 1, "N")}{_six("Tx Ty Tz", load.torque, 2, "Nm")}</div></div>'
     )
+
+
+def wizard(step: WizardStep) -> str:
+    """What the wizard asks, what moves next, how far it is, and what it has found."""
+    boxes = []
+    if step.asks:
+        boxes.append(f'<div class="box warn">{_lines(step.asks)}</div>')
+    elif step.is_running:
+        done = f"{step.done} of {step.count}" if step.count else "it begins"
+        boxes.append(f'<div class="box">Measuring: {done}</div>')
+    if step.count:
+        width = 100.0 * min(step.done / step.count, 1.0)
+        boxes.append(
+            '<div class="bar"><i style="left:0;top:0;height:8px;margin:0;background:#2f9e44;'
+            f'width:{width:.0f}%"></i></div>'
+        )
+    if step.result:
+        saved = (
+            "<small>saved</small>"
+            if step.is_saved
+            else "<small>nothing is changed before you save it</small>"
+        )
+        boxes.append(f'<div class="box good">{_lines(step.result)}{saved}</div>')
+    return f'<div class="ha">{"".join(boxes)}</div>'
+
+
+def _lines(text: str) -> str:
+    return escape(text).replace("\n", "<br>")
 
 
 def signals(inputs: Mapping[str, SignalValue]) -> str:

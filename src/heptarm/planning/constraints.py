@@ -6,13 +6,15 @@ for Newton's method (projection of CBiRRT, Berenson et al. 2009), so that any of
 
 from __future__ import annotations
 
+import ast
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, LimitError, NoPath, ShapeError
+from heptarm.errors import CommandRejected, HeptarmError, LimitError, NoPath, ShapeError
 from heptarm.model.batch import forward_batch
 from heptarm.model.kinematics import jacobian
 from heptarm.values.checks import Array, shown
@@ -26,6 +28,9 @@ from heptarm.values.workspace import Workspace
 #: spline between them may use all of it.
 _AIM, _USED = 0.7, 0.85
 _ITERATIONS = 30
+#: A curve is checked at samples. Between two of them, where an arm that brakes may come to rest, it exceeds a tolerance
+#: by at most this fraction: the sag of a sixteenth of the longest step of a tree.
+_SAG = 2e-3
 #: A tolerance that is exceeded by this fraction is kept.
 _ROUNDING = 1e-9
 #: Of a workspace: so far from its faces [m] and from its joint limits [rad] is nothing to correct, where there is room.
@@ -36,6 +41,11 @@ _REACH = 0.8
 _STEP, _SHORTEST = 0.4, 0.03
 #: Random joint positions from which constraints that contradict each other are tried.
 _TRIALS = 8
+#: Constraints that a text may name, and its most characters.
+_WRITTEN: dict[str, Callable[..., PathConstraint]] = {
+    one.__name__: one for one in (Upright, OnPlane, OnLine, Workspace)
+}
+_LONGEST_TEXT = 1000
 
 
 class Constraints:
@@ -45,10 +55,12 @@ class Constraints:
         keep: the constraints, at least one.
         robot: the robot.
         tcp: pose of the tool frame in the flange frame.
-        start: joint positions at which an axis that is kept has its direction, shape (7,) [rad].
+        start: joint positions at which the path begins, shape (7,) [rad].
 
     Attributes:
+        keep: the constraints; an axis that had no direction of its own has that of the start.
         step: longest step of a tree [rad]: between its ends the constraints hold.
+        most: largest deviation that a curve may have, in tolerances.
 
     Raises:
         NoPath: the start contradicts them, or they contradict each other.
@@ -58,20 +70,22 @@ class Constraints:
 
     def __init__(self, keep: Sequence[PathConstraint], robot: RobotModel, tcp: Pose, start: Array) -> None:
         self._robot, self._tcp = robot, tcp
-        up = forward_batch(robot, start[None])[0, :3, :3]
-        self._parts = [part for one in keep for part in _parts(one, robot, up @ tcp.rotation)]
+        turn = self._tools(start[None])[1][0]
+        self.keep = tuple(_directed(constraint, turn) for constraint in keep)
+        self._parts = [part for constraint in self.keep for part in _parts(constraint, robot)]
         self._most = _USED
         self.step = min(part.step for part in self._parts)
         self._check_start(start)
 
     def _check_start(self, start: Array) -> None:
-        deviation = self.deviations(start[None])[0]
-        if deviation > 1.0 + _ROUNDING:
+        deviation = float(self.deviations(start[None])[0])
+        if deviation > 1.0 + _SAG:
             random = np.random.default_rng(0)
             tried = [start, *random.uniform(self._robot.q_min, self._robot.q_max, (_TRIALS, 7))]
-            if all(self.projected(one) is None for one in tried):
+            if all(self.projected(point) is None for point in tried):
                 raise NoPath(
-                    f"keep contradicts itself: no joint positions obey {' and '.join(one.name for one in self._parts)}",
+                    "keep contradicts itself: no joint positions obey "
+                    f"{' and '.join(part.name for part in self._parts)}",
                     reason="constraint",
                     parameter="keep",
                     hint="leave out one of the constraints, or allow more",
@@ -82,11 +96,12 @@ class Constraints:
                 parameter="start",
                 hint="move the arm there first, for example by find_path without keep",
             )
-        self.allow(float(deviation))
+        self.most = max(1.0, deviation) + _ROUNDING
+        self.allow(deviation)
 
     def allow(self, deviation: float) -> None:
         """Let the search use more of the tolerances: as much as at joint positions where it begins or ends."""
-        self._most = max(self._most, min(deviation + 0.02, 1.0))
+        self._most = max(self._most, min(deviation + 0.02, self.most))
 
     def deviations(self, q: Array) -> Array:
         """Largest deviation at n joint positions, in tolerances: more than 1 violates a constraint; shape (n,)."""
@@ -115,7 +130,7 @@ class Constraints:
         for _ in range(_ITERATIONS):
             xyz, turns = self._tools(q[None])
             offsets = [part.offsets(xyz, turns, q[None]) for part in self._parts]
-            deviations = [float(part.deviations(one)[0]) for part, one in zip(self._parts, offsets)]
+            deviations = [float(part.deviations(point)[0]) for part, point in zip(self._parts, offsets)]
             if max(deviations) <= _AIM:
                 is_inside = (q >= self._robot.q_min).all() and (q <= self._robot.q_max).all()
                 return np.asarray(q) if is_inside else None
@@ -173,9 +188,9 @@ class _Direction(_Part):
 
     size = 3
 
-    def __init__(self, keep: Upright, start: Array) -> None:
+    def __init__(self, keep: Upright) -> None:
         self.name, self.within = f'Upright("{keep.axis}")', keep.within
-        self._axis, self._up = keep.column, start[:, keep.column]
+        self._axis, self._up = keep.column, np.asarray(keep.direction)
         self._across = np.linalg.svd(self._up[None])[2][1]  # for an axis upside down any direction will do
         self.step = _longest_step(keep.within)
 
@@ -286,15 +301,22 @@ def _longest_step(within: float) -> float:
     return float(np.clip(np.sqrt(8.0 * (_USED - _AIM) * within), _SHORTEST, _STEP))
 
 
-def _parts(keep: PathConstraint, robot: RobotModel, start: Array) -> list[_Part]:
-    """The parts of one constraint; `start` is the rotation of the tool frame at the start.
+def _directed(keep: PathConstraint, turn: Array) -> PathConstraint:
+    """The constraint, with the direction that its axis has in a rotation of the tool frame if it has none."""
+    if isinstance(keep, Upright) and keep.direction is None:
+        return replace(keep, direction=turn[:, keep.column])
+    return keep
+
+
+def _parts(keep: PathConstraint, robot: RobotModel) -> list[_Part]:
+    """The parts of one constraint.
 
     Raises:
         CommandRejected: a workspace in a frame other than the base.
         ShapeError: no constraint.
     """
     if isinstance(keep, Upright):
-        return [_Direction(keep, start)]
+        return [_Direction(keep)]
     if isinstance(keep, OnPlane | OnLine):
         return [_Place(keep)]
     if not isinstance(keep, Workspace):
@@ -329,11 +351,42 @@ def _parts(keep: PathConstraint, robot: RobotModel, start: Array) -> list[_Part]
 
 
 def constraints_of(keep: object) -> list[PathConstraint]:
-    """The constraints that are given as one, several or none.
-
-    Raises:
-        ShapeError: something else.
-    """
+    """The constraints that are given as one, several or none."""
     if keep is None:
         return []
     return list(keep) if isinstance(keep, list | tuple) else [cast("PathConstraint", keep)]
+
+
+def constraint_from_text(text: str, parameter: str = "keep") -> PathConstraint:
+    """Read a constraint that is written as in Python, for a command line or a message.
+
+    Args:
+        text: such as "Upright('z', within=0.1)" or "OnPlane((0.5, 0, 0.4), normal=(0, 0, 1))".
+        parameter: the parameter that has the text, in errors.
+
+    Raises:
+        CommandRejected: no constraint; a value out of range raises as the constraint itself does.
+    """
+    try:
+        if len(text) > _LONGEST_TEXT:
+            raise ValueError(f"at most {_LONGEST_TEXT} characters are allowed, got {len(text)}")
+        call = ast.parse(text.strip(), mode="eval").body
+        if (
+            not isinstance(call, ast.Call)
+            or not isinstance(call.func, ast.Name)
+            or call.func.id not in _WRITTEN
+        ):
+            raise ValueError("it is no call of one of these")
+        named = {str(one.arg): ast.literal_eval(one.value) for one in call.keywords}
+        found: PathConstraint = _WRITTEN[call.func.id](*map(ast.literal_eval, call.args), **named)
+    except HeptarmError:
+        raise  # a value out of range: its own text has more detail
+    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError) as error:
+        raise CommandRejected(
+            f"{parameter} must be {', '.join(_WRITTEN)} as in Python, got {text[:80]!r}: "
+            f"{getattr(error, 'msg', None) or error}",
+            parameter=parameter,
+            value=text[:_LONGEST_TEXT],
+            hint="for example \"Upright('z', within=0.1)\"",
+        ) from error
+    return found

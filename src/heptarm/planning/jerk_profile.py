@@ -114,7 +114,7 @@ class JerkProfile:
         if found.brake.duration > 0.0 or found.accel.duration > 0.0:  # pieces before the seven
             return None
         begins = np.concatenate([[0.0], np.cumsum(found.t)[:-1]])
-        p, v, a, j = (np.array(one)[:7] * self._unit for one in (found.p, found.v, found.a, found.j))
+        p, v, a, j = (np.array(array)[:7] * self._unit for array in (found.p, found.v, found.a, found.j))
         pieces: Array = np.stack([begins, p, v, a / 2, j / 6], axis=1)
         return pieces
 

@@ -107,21 +107,23 @@ def look_ahead(
             last += 1
         plans.append(_planned(robot, here, items, range(first, last + 1), frames))
         here, first = plans[-1].end, last + 1
-    coarse = max(step, sum(one.duration for one in plans) / _MOST_SAMPLES)
-    samples = [_Samples.of(one, coarse) for one in plans]
-    starts = np.concatenate([[0.0], np.cumsum([one.t[-1] for one in samples])]).tolist()
+    coarse = max(step, sum(plan.duration for plan in plans) / _MOST_SAMPLES)
+    samples = [_Samples.of(plan, coarse) for plan in plans]
+    starts = np.concatenate([[0.0], np.cumsum([sample.t[-1] for sample in samples])]).tolist()
     # one ends where the next one begins: that sample counts once
     kept = [slice(0, None), *[slice(1, None)] * (len(samples) - 1)]
     both = list(zip(samples, kept, strict=True))
     return PlannedProgram(
         frozen(
-            np.concatenate([begin + one.t[part] for begin, (one, part) in zip(starts, both, strict=False)])
+            np.concatenate(
+                [begin + sample.t[part] for begin, (sample, part) in zip(starts, both, strict=False)]
+            )
         ),
-        frozen(np.concatenate([one.q[part] for one, part in both])),
-        frozen(np.concatenate([one.dq[part] for one, part in both])),
-        frozen(np.concatenate([one.ddq[part] for one, part in both])),
-        tuple(begin + own for begin, one in zip(starts, samples, strict=False) for own in one.begins),
-        tuple(fact for one in samples for fact in one.is_blended),
+        frozen(np.concatenate([sample.q[part] for sample, part in both])),
+        frozen(np.concatenate([sample.dq[part] for sample, part in both])),
+        frozen(np.concatenate([sample.ddq[part] for sample, part in both])),
+        tuple(begin + own for begin, sample in zip(starts, samples, strict=False) for own in sample.begins),
+        tuple(fact for sample in samples for fact in sample.is_blended),
     )
 
 
@@ -218,11 +220,12 @@ def _motion(item: wire.Item, tcp: Pose, frames: FramesOfArm) -> seam.PlantMotion
         return _same(seam.LinRel, motion, **_relative(motion, item.frame, tcp, frames))
     if isinstance(motion, wire.Spline):
         segments = (
-            _same(getattr(seam, type(one).__name__.removesuffix("Segment")), one) for one in motion.segments
+            _same(getattr(seam, type(segment).__name__.removesuffix("Segment")), segment)
+            for segment in motion.segments
         )
         return _same(seam.Spline, motion, segments=tuple(segments))
     if isinstance(motion, wire.JointSpline):
-        points = (_same(seam.Ptp, one) for one in motion.points)
+        points = (_same(seam.Ptp, point) for point in motion.points)
         return _same(seam.JointSpline, motion, points=tuple(points))
     if isinstance(motion, wire.HandGuide):
         raise CommandRejected(
@@ -243,9 +246,9 @@ def _motion(item: wire.Item, tcp: Pose, frames: FramesOfArm) -> seam.PlantMotion
 def _same(kind: type[_Planned], message: Any, **given: Any) -> _Planned:
     """A value of the seam with the fields that a message has under the same names, and the `given` ones."""
     same = {
-        one.name: _converted(getattr(message, one.name))
-        for one in fields(kind)  # type: ignore[arg-type]
-        if one.name not in given and hasattr(message, one.name)
+        field.name: _converted(getattr(message, field.name))
+        for field in fields(kind)  # type: ignore[arg-type]
+        if field.name not in given and hasattr(message, field.name)
     }
     return kind(**same, **given)
 

@@ -89,8 +89,8 @@ def inherited(part: _Part, whole: seam.Batch | seam.Spline | seam.JointSpline) -
     )
 
 
-def _values(one: Any) -> dict[str, Any]:
-    return {field.name: getattr(one, field.name) for field in fields(one)}
+def _values(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in fields(value)}
 
 
 def _filled(own: Any, whole: Any) -> Any:
@@ -101,7 +101,7 @@ def _filled(own: Any, whole: Any) -> Any:
         return whole if own is None or isnan(own) else own
     if isinstance(own, _SETTINGS):
         return replace(
-            own, **{name: _filled(one, getattr(whole, name)) for name, one in _values(own).items()}
+            own, **{name: _filled(value, getattr(whole, name)) for name, value in _values(own).items()}
         )
     return own
 
@@ -113,13 +113,13 @@ def check_numbers(motion: seam.PlantMotion) -> None:
     """Refuse speeds and positions that no motion can have, before anything divides by them or squares them."""
     for value in _values(motion).values():
         if isinstance(value, seam.JointDynamics):
-            for one in (*value.velocity, *value.acceleration, *value.jerk):
-                if not (isnan(one) or SLOWEST <= one <= 1.0):
-                    _refuse_number("relative speeds", one, f"in [{SLOWEST:g}, 1]")
+            for factor in (*value.velocity, *value.acceleration, *value.jerk):
+                if not (isnan(factor) or SLOWEST <= factor <= 1.0):
+                    _refuse_number("relative speeds", factor, f"in [{SLOWEST:g}, 1]")
         elif isinstance(value, seam.CartesianDynamics):
-            for one in _values(value).values():
-                if not (isnan(one) or SLOWEST <= one < inf):
-                    _refuse_number("Cartesian speeds", one, f"finite and at least {SLOWEST:g}")
+            for number in _values(value).values():
+                if not (isnan(number) or SLOWEST <= number < inf):
+                    _refuse_number("Cartesian speeds", number, f"finite and at least {SLOWEST:g}")
         elif isinstance(value, seam.Pose):
             check_places((*value.xyz, *value.quat))
 

@@ -187,8 +187,8 @@ def _excess(
         PlanError: a set-point has no joint position next to the one before.
     """
     each = zip(path.segments, samples.q, samples.followed, strict=True)
-    followed = [(one.path, q) for one, q, is_followed in each if is_followed]
-    does_a3_move = any(one.keeps_a3 and np.ptp(q[:, 2]) > _STAYS for one, q in followed)
+    followed = [(part.path, q) for part, q, is_followed in each if is_followed]
+    does_a3_move = any(path.keeps_a3 and np.ptp(q[:, 2]) > _STAYS for path, q in followed)
     if not (does_a3_move or any(_is_near_singular(robot, q) for _, q in followed)):
         return None
     why = ", where A3 cannot stay at its angle" if does_a3_move else ""

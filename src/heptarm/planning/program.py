@@ -244,9 +244,9 @@ def _blend_ends(before: _Motion, after: _Motion, blending: seam.Blending) -> Non
     """Give the blend of two motions a fraction of both, equally long at programmed speed."""
     if before.path is None or after.path is None:
         return
-    one = blending_zone(before.positions, before.rotations, blending, backwards=True)
+    zone = blending_zone(before.positions, before.rotations, blending, backwards=True)
     other = blending_zone(after.positions, after.rotations, blending, backwards=False)
-    most = min(before.time * min(one, 1.0 - before.begin), after.time * min(other, _HALF))
+    most = min(before.time * min(zone, 1.0 - before.begin), after.time * min(other, _HALF))
     if most >= _SHORTEST:
         before.finish, after.begin = most / before.time, most / after.time
 

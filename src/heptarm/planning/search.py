@@ -22,7 +22,7 @@ from heptarm._library import library
 from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
-from heptarm.values.checks import Array, array, frozen, integer, shown, within
+from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
 from heptarm.values.clearance import Clearance, PlanningWorld
 from heptarm.values.motion.planned_path import Path, PathConstraint, Region, SearchStats
 from heptarm.values.motion.ptp import Ptp
@@ -52,8 +52,6 @@ _REFINEMENTS = 12
 _SAMPLES = 16
 #: Name of a search that needed no trees.
 _STRAIGHT = "straight"
-#: A tolerance that is exceeded by this fraction is kept.
-_ROUNDING = 1e-9
 #: Clearances up to this are reported [m].
 _REPORTED = 0.2
 
@@ -74,6 +72,7 @@ def find_path(
     states: int = STATES,
     improve: int = 0,
     seed: int = 0,
+    known: Path | None = None,
     stop: Callable[[], bool] | None = None,
     progress: Callable[[int, float], object] | None = None,
 ) -> Path:
@@ -95,6 +94,8 @@ def find_path(
         improve: joint positions that it reaches after that in search of shorter paths, 0 to 1,000,000: of all that it
             finds before `timeout`, the fastest one is the result.
         seed: of its random numbers, 0 to 2^32 - 1.
+        known: a path to the same goal that begins nearby. Where the lines to it and along its points are free, it is
+            made shorter from this start on, and nothing is searched. None: there is none.
         stop: called again and again; the search ends when it returns true.
         progress: called again and again with the joint positions reached so far, and how near start and goal came
             [rad].
@@ -129,7 +130,8 @@ def find_path(
     search = _Search(world, begin, tcp, constraints_of(keep), limits, random)
     search.check_start()
     goals = search.goals(goal)
-    points, planner = search.connected(goals)
+    joined = None if known is None else search.joined(known, _each(goal))
+    points, planner = search.connected(goals) if joined is None else joined
     spline = search.smoothed(search.shortened(points), fraction)
     if planner != _STRAIGHT and more:
         limits.states = limits.reached + more
@@ -143,7 +145,7 @@ def find_path(
         clearance=search.nearest_on(spline.curve),
         stats=stats,
         goal=tuple(_each(goal)),
-        keep=tuple(constraints_of(keep)),
+        keep=search.kept,
         world=world,
     )
 
@@ -318,11 +320,16 @@ class _Search:
         self._keep = Constraints(keep, world.robot, tcp, start) if keep else None
         self._step = _STEP if self._keep is None else self._keep.step
 
+    @property
+    def kept(self) -> tuple[PathConstraint, ...]:
+        """The constraints, as they hold from this start on."""
+        return () if self._keep is None else self._keep.keep
+
     # -------------------------------------------------------------------------- start and goals
 
     def check_start(self) -> None:
         """Refuse a start at which bodies overlap by more than a little."""
-        deep = [one for one in self._world.touching(self._start) if one.distance < -_SLIGHT]
+        deep = [touch for touch in self._world.touching(self._start) if touch.distance < -_SLIGHT]
         if deep:
             raise NoPath(
                 f"start is in collision: {deep[0]}; it may overlap by {_SLIGHT * 1e3:g} mm",
@@ -339,7 +346,7 @@ class _Search:
         Raises:
             NoPath: bodies are in the way at all of them, or the goal cannot be reached.
         """
-        rows = np.concatenate([self._solutions(one) for one in _each(goal)])
+        rows = np.concatenate([self._solutions(single) for single in _each(goal)])
         if not len(rows):
             raise NoPath(
                 "goal has no inverse kinematics: it is out of reach, or every arm position that reaches it violates a "
@@ -351,7 +358,7 @@ class _Search:
         if self._keep is not None:
             deviations = self._keep.deviations(rows)
             least = float(deviations.min())
-            if least > 1.0 + _ROUNDING:
+            if least > self._keep.most:
                 raise NoPath(
                     f"goal contradicts keep: {self._keep.described(rows[deviations.argmin()])}",
                     reason="constraint",
@@ -405,6 +412,28 @@ class _Search:
         return found[((found >= self._robot.q_min) & (found <= self._robot.q_max)).all(axis=1)]
 
     # ------------------------------------------------------------------------------------ search
+
+    def joined(self, known: Path, goal: Sequence[Array | Pose | Region]) -> tuple[list[Array], str] | None:
+        """As `connected`, through the points of a path that was found before; None: a line between them is not free.
+
+        Raises:
+            ShapeError: it is no path to this goal.
+        """
+        instance(known, Path, "known")
+        if len(known.goal) != len(goal) or not all(map(_is_same, known.goal, goal)):
+            raise ShapeError(
+                "known must be a path to the same goal, got one to another goal",
+                parameter="known",
+                hint="leave it out",
+            )
+        points = [self._start]
+        for one in (known.start, *(point.q for point in known.points)):
+            line = self._line(points[-1], one)
+            if line is None:
+                return None
+            points += line
+        self._budget.reached += len(points)
+        return points, known.stats.planner
 
     def connected(self, goals: Array) -> tuple[list[Array], str]:
         """Joint positions from the start to a goal, free on the straight lines between them; and the planner."""
@@ -572,7 +601,7 @@ class _Search:
 
         for curve, through in self._curves(_apart(points)):
             motion = JointSpline(
-                points=tuple(PlantPtp(q=tuple(one.tolist())) for one in through[1:]),
+                points=tuple(PlantPtp(q=tuple(point.tolist())) for point in through[1:]),
                 dynamics=JointDynamics(velocity=(speed,) * 7),
             )
             try:
@@ -607,7 +636,7 @@ class _Search:
         """Pieces between two points on which a curve is not free; the first ones, empty: it is free."""
         outside = ((curve < self._robot.q_min) | (curve > self._robot.q_max)).any(axis=1)
         if self._keep is not None:
-            outside |= self._keep.deviations(curve) > 1.0 + _ROUNDING
+            outside |= self._keep.deviations(curve) > self._keep.most
         if outside.any():
             return np.unique(np.maximum(np.flatnonzero(outside) - 1, 0) // _SAMPLES)
         touch = self._world.first_on(curve)
@@ -639,7 +668,7 @@ class _Search:
         distances = self._world.distances(curve[:: _SAMPLES // 4], below=_REPORTED)
         worst = curve[:: _SAMPLES // 4][int(distances.argmin())]
         found = self._world.clearances(worst, below=_REPORTED) if np.isfinite(distances).any() else ()
-        allowed = [one for one in found if one.distance >= distances.min() - 1e-9]
+        allowed = [clearance for clearance in found if clearance.distance >= distances.min() - 1e-9]
         return allowed[0] if allowed else None
 
 
@@ -678,9 +707,9 @@ def _each(goal: object) -> list[Array | Pose | Region]:
         and goal
         and not isinstance(goal[0], int | float)
     ):
-        return [one for part in goal for one in _each(part)]
+        return [element for part in goal for element in _each(part)]
     if isinstance(goal, np.ndarray) and goal.ndim == 2:
-        return [one for row in goal for one in _each(row)]
+        return [element for row in goal for element in _each(row)]
     if isinstance(goal, np.ndarray | Sequence) and not isinstance(goal, str):
         return [array(goal, 7, "goal")]
     raise ShapeError(
@@ -691,12 +720,18 @@ def _each(goal: object) -> list[Array | Pose | Region]:
     )
 
 
+def _is_same(one: Array | Pose | Region, other: Array | Pose | Region) -> bool:
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return isinstance(one, np.ndarray) and isinstance(other, np.ndarray) and np.array_equal(one, other)
+    return one == other
+
+
 def _apart(points: list[Array]) -> Array:
     """Points without those that are where the one before is; a path that does not move keeps one."""
     kept = [points[0]]
-    for one in points[1:]:
-        if np.abs(one - kept[-1]).max() > 1e-4:
-            kept.append(one)
+    for point in points[1:]:
+        if np.abs(point - kept[-1]).max() > 1e-4:
+            kept.append(point)
     if len(kept) == 1 or np.abs(kept[-1] - points[-1]).max() > 0.0:
         kept = [*(kept if len(kept) == 1 else kept[:-1]), points[-1]]
     return np.array(kept)

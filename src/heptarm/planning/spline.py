@@ -362,17 +362,17 @@ def _segments(whole: seam.Spline, origin: Pose) -> tuple[list[_SplineSegment], O
             raise PlanError(
                 "planning", f"Can not plan motion: a spline cannot have a segment of kind {kind_of(part)}"
             )
-        one = inherited(part, whole)
-        control = orientation_of(one.orientation)
+        filled = inherited(part, whole)
+        control = orientation_of(filled.orientation)
         if control.type == "joint" or control.reference == "path":
             raise PlanError(
                 "planning",
                 f"Can not plan motion: segment {index + 1} of the spline: orientation must be variable, constant or "
                 f"ignored, relative to the base; got {control.type} relative to the {control.reference}",
             )
-        target = pose_of(one.end if isinstance(one, seam.Circ) else one.target)
+        target = pose_of(filled.end if isinstance(filled, seam.Circ) else filled.target)
         goal = target.quat if control.type == "variable" else quat
-        segment = _segment(one, here, target.xyz, Pose(here, quat).angle_to(Pose(here, goal)), index)
+        segment = _segment(filled, here, target.xyz, Pose(here, quat).angle_to(Pose(here, goal)), index)
         if segment is not None:
             segments.append(segment)
             here, quat, place = target.xyz, goal, place + segment.length
@@ -385,23 +385,25 @@ def _segments(whole: seam.Spline, origin: Pose) -> tuple[list[_SplineSegment], O
     )
 
 
-def _segment(one: SplineSegment, here: Array, end: Array, angle: float, index: int) -> _SplineSegment | None:
+def _segment(
+    segment: SplineSegment, here: Array, end: Array, angle: float, index: int
+) -> _SplineSegment | None:
     chord = float(np.linalg.norm(end - here))
-    if isinstance(one, seam.Circ):
+    if isinstance(segment, seam.Circ):
         try:
-            arc = Arc(here, np.array(one.via.xyz), end)
+            arc = Arc(here, np.array(segment.via.xyz), end)
         except PlanError as error:
             raise PlanError(error.kind, f"{error} (segment {index + 1} of the spline)") from None
-        return _SplineSegment(one, index, here, end, arc.length, arc, False)
+        return _SplineSegment(segment, index, here, end, arc.length, arc, False)
     none = np.array([0.0, 0.0, 0.0, 1.0])
     if chord < _SHORT:
         if angle < _STILL:
             return None
         return _SplineSegment(
-            one, index, here, end, _LEVER * angle, Straight(here, end, Slerp(none, none)), True
+            segment, index, here, end, _LEVER * angle, Straight(here, end, Slerp(none, none)), True
         )
-    line = Straight(here, end, Slerp(none, none)) if isinstance(one, seam.Lin) else None
-    return _SplineSegment(one, index, here, end, chord, line, False)
+    line = Straight(here, end, Slerp(none, none)) if isinstance(segment, seam.Lin) else None
+    return _SplineSegment(segment, index, here, end, chord, line, False)
 
 
 def _is_corner(one: _SplineSegment, two: _SplineSegment) -> bool:
@@ -428,8 +430,8 @@ def _curves(segments: list[_SplineSegment]) -> list[Straight | Arc | Quintic]:
         before = segments[index - 1] if index and not segments[index - 1].turns else None
         after = segments[last + 1] if last + 1 < len(segments) and not segments[last + 1].turns else None
         run = segments[index : last + 1]
-        points = np.array([run[0].start, *(one.end for one in run)])
-        lengths = np.array([one.length for one in run])
+        points = np.array([run[0].start, *(segment.end for segment in run)])
+        lengths = np.array([segment.length for segment in run])
         slope, curvature = slopes(
             points,
             lengths,
@@ -477,19 +479,19 @@ def plan_joint_spline(robot: RobotModel, whole: seam.JointSpline, start: Array, 
                 "planning",
                 f"Can not plan motion: a joint spline cannot have a segment of kind {kind_of(part)}",
             )
-        one = inherited(part, whole)
+        filled = inherited(part, whole)
         try:
-            target = joint_target(robot, one, points[-1], tcp)
+            target = joint_target(robot, filled, points[-1], tcp)
         except PlanError as error:
             raise PlanError(error.kind, f"{error} (point {index + 1} of the spline)") from None
-        fastest = robot.dq_max * fractions(one.dynamics.velocity)
+        fastest = robot.dq_max * fractions(filled.dynamics.velocity)
         length = float((np.abs(target - points[-1]) / fastest).max())
         if length < _STILL:
             continue
         points.append(target)
         lengths.append(length)
         kept.append(index)
-        limits.append(segment_limits(one))
+        limits.append(segment_limits(filled))
     if not kept:
         return Plan(whole, start, start)
     path = JointCurve(np.array(points), np.array(lengths))

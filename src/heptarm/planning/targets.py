@@ -154,7 +154,7 @@ def cartesian_path(robot: RobotModel, motion: PathMotion, start: Array, tcp: Pos
         )
         for is_other in (False, True)
     )
-    middle, middle_of_other = (np.array(one.geometry.quat(0.5)) for one in (path, other))
+    middle, middle_of_other = (np.array(candidate.geometry.quat(0.5)) for candidate in (path, other))
     is_free = abs(float(middle @ middle_of_other)) < _SAME_TURN
     return (
         other if is_free and not goes_on(robot, path.at, start) and goes_on(robot, other.at, start) else path

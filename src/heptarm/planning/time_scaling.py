@@ -415,8 +415,8 @@ def reachable(s: Array, free: Array, taken: Array, square: Array) -> Array:
         taken: by how much that falls with the square of speed, shape (n, m).
         square: largest squares of speed, shape (n,).
     """
-    given, result = [np.ascontiguousarray(one) for one in (s, free, taken)], square.copy()
-    addresses = [one.ctypes.data for one in given]
+    given, result = [np.ascontiguousarray(array) for array in (s, free, taken)], square.copy()
+    addresses = [array.ctypes.data for array in given]
     _functions().hp_reachable(*free.shape, *addresses, SPARE, result.ctypes.data)
     return result
 
@@ -431,11 +431,11 @@ class Excess:
         self._s, self._arrays = (
             path.s,
             [
-                *(np.ascontiguousarray(path.s), *(one[:, limited].copy() for one in columns)),
-                *(np.ascontiguousarray(path.fastest), *(one[:, limited].copy() for one in limits)),
+                *(np.ascontiguousarray(path.s), *(column[:, limited].copy() for column in columns)),
+                *(np.ascontiguousarray(path.fastest), *(limit[:, limited].copy() for limit in limits)),
             ],
         )
-        addresses = [one.ctypes.data for one in self._arrays]
+        addresses = [array.ctypes.data for array in self._arrays]
         self._memory = _Limits(*addresses, len(path.s), int(limited.sum()))
 
     def of(self, step: float, speed: Array) -> Array:
@@ -449,14 +449,14 @@ class Excess:
         place = self._s[0] + place * ((self._s[-1] - self._s[0]) / place[-1])
         acceleration = np.gradient(speed, step)
         jerk, result = np.gradient(acceleration, step), np.zeros((3, len(self._s)))
-        given = [one.ctypes.data for one in (place, speed, acceleration, jerk, result)]
+        given = [array.ctypes.data for array in (place, speed, acceleration, jerk, result)]
         _functions().hp_excess(ctypes.byref(self._memory), len(place), *given)
         return result
 
 
 def least_around(s: Array, values: Array, reaches: Array) -> Array:
     """The least of values within a reach to both sides of each sample of s; all of shape (n,)."""
-    given, result = [np.ascontiguousarray(one) for one in (s, values, reaches)], np.empty_like(values)
-    addresses = [one.ctypes.data for one in (*given, result)]
+    given, result = [np.ascontiguousarray(array) for array in (s, values, reaches)], np.empty_like(values)
+    addresses = [array.ctypes.data for array in (*given, result)]
     _functions().hp_least_around(len(s), *addresses)
     return result

@@ -226,12 +226,12 @@ class CameraFeed:
             self._shapes = shapes
             request["shapes"] = [
                 {
-                    "kind": one.kind,
-                    "size": one.size.tolist(),
+                    "kind": shape.kind,
+                    "size": shape.size.tolist(),
                     "xyz": at.xyz.tolist(),
                     "quat": at.quat.tolist(),
                 }
-                for one, at in shapes
+                for shape, at in shapes
             ]
         return json.dumps(request).encode() + b"\n"
 

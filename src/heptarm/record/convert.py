@@ -45,8 +45,8 @@ def convert(recording: Recording, out: str | Path, *, overwrite: bool = False) -
             allowed=allowed,
             hint="a folder for the pictures of a camera has none",
         )
-    for _, one in _tables(recording, path):
-        refuse_existing(one, overwrite=flag(overwrite, "overwrite"), name="out")
+    for _, file in _tables(recording, path):
+        refuse_existing(file, overwrite=flag(overwrite, "overwrite"), name="out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         return write(recording, path)
@@ -76,17 +76,17 @@ def _npz(recording: Recording, path: Path) -> list[Path]:
 def _parquet(recording: Recording, path: Path) -> list[Path]:
     require("pyarrow", extra="record")
     found = []
-    for is_fri, one in _tables(recording, path):
-        recording.to_pandas(fri=is_fri).to_parquet(one, engine="pyarrow")
-        found.append(one)
+    for is_fri, file in _tables(recording, path):
+        recording.to_pandas(fri=is_fri).to_parquet(file, engine="pyarrow")
+        found.append(file)
     return found
 
 
 def _csv(recording: Recording, path: Path) -> list[Path]:
     found = []
-    for is_fri, one in _tables(recording, path):
-        recording.to_pandas(fri=is_fri).to_csv(one)
-        found.append(one)
+    for is_fri, file in _tables(recording, path):
+        recording.to_pandas(fri=is_fri).to_csv(file)
+        found.append(file)
     return found
 
 

@@ -94,7 +94,7 @@ def plain(value: Any) -> Any:
         found = {field.name: plain(getattr(value, field.name)) for field in fields(value)}
         return {"type": type(value).__name__, **found}
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(element) for element in value]
     return value
 
 
@@ -112,14 +112,14 @@ def restored(content: Any, kind: Any) -> Any:
         return _restored_message(content, kind)
     members = get_args(kind)
     if members and isinstance(content, list):
-        return tuple(restored(one, members[0]) for one in content)
+        return tuple(restored(element, members[0]) for element in content)
     if members:  # a union
         if content is None and NoneType in members:
             return None
         name = content.get("type") if isinstance(content, dict) else content
-        for one in members:
-            if getattr(one, "__name__", "") == name:
-                return restored(content, one)
+        for member in members:
+            if getattr(member, "__name__", "") == name:
+                return restored(content, member)
         raise ValueError(f"{name!r} is not known")
     if isinstance(kind, type) and issubclass(kind, enum.Enum):
         return _restored_word(content, kind)
@@ -157,11 +157,11 @@ def _restored_word(content: Any, kind: type[enum.Enum]) -> Any:
     if isinstance(content, int):
         return kind(content)
     words = str(content).upper().split("|")
-    if any(one not in kind.__members__ for one in words):
+    if any(word not in kind.__members__ for word in words):
         raise ValueError(f"{kind.__name__} {content!r} is not known")
     found = kind[words[0]]
-    for one in words[1:]:
-        found |= kind[one]  # type: ignore[operator]
+    for word in words[1:]:
+        found |= kind[word]  # type: ignore[operator]
     return found
 
 
@@ -181,7 +181,7 @@ def _short(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list):
-        return f"[{' '.join(_short(one) for one in value)}]"
+        return f"[{' '.join(_short(element) for element in value)}]"
     return str(value)
 
 
@@ -218,7 +218,7 @@ class Journal:
 
     def since(self, time: int) -> list[JournalEntry]:
         """The kept entries from a time of our clock on [ns], oldest first."""
-        return [JournalEntry(*one) for one in list(self._kept) if one[0] >= time]
+        return [JournalEntry(*entry) for entry in list(self._kept) if entry[0] >= time]
 
     def open(self) -> deque[Record]:
         """A queue that receives every entry from now on, as `Record`; its reader takes them from the left."""
@@ -228,7 +228,7 @@ class Journal:
 
     def close(self, queue: deque[Record]) -> None:
         """End a queue."""
-        self._queues = tuple(one for one in self._queues if one is not queue)
+        self._queues = tuple(other for other in self._queues if other is not queue)
 
     def begin_session(self, reader: Reader) -> None:
         """Note an FRI session, whose cycles are recorded from now on."""

@@ -74,11 +74,11 @@ class RowLayout:
     def _keys(self) -> tuple[bytes, ...]:
         """The constant bytes before the numbers of each field."""
         found = []
-        for number, one in enumerate(self.fields, 1):
-            dtype, _, wire_type = _CODES[one.code]
+        for number, field in enumerate(self.fields, 1):
+            dtype, _, wire_type = _CODES[field.code]
             head = key(number, wire_type)
-            if one.size > 1:
-                head = key(number, BYTES) + varint(one.size * np.dtype(dtype).itemsize)
+            if field.size > 1:
+                head = key(number, BYTES) + varint(field.size * np.dtype(dtype).itemsize)
             found.append(head)
         return tuple(found)
 
@@ -86,19 +86,19 @@ class RowLayout:
     def dtype(self) -> np.dtype[Any]:
         """Type of a row; fields that begin with "_" are the keys."""
         entries: list[Any] = []
-        for number, (one, head) in enumerate(zip(self.fields, self._keys, strict=True)):
+        for number, (field, head) in enumerate(zip(self.fields, self._keys, strict=True)):
             entries.append((f"_{number}", "u1", (len(head),)))
-            code = _CODES[one.code][0]
-            entries.append((one.name, code) if one.size == 1 else (one.name, code, (one.size,)))
+            code = _CODES[field.code][0]
+            entries.append((field.name, code) if field.size == 1 else (field.name, code, (field.size,)))
         return np.dtype(entries)
 
     def rows(self, count: int) -> Rows:
         """Rows with their keys; floats are NaN, integers 0."""
         template = np.zeros(1, self.dtype)
-        for number, (one, head) in enumerate(zip(self.fields, self._keys, strict=True)):
+        for number, (field, head) in enumerate(zip(self.fields, self._keys, strict=True)):
             template[f"_{number}"] = np.frombuffer(head, np.uint8)
-            if one.code == "f8":
-                template[one.name] = np.nan
+            if field.code == "f8":
+                template[field.name] = np.nan
         return np.repeat(template, count)
 
     def read(self, payloads: Sequence[bytes]) -> Rows:
@@ -119,8 +119,8 @@ class RowLayout:
     def descriptor(self) -> bytes:
         """FileDescriptorSet of the message."""
         parts = [
-            _field(one.name, number, _CODES[one.code][1], is_repeated=one.size > 1)
-            for number, one in enumerate(self.fields, 1)
+            _field(field.name, number, _CODES[field.code][1], is_repeated=field.size > 1)
+            for number, field in enumerate(self.fields, 1)
         ]
         message = put_bytes(1, self.name.encode()) + b"".join(put_bytes(2, part) for part in parts)
         return _file_set(_file(f"heptarm/{self.name}.proto", _PACKAGE, [message]))
@@ -165,7 +165,7 @@ _CYCLE_WORDS: tuple[tuple[RowField, int], ...] = (
     (RowField("pose_sent", "f8", 7), at.S_POSE_SENT),
     (RowField("io", "f8", 10), at.S_IO),
 )
-FRI_CYCLE = RowLayout("FriCycle", tuple(one for one, _ in _CYCLE_WORDS))
+FRI_CYCLE = RowLayout("FriCycle", tuple(field for field, _ in _CYCLE_WORDS))
 #: FRI's poses are x y z [mm] and w x y z; a recording has x y z [m] and x y z w.
 _POSES = ("pose", "pose_sent")
 
@@ -177,9 +177,9 @@ def cycle_rows(words: npt.NDArray[np.float64]) -> Rows:
         words: slots of the ring of states, shape (n, 123).
     """
     rows, ints = FRI_CYCLE.rows(len(words)), words.view(np.int64)
-    for one, place in _CYCLE_WORDS:
-        source = ints if one.code == "i8" else words
-        rows[one.name] = source[:, place] if one.size == 1 else source[:, place : place + one.size]
+    for field, place in _CYCLE_WORDS:
+        source = ints if field.code == "i8" else words
+        rows[field.name] = source[:, place] if field.size == 1 else source[:, place : place + field.size]
     for name in _POSES:
         pose = rows[name]
         rows[name] = np.concatenate([pose[:, :3] * 1e-3, pose[:, [4, 5, 6, 3]]], axis=1)
@@ -210,7 +210,7 @@ def _message(name: str, *entries: bytes, enum: bytes = b"") -> bytes:
 def _file(name: str, package: str, messages: Sequence[bytes], needs: Sequence[str] = ()) -> bytes:
     """FileDescriptorProto."""
     content = put_bytes(1, name.encode()) + put_bytes(2, package.encode())
-    content += b"".join(put_bytes(3, one.encode()) for one in needs)
+    content += b"".join(put_bytes(3, need.encode()) for need in needs)
     content += b"".join(put_bytes(4, message) for message in messages)
     return content + put_bytes(12, b"proto3")
 
@@ -267,7 +267,7 @@ def _pose_descriptor() -> bytes:
 
 
 def _transforms_descriptor() -> bytes:
-    one = _message(
+    message = _message(
         "FrameTransform",
         _STAMPED,
         _field("parent_frame_id", 2, _STRING),
@@ -279,7 +279,7 @@ def _transforms_descriptor() -> bytes:
         "FrameTransforms", _field("transforms", 1, _MESSAGE, ".foxglove.FrameTransform", is_repeated=True)
     )
     content = _file(
-        "foxglove/FrameTransforms.proto", "foxglove", [_VECTOR, _QUATERNION, one, several], [_TIME]
+        "foxglove/FrameTransforms.proto", "foxglove", [_VECTOR, _QUATERNION, message, several], [_TIME]
     )
     return _file_set(_TIMESTAMP, content)
 

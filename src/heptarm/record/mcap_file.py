@@ -166,13 +166,13 @@ class RecordingFile:
         rows = state_rows([sample.body for sample in samples])
         sampled = sampling_times(rows["stamp"], to_ours) + self._epoch
         data, size, out, channel = rows.tobytes(), rows.itemsize, self._out, self._states
-        for index, (one, at) in enumerate(zip(samples, sampled.tolist(), strict=True)):
+        for index, (state, at) in enumerate(zip(samples, sampled.tolist(), strict=True)):
             if not index % _TURN:
                 time.sleep(0.0)  # the thread that receives states is not held up by the interpreter's lock
             payload = data[index * size : (index + 1) * size]
-            out.add_message(channel, one.received + self._epoch, payload, at, one.number & 0xFFFFFFFF)
-            self._write_pose(rows[index], one.received, at)
-            self._write_rest(one, at, signals)
+            out.add_message(channel, state.received + self._epoch, payload, at, state.number & 0xFFFFFFFF)
+            self._write_pose(rows[index], state.received, at)
+            self._write_rest(state, at, signals)
         self.sampled = at - self._epoch
 
     def _write_pose(self, row: Any, received: int, sampled: int) -> None:
@@ -189,9 +189,9 @@ class RecordingFile:
             data = encode_transforms(sampled, links.transforms(row["q"].tolist()))
             self._out.add_message(self._frames, at, data, sampled)
 
-    def _write_rest(self, one: StateSample, sampled: int, names: Sequence[str]) -> None:
+    def _write_rest(self, sample: StateSample, sampled: int, names: Sequence[str]) -> None:
         """Write control mode and signals if they have changed; their stamps do not count."""
-        state = self._rest.change(one.body)
+        state = self._rest.change(sample.body)
         if state is None:
             return
         content: dict[str, Any] = {}
@@ -203,7 +203,7 @@ class RecordingFile:
         if state.mode is not None:
             content["mode"] = plain(state.mode) | {"stamp": 0}
         data = json.dumps(content, allow_nan=False)
-        self._out.add_message(self._signals, one.received + self._epoch, data.encode(), sampled)
+        self._out.add_message(self._signals, sample.received + self._epoch, data.encode(), sampled)
 
     def cycles(self, words: npt.NDArray[np.float64]) -> None:
         """Write FRI cycles; `words` has shape (n, 123)."""
@@ -332,11 +332,11 @@ def merge(path: Path, recordings: Mapping[str, RecordedData]) -> Path:
         CommandRejected: the file cannot be written.
     """
     zero = round(_MERGED_EPOCH * 1e9)  # files of the same recordings are the same
-    (first, one), *others = recordings.items()
+    (first, recording), *others = recordings.items()
     same = {"clock_rate": "1"}  # times are the cabinet's already
-    out = RecordingFile(path, {**one.facts, **same}, epoch=zero, chunk=_MERGED_CHUNK, arm=first)
+    out = RecordingFile(path, {**recording.facts, **same}, epoch=zero, chunk=_MERGED_CHUNK, arm=first)
     try:
-        out.copy(one)
+        out.copy(recording)
         for name, other in others:
             out.beside({**other.facts, **same}, name).copy(other)
         out.finish({"states": str(sum(map(len, recordings.values()))), "lost": "0"})

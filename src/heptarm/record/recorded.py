@@ -14,7 +14,7 @@ from heptarm.errors import CommandRejected, require
 from heptarm.record.journal import NOTE
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import to_frame
-from heptarm.values.checks import Array, finite, flag, shown
+from heptarm.values.checks import Array, choice, finite, flag, shown
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
 from heptarm.values.robot import RobotModel, known_robot
@@ -109,16 +109,7 @@ class RecordedData:
         Raises:
             CommandRejected: there is none of that name; the text lists them.
         """
-        found = self.signals.get(name)
-        if found is None:
-            known = ", ".join(self.signals)
-            raise CommandRejected(
-                f"name must be one of {known}, got {shown(name)}",
-                parameter="name",
-                value=name,
-                allowed=known,
-            )
-        return found
+        return choice(name, "name", self.signals)
 
     def __contains__(self, name: object) -> bool:
         """Whether there is a signal of that name."""

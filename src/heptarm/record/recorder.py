@@ -185,8 +185,8 @@ class _Film:
 
     def write(self) -> None:
         """Write what is finished."""
-        for one in self._feed.take():
-            self._file.picture(self._feed.camera, one)
+        for picture in self._feed.take():
+            self._file.picture(self._feed.camera, picture)
             self.pictures += 1
 
     def close(self) -> None:
@@ -327,9 +327,9 @@ class Recorder(Sealed):
         size = chunk_size(sum(source.state_rate for source in sources.values()))
         file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
         files = [file, *(file.beside(source.facts, name) for name, source in others)]
-        for name, one in zip(sources, files, strict=True):
+        for name, writer in zip(sources, files, strict=True):
             if name in self._cameras:
-                self._films[name] = _Film(self._cameras[name], one)
+                self._films[name] = _Film(self._cameras[name], writer)
         return files
 
     @property

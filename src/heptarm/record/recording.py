@@ -186,8 +186,8 @@ def _read(file: BinaryIO, content: _Content) -> str:
     try:
         for record in stream.records:
             if type(record).__name__ == "Chunk":
-                for one in _of_chunk(reader, record):
-                    _take(one, content)
+                for message in _of_chunk(reader, record):
+                    _take(message, content)
             else:
                 _take(record, content)
             if type(record).__name__ == "DataEnd":
@@ -288,7 +288,9 @@ def _recording(path: Path, content: _Content) -> Recording:
     if content.cycled:
         cycles = layouts.get(FRI_CYCLE.full_name, FRI_CYCLE).read(content.payloads[FRI_CYCLE.full_name])
         signals[f"{FRI}t"] = line(content.cycled)
-        signals |= {f"{FRI}{name}": one for name, one in signals_of(cycles).items() if name not in _HIDDEN}
+        signals |= {
+            f"{FRI}{name}": signal for name, signal in signals_of(cycles).items() if name not in _HIDDEN
+        }
     events = tuple(_events(content.entries, line))
     return Recording(
         path,

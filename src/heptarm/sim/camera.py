@@ -124,14 +124,14 @@ class ArmCamera:
         scene, flange = self._renderer.scene, self._data.site("flange")
         turn = flange.xmat.reshape(3, 3)
         geoms = scene.geoms if self.shapes else ()  # each look at them takes long
-        for one, pose in self.shapes:
+        for shape, pose in self.shapes:
             if scene.ngeom >= scene.maxgeom:
                 return
             geom = geoms[scene.ngeom]
             mujoco.mjv_initGeom(
                 geom,
-                GEOMS[one.kind],
-                mujoco_size(one.kind, one.size),
+                GEOMS[shape.kind],
+                mujoco_size(shape.kind, shape.size),
                 flange.xpos + turn @ pose.xyz,
                 (turn @ pose.rotation).reshape(-1),
                 np.array(COLOUR, np.float32),
@@ -142,7 +142,8 @@ class ArmCamera:
 
 def _shapes(given: Sequence[Mapping[str, Any]]) -> tuple[tuple[Shape, Pose], ...]:
     return tuple(
-        (Shape(one["kind"], np.array(one["size"])), Pose.of(one["xyz"], one["quat"])) for one in given
+        (Shape(shape["kind"], np.array(shape["size"])), Pose.of(shape["xyz"], shape["quat"]))
+        for shape in given
     )
 
 

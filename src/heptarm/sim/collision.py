@@ -185,7 +185,7 @@ class CollisionModel(Sealed):
     @property
     def arms(self) -> tuple[str, ...]:
         """Names of the other arms in the world, see `with_arm`."""
-        return tuple(one.name for one in self._arms)
+        return tuple(arm.name for arm in self._arms)
 
     @property
     def checks(self) -> int:
@@ -236,7 +236,7 @@ class CollisionModel(Sealed):
         given = (shape,) if isinstance(shape, Shape | Mesh) else _listed(shape, "shape")
         if not given:
             raise ShapeError("shape must have at least one shape, got none", parameter="shape", value=shape)
-        parts: tuple[Shape | Mesh, ...] = tuple(instance(one, (Shape, Mesh), "shape") for one in given)
+        parts: tuple[Shape | Mesh, ...] = tuple(instance(part, (Shape, Mesh), "shape") for part in given)
         self._add(name, parts, np.zeros((0, 3)), 0.0, at)
 
     @_changes
@@ -577,25 +577,25 @@ class CollisionModel(Sealed):
         posture = np.zeros(7) if q is None else array(q, 7, "q")
         self._robot.check(posture, "q")
         back = chosen.pose.inverse()
-        others = (OtherArm(one.name, one.robot, back @ one.pose, one.carried) for one in self._arms)
+        others = (OtherArm(arm.name, arm.robot, back @ arm.pose, arm.carried) for arm in self._arms)
         view = self._copy()
         view._robot, view._carried, view._held = known(chosen.robot), chosen.carried, {}
         view._arms = (
             OtherArm(own, self._robot.name, back, self._carried),
-            *(one for one in others if one.name != name),
+            *(other for other in others if other.name != name),
         )
         view._models = self._models.seen_by(name, view._robot.name, back, own)
         view._distances = view._compiled()
         view._distances.set_arm(own, posture)
-        for one in view.arms[1:]:
-            view._distances.set_arm(one, self._distances.posture_of(one))
+        for arm in view.arms[1:]:
+            view._distances.set_arm(arm, self._distances.posture_of(arm))
         for body in self._distances.free:
             view._distances.put(body, back @ self._distances.place_of(body))
         return view
 
     def _arm(self, name: str) -> OtherArm:
         instance(name, str, "name")
-        found = next((one for one in self._arms if one.name == name), None)
+        found = next((arm for arm in self._arms if arm.name == name), None)
         if found is None:
             raise _unknown(name, self.arms, "another arm of the world", "name")
         return found
@@ -625,12 +625,12 @@ class CollisionModel(Sealed):
         from heptarm.sim.distances import Distances
 
         instance(others, Mapping, "others")
-        rows = {"q": _rows(q, "q")} | {name: _rows(one, name) for name, one in others.items()}
+        rows = {"q": _rows(q, "q")} | {name: _rows(row, name) for name, row in others.items()}
         times = finite_entries(numbers(t, "t", "times of shape (n,)"), "t")
-        if any(times.shape != (len(one),) for one in rows.values()):
+        if any(times.shape != (len(row),) for row in rows.values()):
             raise ShapeError(
                 f"t and all joint positions must have the same length, got {times.shape} and "
-                f"{[len(one) for one in rows.values()]}",
+                f"{[len(row) for row in rows.values()]}",
                 parameter="t",
             )
         path = rows.pop("q")
@@ -643,7 +643,7 @@ class CollisionModel(Sealed):
             last = min(k + 1, len(path) - 1)
             moved = self._distances.moved(path[last] - path[k])
             moved += max(
-                (one.moved(rows[name][last] - rows[name][k]) for name, one in movers.items()), default=0.0
+                (mover.moved(rows[name][last] - rows[name][k]) for name, mover in movers.items()), default=0.0
             )
             at = 0.0
             while free < (1.0 - at) * moved or free < 0.0 or (last == len(path) - 1 and at < 1.0):
@@ -691,9 +691,9 @@ class CollisionModel(Sealed):
     def touching(self, q: npt.ArrayLike) -> tuple[Clearance, ...]:
         """Pairs of bodies that touch at joint positions: nearer than `margin`, and not allowed to; as `clearances`."""
         return tuple(
-            one
-            for one in self._clearances(array(q, 7, "q"), self._margin)
-            if frozenset((one.first, one.second)) not in self._allowed
+            clearance
+            for clearance in self._clearances(array(q, 7, "q"), self._margin)
+            if frozenset((clearance.first, clearance.second)) not in self._allowed
         )
 
     @_alone
@@ -735,7 +735,10 @@ class CollisionModel(Sealed):
         points, margin = _rows(path, "path"), self._margin
         known: dict[tuple[str, str], float] = {}
         if self._distances.nearest(points[:1], margin)[0] < margin:
-            known = {(one.first, one.second): one.distance for one in self.touching(points[0])}
+            known = {
+                (clearance.first, clearance.second): clearance.distance
+                for clearance in self.touching(points[0])
+            }
         piece, at = 0, 0.0
         while known and piece < len(points) - 1:
             at, found = self._leave(points[piece], points[piece + 1], known)
@@ -794,13 +797,13 @@ class CollisionModel(Sealed):
     def _new(self, q: Array, start: dict[tuple[str, str], float]) -> Clearance | None:
         """The nearest pair that touches at joint positions and did not at the start, or is nearer now."""
         now = self.touching(q)
-        present = {(one.first, one.second) for one in now}
+        present = {(clearance.first, clearance.second) for clearance in now}
         for pair in [pair for pair in start if pair not in present]:
             del start[pair]  # it has been left: from now on it counts
-        for one in now:
-            before = start.get((one.first, one.second))
-            if before is None or one.distance < before - _NEARER:
-                return one
+        for clearance in now:
+            before = start.get((clearance.first, clearance.second))
+            if before is None or clearance.distance < before - _NEARER:
+                return clearance
         return None
 
     def _clearances(self, q: Array, below: float) -> tuple[Clearance, ...]:
@@ -810,7 +813,7 @@ class CollisionModel(Sealed):
             names = self._distances.named(*pair)
             nearest[names] = min(nearest.get(names, np.inf), distance)
         found = [Clearance(*names, distance) for names, distance in nearest.items()]
-        return tuple(sorted(found, key=lambda one: one.distance))
+        return tuple(sorted(found, key=lambda clearance: clearance.distance))
 
 
 class _Models:
@@ -905,7 +908,7 @@ def _carried(
     if workpiece is not None:
         tip = tool.frames[0][1] if tool is not None and tool.frames else origin
         found.append(CarriedShapes(workpiece.name, workpiece.shapes, tip if at is None else at))
-    return tuple(one for one in found if one.shapes)
+    return tuple(body for body in found if body.shapes)
 
 
 def _unknown(name: str, known: tuple[str, ...], what: str, parameter: str = "body") -> CommandRejected:

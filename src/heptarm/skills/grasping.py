@@ -78,7 +78,7 @@ def grasps(shapes: Sequence[Shape], *, opening: float = OPENING) -> tuple[Grasp,
     """
     room = within(opening, "opening", 0.0, 1.0, above=True, unit="m") - _PLAY
     if len(shapes) != 1 or shapes[0].kind not in ("box", "cylinder"):
-        got = ", ".join(one.kind for one in shapes) or "none"
+        got = ", ".join(shape.kind for shape in shapes) or "none"
         raise ShapeError(
             f"a body must be one box or one cylinder to be grasped by its shape, got {got}",
             parameter="body",
@@ -177,10 +177,10 @@ def pick(
     if candidates is None:
         candidates = sorted(
             grasps(world.shapes(body), opening=opening),
-            key=lambda one: round(float((where @ one.pose).rotation[2, 2]), 3),  # -1: from above
+            key=lambda pose: round(float((where @ pose.pose).rotation[2, 2]), 3),  # -1: from above
         )
     gripper.open()
-    number, path = task.first_path([where @ one.pose for one in candidates], _before(task.approach))
+    number, path = task.first_path([where @ pose.pose for pose in candidates], _before(task.approach))
     grasp = where @ candidates[number].pose
     arm.move(path)
     with task.contact():
@@ -300,7 +300,7 @@ class _Task:
 
     def _line_check(self) -> _LineCheck:
         """What checks a straight line in the world as it is now."""
-        pairs = [(self.body, one) for one in self.world.bodies if one != self.body]
+        pairs = [(self.body, body) for body in self.world.bodies if body != self.body]
         return _LineCheck(self.body, self.world, self.world.allowing(pairs))
 
     @contextmanager
@@ -390,7 +390,7 @@ class _LineCheck:
         at: Pose | None = None,
     ) -> _LineCheck:
         """The same, of an arm that carries a tool and a workpiece."""
-        carried = [one.carrying(tool, workpiece, at=at) for one in (self.world, self.contact)]
+        carried = [world.carrying(tool, workpiece, at=at) for world in (self.world, self.contact)]
         return _LineCheck(self.body, *carried)
 
     def first_on(self, path: Array) -> TouchOnPath | None:
@@ -398,7 +398,7 @@ class _LineCheck:
         touch = self.contact.first_on(path)
         if touch is not None:
             return touch
-        for one in self.world.touching(path[-1]):
-            if self.body in (one.first, one.second) and one.distance < -_ROUNDING:
-                return TouchOnPath(one, 1.0, path[-1])
+        for contact in self.world.touching(path[-1]):
+            if self.body in (contact.first, contact.second) and contact.distance < -_ROUNDING:
+                return TouchOnPath(contact, 1.0, path[-1])
         return None

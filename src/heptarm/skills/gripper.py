@@ -55,7 +55,9 @@ def _wired(arm: ArmVerbs, role: str, name: str, others: Mapping[str, str]) -> st
     needs_output = role in ("open", "close")
     wanted = "output" if needs_output else "input"
     if signal.is_output != needs_output or signal.kind != "boolean":
-        fitting = [one.name for one in known if one.is_output == needs_output and one.kind == "boolean"]
+        fitting = [
+            signal.name for signal in known if signal.is_output == needs_output and signal.kind == "boolean"
+        ]
         is_kind = "output" if signal.is_output else "input"
         raise CommandRejected(
             f"{role} must be a boolean {wanted}, got {signal.name}, a signal of kind {signal.kind}, {is_kind}",

@@ -73,7 +73,7 @@ class Insertion(Value):
         """A few lines with units."""
         rows = {
             "depth": f"{fixed(self.depth * 1e3, 1)} mm",
-            "offset": f"{' '.join(fixed(one * 1e3, 2) for one in self.offset)} mm",
+            "offset": f"{' '.join(fixed(length * 1e3, 2) for length in self.offset)} mm",
             "pose": str(self.pose),
             "duration": f"{fixed(self.duration, 2)} s",
             "searched": "yes" if self.searched else "no",

@@ -40,12 +40,12 @@ class Outcome:
     @property
     def data(self) -> dict[str, Any]:
         """As plain data."""
-        one = self.scenario
+        scenario = self.scenario
         return {
-            "scenario": one.name,
-            "title": one.title,
-            "rows": list(one.rows),
-            "line": one.line,
+            "scenario": scenario.name,
+            "title": scenario.title,
+            "rows": list(scenario.rows),
+            "line": scenario.line,
             "verdict": self.verdict.value,
             "text": self.text,
             "seconds": round(self.seconds, 3),

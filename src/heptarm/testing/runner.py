@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import fnmatch
-import importlib
 import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.errors import CommandRejected, HeptarmError, NotReady
+from heptarm.errors import HeptarmError, NotReady
 from heptarm.testing.measure import NotShown, Unfit, collect
 from heptarm.testing.report import Outcome, Report, Verdict
-from heptarm.testing.scenario import REGISTRY, Risk, Scenario
+from heptarm.testing.scenario import REGISTRY, Risk, Scenario, defined, selected
 from heptarm.testing.stage import HOME, REAL_SPEED, VIRTUAL_SPEED, has_operator
-from heptarm.values.checks import instance
 from heptarm.values.motion.ptp import ptp
 
 #: Modules of this package that define scenarios, in the order in which they run.
@@ -42,9 +39,7 @@ GROUPS = (
 
 def scenarios() -> tuple[Scenario, ...]:
     """All of them, group by group."""
-    for group in GROUPS:
-        importlib.import_module(f"heptarm.testing.catalogue.{group}")
-    return tuple(sorted(REGISTRY.values(), key=lambda one: GROUPS.index(one.group)))
+    return defined(REGISTRY, "heptarm.testing.catalogue", GROUPS)
 
 
 def find(patterns: Sequence[str] = ()) -> tuple[Scenario, ...]:
@@ -53,25 +48,7 @@ def find(patterns: Sequence[str] = ()) -> tuple[Scenario, ...]:
     Raises:
         CommandRejected: a pattern that fits none.
     """
-    every = scenarios()
-    instance(patterns, (list, tuple), "patterns")
-    if not patterns:
-        return every
-    for pattern in patterns:
-        instance(pattern, str, "patterns")
-        if not any(_fits(one, pattern) for one in every):
-            raise CommandRejected(
-                f"no scenario {pattern!r}",
-                parameter="only",
-                value=pattern,
-                allowed=", ".join(dict.fromkeys(one.group for one in every)),
-                hint="name a group, a scenario, or a pattern such as motions.*",
-            )
-    return tuple(one for one in every if any(_fits(one, pattern) for pattern in patterns))
-
-
-def _fits(one: Scenario, pattern: str) -> bool:
-    return one.group == pattern or fnmatch.fnmatchcase(one.name, pattern)
+    return selected(scenarios(), patterns, what="scenario")
 
 
 #: At home the joints are within this [rad].
@@ -129,7 +106,7 @@ def run(
             outcomes.append(outcome)
             if on_end is not None:
                 on_end(outcome)
-        if any(one.verdict is not Verdict.LEFT_OUT and one.scenario.moves for one in outcomes):
+        if any(outcome.verdict is not Verdict.LEFT_OUT and outcome.scenario.moves for outcome in outcomes):
             tidy(arm, home=True)
     finally:
         arm.speed = before

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import fnmatch
+import importlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol, TypeVar
 
 from heptarm.arm.arm import Arm
+from heptarm.errors import CommandRejected
+from heptarm.values.checks import instance
 
 #: Lines of what heptarm is built for, by number: a scenario shows one of them.
 LINES = {
@@ -75,6 +80,59 @@ class Scenario:
     def moves(self) -> bool:
         """Whether the arm moves."""
         return self.risk is not Risk.STILL
+
+
+class _Member(Protocol):
+    """A scenario, or a step of the commissioning run."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def group(self) -> str: ...
+
+
+M = TypeVar("M", bound=_Member)
+
+
+def defined(registry: Mapping[str, M], package: str, groups: Sequence[str]) -> tuple[M, ...]:
+    """What the modules of a package have defined, group by group.
+
+    Args:
+        registry: where they put it.
+        package: whose modules are the groups.
+        groups: in their order.
+    """
+    for group in groups:
+        importlib.import_module(f"{package}.{group}")
+    return tuple(sorted(registry.values(), key=lambda member: groups.index(member.group)))
+
+
+def selected(every: Sequence[M], patterns: Sequence[str], *, what: str) -> tuple[M, ...]:
+    """Those whose name or group is named, or that fit a pattern such as "motions.*"; without patterns: all.
+
+    Raises:
+        ShapeError: the patterns are no texts.
+        CommandRejected: a pattern that fits none.
+    """
+    instance(patterns, (list, tuple), "patterns")
+    fitting = {}
+    for pattern in patterns:
+        instance(pattern, str, "patterns")
+        fitting[pattern] = {
+            member.name
+            for member in every
+            if member.group == pattern or fnmatch.fnmatchcase(member.name, pattern)
+        }
+        if not fitting[pattern]:
+            raise CommandRejected(
+                f"no {what} {pattern!r}",
+                parameter="only",
+                value=pattern,
+                allowed=", ".join(dict.fromkeys(member.group for member in every)),
+                hint=f"name a group, a {what}, or a pattern such as {every[0].group}.*",
+            )
+    names = set().union(*fitting.values())
+    return tuple(member for member in every if not patterns or member.name in names)
 
 
 #: All scenarios by name, in the order in which their modules define them.

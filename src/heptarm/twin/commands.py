@@ -138,9 +138,9 @@ def commands_of(run: RecordedData) -> Commands:
     try:
         requests = {event.id: event for event in run.events if event.kind == REQUEST and event.id}
         notes: list[str] = []
-        sections = sorted(_sections(run, requests, notes), key=lambda one: one.sent)
+        sections = sorted(_sections(run, requests, notes), key=lambda section: section.sent)
         tools = restored(json.loads(run.facts.get("tools", "[]")), tuple[wire.ToolInfo, ...])
-        steps = sorted(_steps(run), key=lambda one: one.t)
+        steps = sorted(_steps(run), key=lambda step: step.t)
     except ValueError as error:
         raise _unusable(
             run,
@@ -201,7 +201,7 @@ def _sections(run: RecordedData, requests: dict[int, RecordedEvent], notes: list
         name = "" if request is None else request.name
         program = restored(request.content, wire.Run) if request is not None and name == "Run" else None
         is_guided = program is not None and any(
-            isinstance(one.motion, wire.HandGuide) for one in program.items
+            isinstance(item.motion, wire.HandGuide) for item in program.items
         )
         if is_guided:
             notes.append(

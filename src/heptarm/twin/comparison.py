@@ -18,7 +18,7 @@ from heptarm.record.plot.signals import compare
 from heptarm.record.recorded import RecordedMotion
 from heptarm.record.recording import Recording
 from heptarm.record.samples import labels
-from heptarm.values.checks import Array, Value, flag, shown, within
+from heptarm.values.checks import Array, Value, choice, flag, shown, within
 from heptarm.values.files import path_of, refuse_existing
 from heptarm.values.text import aligned, fixed, lines
 
@@ -134,25 +134,16 @@ class Twin(Value):
         Raises:
             CommandRejected: it was not compared; the text lists those that were.
         """
-        for one in self.deviations:
-            if one.signal == signal:
-                return one
-        known = ", ".join(one.signal for one in self.deviations)
-        raise CommandRejected(
-            f"signal must be one of {known}, got {shown(signal)}",
-            parameter="signal",
-            value=signal,
-            allowed=known,
-        )
+        return choice(signal, "signal", {deviation.signal: deviation for deviation in self.deviations})
 
     @property
     def parts(self) -> float:
         """First time at which a signal leaves its band or a motion ends by another cause [s]; NaN: never."""
-        found = [one.parts for one in self.deviations if not one.is_inside]
-        for one in self.motions:
-            if not one.ends_alike:
-                ends = [one.recorded.end, nan if one.simulated is None else one.simulated.end]
-                found.append(min((end for end in ends if not isnan(end)), default=one.recorded.begin))
+        found = [deviation.parts for deviation in self.deviations if not deviation.is_inside]
+        for motion in self.motions:
+            if not motion.ends_alike:
+                ends = [motion.recorded.end, nan if motion.simulated is None else motion.simulated.end]
+                found.append(min((end for end in ends if not isnan(end)), default=motion.recorded.begin))
         return min(found, default=nan)
 
     @property
@@ -200,10 +191,14 @@ class Twin(Value):
         else:
             title = f"{self.recorded.path.name} and its twin part at {self.parts:.3f} s: {self._why()}"
         rows: dict[str, str] = {"signal": aligned(["largest", "band", "rms", "", "at", "parts"], 11)}
-        for one in self.deviations:
-            numbers = [f"{value:.4g}" for value in (one.largest, one.band, one.rms)]
-            times = [f"{one.entry}", f"{fixed(one.t, 3)} s", "-" if one.is_inside else f"{one.parts:.3f} s"]
-            rows[f"{one.signal} [{one.unit}]"] = aligned([*numbers, *times], 11)
+        for deviation in self.deviations:
+            numbers = [f"{value:.4g}" for value in (deviation.largest, deviation.band, deviation.rms)]
+            times = [
+                f"{deviation.entry}",
+                f"{fixed(deviation.t, 3)} s",
+                "-" if deviation.is_inside else f"{deviation.parts:.3f} s",
+            ]
+            rows[f"{deviation.signal} [{deviation.unit}]"] = aligned([*numbers, *times], 11)
         for motion in self.motions:
             if not motion.ends_alike:
                 rows[f"motion {motion.recorded.id}"] = self._ending(motion)
@@ -213,12 +208,16 @@ class Twin(Value):
 
     def _why(self) -> str:
         first = min(
-            (one for one in self.deviations if not one.is_inside), key=lambda one: one.parts, default=None
+            (deviation for deviation in self.deviations if not deviation.is_inside),
+            key=lambda deviation: deviation.parts,
+            default=None,
         )
         if first is not None and first.parts <= self.parts:
             return f"{first.signal} deviates by more than {first.band:g} {first.unit}"
         return next(
-            f"motion {one.recorded.id}: {self._ending(one)}" for one in self.motions if not one.ends_alike
+            f"motion {motion.recorded.id}: {self._ending(motion)}"
+            for motion in self.motions
+            if not motion.ends_alike
         )
 
     @staticmethod
@@ -291,21 +290,24 @@ def aligned_twin(
         compared, shape (m,) [s].
     """
     by_id = {motion.id: motion for motion in simulated.motions}
-    ran = [one for one in repetitions if one.number in by_id]
+    ran = [repetition for repetition in repetitions if repetition.number in by_id]
     last = float(simulated.t[-1])
-    begins = [by_id[one.number].begin for one in ran]
+    begins = [by_id[repetition.number].begin for repetition in ran]
     shifts = [
-        _shift(recorded, simulated, begin, one.section) if same_speed else 0.0
-        for one, begin in zip(ran, begins, strict=True)
+        _shift(recorded, simulated, begin, repetition.section) if same_speed else 0.0
+        for repetition, begin in zip(ran, begins, strict=True)
     ]
     # one that waited for the end of the one before begins with its set-points
     begins = [begin + max(shift, 0.0) for begin, shift in zip(begins, shifts, strict=True)]
-    wanted = [one.section.motion.begin + max(-shift, 0.0) for one, shift in zip(ran, shifts, strict=True)]
+    wanted = [
+        repetition.section.motion.begin + max(-shift, 0.0)
+        for repetition, shift in zip(ran, shifts, strict=True)
+    ]
     sources: list[float] = []
     targets: list[float] = []
     spans: list[tuple[float, float]] = []
-    for index, (one, begin) in enumerate(zip(ran, begins, strict=True)):
-        end = by_id[one.number].end
+    for index, (repetition, begin) in enumerate(zip(ran, begins, strict=True)):
+        end = by_id[repetition.number].end
         moves = (last if isnan(end) else end) - begin
         # the one before may have taken longer than it was recorded
         there = max([wanted[index], *targets[-1:]])
@@ -329,7 +331,7 @@ def aligned_twin(
         motion.id: replace(motion, begin=float(line(motion.begin)), end=float(line(motion.end)))
         for motion in simulated.motions
     }
-    repeated = {one.number for one in repetitions}
+    repeated = {repetition.number for repetition in repetitions}
     aligned_recording = replace(
         simulated,
         signals=signals,
@@ -337,7 +339,8 @@ def aligned_twin(
         events=tuple(replace(event, t=float(line(event.t))) for event in simulated.events),
     )
     motions = tuple(
-        RepeatedMotion(one.section.motion, moved.get(one.number), one.refusal) for one in repetitions
+        RepeatedMotion(repetition.section.motion, moved.get(repetition.number), repetition.refusal)
+        for repetition in repetitions
     )
     return aligned_recording, motions, times[inside]
 
@@ -376,8 +379,8 @@ def _shift(recorded: Recording, simulated: Recording, begin: float, section: Sec
         at = t - there + begin + shift
         both = ~_is_lost(at, own_t, lost)
         now, speed = (
-            np.stack([np.interp(at[both], own_t, column) for column in one.T], axis=1)
-            for one in (own_q, slopes)
+            np.stack([np.interp(at[both], own_t, column) for column in rows.T], axis=1)
+            for rows in (own_q, slopes)
         )
         return q[both] - now, speed
 
@@ -405,7 +408,7 @@ def deviations_of(
 ) -> tuple[Deviation, ...]:
     """How far the signals deviate at times of the recording, shape (m,) [s]."""
     found = (_deviation(name, recorded, simulated, times, bands[name]) for name in SIGNALS)
-    return tuple(one for one in found if one is not None)
+    return tuple(deviation for deviation in found if deviation is not None)
 
 
 def _deviation(

@@ -133,8 +133,8 @@ def replay_in_sim(
 
 def _target(target: str | None, commands: Commands) -> str:
     """The simulator; a private one is as fast as what it has to repeat allows."""
-    is_timed = any(one.word for one in commands.steps) or any(
-        one.stream is not None for one in commands.sections
+    is_timed = any(step.word for step in commands.steps) or any(
+        section.stream is not None for section in commands.sections
     )
     speed = 1.0 if is_timed else _FASTER
     if target is None:
@@ -195,9 +195,9 @@ class _Run:
         if self._tool is not None:
             self._arm.attach_tool(self._tool)
         else:
-            known = {one.name: one for one in commands.tools}
-            for one in commands.tools:
-                self._request(wire.DefineTool(tool=one))
+            known = {tool.name: tool for tool in commands.tools}
+            for tool in commands.tools:
+                self._request(wire.DefineTool(tool=tool))
             if commands.tool:
                 frame = "" if commands.frame == FLANGE else commands.frame
                 self._request(wire.AttachTool(name=commands.tool, frame=frame))
@@ -209,20 +209,20 @@ class _Run:
     def execute(self) -> None:
         """Repeat everything in its order."""
         sections, steps = self._commands.sections, self._commands.steps
-        first = min(one.sent for one in sections)
+        first = min(section.sent for section in sections)
         # what was set before the first program holds when it begins
         queue: list[tuple[float, Section | RepeatedStep]] = [
-            (max(one.t, first), one) for one in steps if one.t >= 0.0 or not one.word
+            (max(step.t, first), step) for step in steps if step.t >= 0.0 or not step.word
         ]
-        queue += [(one.sent, one) for one in sections]
-        for t, one in sorted(queue, key=lambda pair: pair[0]):
+        queue += [(section.sent, section) for section in sections]
+        for t, entry in sorted(queue, key=lambda pair: pair[0]):
             # what comes from outside is scheduled before its time: the simulator keeps that to a tick
-            if isinstance(one, Section) or not one.word or self._running(t) is None:
+            if isinstance(entry, Section) or not entry.word or self._running(t) is None:
                 self._wait_until(t)
-            if isinstance(one, RepeatedStep):
-                self._repeat(one)
+            if isinstance(entry, RepeatedStep):
+                self._repeat(entry)
                 continue
-            self._begin(one)
+            self._begin(entry)
         self._wait_for_rest()
 
     # ---------------------------------------------------------------------------------------- programs
@@ -241,7 +241,7 @@ class _Run:
             self._approach(section)
         if self._mode is not None:
             message = mode_message(self._mode)
-            items = tuple(_with_mode(one, message) for one in program.items)
+            items = tuple(_with_mode(item, message) for item in program.items)
             program = wire.Run(items=items, when=program.when)
         try:
             handle = MotionHandle.send(self._arm.connection, program, count=len(program.items))
@@ -290,7 +290,9 @@ class _Run:
 
     def _stops_within(self, section: Section) -> list[RepeatedStep]:
         return [
-            one for one in self._commands.steps if one.word and section.motion.begin <= one.t <= section.until
+            step
+            for step in self._commands.steps
+            if step.word and section.motion.begin <= step.t <= section.until
         ]
 
     def _approach(self, section: Section) -> None:
@@ -308,8 +310,8 @@ class _Run:
         running = self._running(step.t)
         if step.word:
             is_streamed = any(
-                one.stream is not None and one.motion.begin <= step.t <= one.until
-                for one in self._commands.sections
+                section.stream is not None and section.motion.begin <= step.t <= section.until
+                for section in self._commands.sections
             )
             if is_streamed:
                 return  # scheduled with the stream
@@ -360,7 +362,9 @@ class _Run:
     def _began(self, handle: MotionHandle) -> float:
         """When a program began [s], on the simulator's clock; it is waited for."""
         connection, number = self._arm.connection, handle.id
-        seen = [one for one in connection.history() if one.motion is not None and one.motion.id == number]
+        seen = [
+            state for state in connection.history() if state.motion is not None and state.motion.id == number
+        ]
         if not seen:
             seen = [
                 connection.wait_for(
@@ -409,14 +413,14 @@ class _Run:
             self._arm.connection.wait_for(lambda state: state.stamp * 1e-9 >= stamp, limit)
 
 
-def _with_mode(one: wire.Item, mode: wire.Mode | None) -> wire.Item:
+def _with_mode(item: wire.Item, mode: wire.Mode | None) -> wire.Item:
     return wire.Item(
-        motion=one.motion,
-        frame=one.frame,
+        motion=item.motion,
+        frame=item.frame,
         mode=mode,
-        until=one.until,
-        triggers=one.triggers,
-        reaction=one.reaction,
+        until=item.until,
+        triggers=item.triggers,
+        reaction=item.reaction,
     )
 
 

@@ -23,8 +23,8 @@ from heptarm.values.checks import (
     within,
     word,
 )
-from heptarm.values.frames import check_printable
-from heptarm.values.pose import Pose
+from heptarm.values.frames import check_name, check_printable
+from heptarm.values.pose import Pose, check_pose
 
 #: Farthest place of a camera from its frame's origin along each axis, shortest distance to what it looks at [m].
 FARTHEST, NEAREST = 20.0, 0.001
@@ -34,6 +34,23 @@ FIELDS, SIZES, FASTEST = (0.02, 2.8), (16, 4096), 60.0
 NOISIEST, BLURREST = 100.0, 20.0
 #: Frames that a camera may be attached to.
 FRAMES = ("base", "flange")
+
+
+def lens_distortion(distortion: npt.ArrayLike, name: str = "distortion") -> Array:
+    """Distortion of a lens as in OpenCV: k1 k2 p1 p2 k3, shape (5,).
+
+    Raises:
+        ShapeError: not five numbers.
+        LimitError: one that is not finite.
+    """
+    found = finite_entries(numbers(distortion, name), name)
+    if found.shape != (5,):
+        raise ShapeError(
+            f"{name} must have five numbers, k1 k2 p1 p2 k3, got the shape {found.shape}",
+            parameter=name,
+            value=distortion,
+        )
+    return frozen(found)
 
 
 def intrinsic(matrix: npt.ArrayLike, name: str = "matrix") -> Array:
@@ -59,6 +76,37 @@ def intrinsic(matrix: npt.ArrayLike, name: str = "matrix") -> Array:
             value=matrix,
         )
     return frozen(found)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MountedCamera(Value):
+    """A camera of your own that was measured: where it is, and how it projects.
+
+    Attributes:
+        name: of the camera.
+        frame: "flange": it moves with the arm; or "base".
+        pose: in that frame: x to the right of its pictures, y down, z ahead.
+        matrix: intrinsic matrix, shape (3, 3) [pixels].
+        distortion: k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
+
+    Raises:
+        ShapeError: wrong types.
+        LimitError: no intrinsic matrix.
+        CommandRejected: a name that is not allowed.
+    """
+
+    name: str
+    frame: str
+    pose: Pose
+    matrix: Array
+    distortion: Array = field(default_factory=lambda: np.zeros(5))
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "name")
+        word(self.frame, "frame", FRAMES)
+        check_pose(self.pose)
+        object.__setattr__(self, "matrix", intrinsic(self.matrix))
+        object.__setattr__(self, "distortion", lens_distortion(self.distortion))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, Field
 from typing import Any, ClassVar, TypeAlias, TypeVar
 
@@ -315,7 +315,7 @@ def instance(value: object, kind: type[_Kind] | tuple[type, ...], name: str, hin
     """
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
-        wanted = " or ".join(one.__name__ for one in kinds)
+        wanted = " or ".join(kind.__name__ for kind in kinds)
         article = "an" if wanted[0] in "AEIOU" else "a"
         raise ShapeError(
             f"{name} must be {article} {wanted}, got {shown(value)}", parameter=name, value=value, hint=hint
@@ -335,6 +335,23 @@ def word(value: str, name: str, allowed: Collection[str]) -> str:
             f"{name} must be one of {listed}, got {shown(value)}", parameter=name, value=value, allowed=listed
         )
     return value
+
+
+def choice(name: str, parameter: str, choices: Mapping[str, _Kind]) -> _Kind:
+    """What has a name, out of some; see `word`.
+
+    Raises:
+        ShapeError: none has that name; the text lists those that there are.
+    """
+    if isinstance(name, str) and name in choices:
+        return choices[name]
+    allowed = ", ".join(choices)
+    raise ShapeError(
+        f"{parameter} must be one of {allowed}, got {shown(name)}",
+        parameter=parameter,
+        value=name,
+        allowed=allowed,
+    )
 
 
 def flag(value: bool, name: str) -> bool:

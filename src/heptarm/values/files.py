@@ -188,12 +188,12 @@ def read_arrays(path: Path, what: str, *, hint: str = "") -> dict[str, npt.NDArr
     entry = ""
     try:
         with open_regular(path) as raw, zipfile.ZipFile(raw) as archive:
-            if sum(one.file_size for one in archive.infolist()) > _LARGEST_ARRAYS:
+            if sum(member.file_size for member in archive.infolist()) > _LARGEST_ARRAYS:
                 raise ValueError(f"its arrays have more than {_LARGEST_ARRAYS} bytes")
             found = {}
-            for one in archive.infolist():
-                entry = one.filename
-                found[entry.removesuffix(".npy")] = _array(archive.read(one))
+            for member in archive.infolist():
+                entry = member.filename
+                found[entry.removesuffix(".npy")] = _array(archive.read(member))
             return found
     except CommandRejected:
         raise

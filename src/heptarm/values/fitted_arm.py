@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.checks import Array, Value, array, frozen, instance, shown, within, word
+from heptarm.values.checks import Array, Value, array, choice, frozen, instance, within, word
 from heptarm.values.files import path_of, read_text, refuse_existing, unwritable
 from heptarm.values.robot import Body, Friction, RobotModel, robot
 from heptarm.values.text import lines
@@ -107,8 +107,8 @@ class FittedNumbers(Value):
     def __post_init__(self) -> None:
         kind = QUANTITIES[word(self.name, "name", tuple(QUANTITIES))]
         values = array(self.value, kind.size, self.name)
-        for index, one in enumerate(values.tolist()):
-            within(one, f"{self.name}[{index}]", kind.low, kind.high, unit=kind.unit)
+        for index, value in enumerate(values.tolist()):
+            within(value, f"{self.name}[{index}]", kind.low, kind.high, unit=kind.unit)
         object.__setattr__(self, "value", values)
         sigma = array(self.sigma, kind.size, f"sigma of {self.name}", nan=True)
         if (sigma < 0.0).any():
@@ -125,7 +125,7 @@ class FittedNumbers(Value):
         """Values with their standard deviations and the unit."""
         kind = QUANTITIES[self.name]
         pairs = zip(self.value.tolist(), self.sigma.tolist(), strict=True)
-        texts = [f"{one:.4g}" + ("" if np.isnan(sigma) else f" ± {sigma:.1g}") for one, sigma in pairs]
+        texts = [f"{value:.4g}" + ("" if np.isnan(sigma) else f" ± {sigma:.1g}") for value, sigma in pairs]
         return f"{'  '.join(texts)} {kind.unit}".rstrip()
 
     @property
@@ -133,10 +133,10 @@ class FittedNumbers(Value):
         """Its table in the file."""
         kind = QUANTITIES[self.name]
         of = " of A1 to A7" if kind.size == _AXES else ""
-        sigma = ", ".join("nan" if np.isnan(one) else f"{one:.3g}" for one in self.sigma)
+        sigma = ", ".join("nan" if np.isnan(value) else f"{value:.3g}" for value in self.sigma)
         return (
             f"[{self.name}]  # {kind.title}{of}{f' [{kind.unit}]' if kind.unit else ', a fraction'}\n"
-            f"value = [{', '.join(f'{one:.9g}' for one in self.value)}]\n"
+            f"value = [{', '.join(f'{value:.9g}' for value in self.value)}]\n"
             f"sigma = [{sigma}]\n"
             f"source = {json.dumps(self.source)}\n"
             f"date = {json.dumps(self.date)}\n"
@@ -162,7 +162,7 @@ class FittedArm(Value):
 
     def __post_init__(self) -> None:
         robot(self.robot)
-        names = [instance(one, FittedNumbers, "numbers").name for one in self.numbers]
+        names = [instance(numbers, FittedNumbers, "numbers").name for numbers in self.numbers]
         double = sorted({name for name in names if names.count(name) > 1})
         if double:
             raise CommandRejected(f"{double[0]} must be there once, got it twice", parameter="numbers")
@@ -171,7 +171,7 @@ class FittedArm(Value):
 
     def __contains__(self, name: object) -> bool:
         """Whether a quantity is known."""
-        return any(one.name == name for one in self.numbers)
+        return any(numbers.name == name for numbers in self.numbers)
 
     def __getitem__(self, name: str) -> FittedNumbers:
         """A quantity.
@@ -179,13 +179,7 @@ class FittedArm(Value):
         Raises:
             CommandRejected: it is not known; the text lists those that are.
         """
-        for one in self.numbers:
-            if one.name == name:
-                return one
-        known = ", ".join(one.name for one in self.numbers)
-        raise CommandRejected(
-            f"name must be one of {known}, got {shown(name)}", parameter="name", value=name, allowed=known
-        )
+        return choice(name, "name", {numbers.name: numbers for numbers in self.numbers})
 
     def value(self, name: str, otherwise: Array | float) -> Array:
         """The values of a quantity; `otherwise` where it is not known."""
@@ -225,20 +219,20 @@ class FittedArm(Value):
 
     def with_numbers(self, numbers: Iterable[FittedNumbers]) -> FittedArm:
         """The arm with other values of some quantities; those of the other names stay."""
-        given = {one.name: one for one in numbers}
-        kept = {one.name: one for one in self.numbers}
+        given = {numbers.name: numbers for numbers in numbers}
+        kept = {numbers.name: numbers for numbers in self.numbers}
         return replace(self, numbers=tuple((kept | given).values()))
 
     def __str__(self) -> str:
         """All quantities with their standard deviations, and what they do not explain."""
-        rows = {one.name: str(one) for one in self.numbers}
+        rows = {numbers.name: str(numbers) for numbers in self.numbers}
         known = lines(f"Fitted {self.model.title}", rows)
         return "\n".join([known, *(f"  contradicted: {text}" for text in self.contradictions)])
 
     @property
     def toml(self) -> str:
         """The file's content."""
-        parts = [f"robot = {json.dumps(self.robot)}\n", *(one.toml for one in self.numbers)]
+        parts = [f"robot = {json.dumps(self.robot)}\n", *(numbers.toml for numbers in self.numbers)]
         for text in self.contradictions:
             parts.append(f"[[{_CONTRADICTIONS}]]\n{_TEXT} = {json.dumps(text, ensure_ascii=False)}\n")
         return "\n".join(parts)
@@ -280,11 +274,11 @@ def load_fitted(path: str | Path) -> FittedArm:
     if not isinstance(named, str):
         raise _bad(file, "it names no robot")
     if not isinstance(remarks, list) or not all(
-        isinstance(one, Mapping) and isinstance(one.get(_TEXT), str) for one in remarks
+        isinstance(remark, Mapping) and isinstance(remark.get(_TEXT), str) for remark in remarks
     ):
         raise _bad(file, f"[[{_CONTRADICTIONS}]] must have a {_TEXT} each")
     numbers = tuple(_numbers(file, name, table) for name, table in tables.items())
-    fitted = FittedArm(named, numbers, tuple(one[_TEXT] for one in remarks))
+    fitted = FittedArm(named, numbers, tuple(remark[_TEXT] for remark in remarks))
     fitted.friction, fitted.load  # noqa: B018  # one that no body has is refused here
     return fitted
 
@@ -304,4 +298,4 @@ def _numbers(file: Path, name: str, table: Any) -> FittedNumbers:
     texts = {key: table[key] for key in ("source", "date") if key in table}
     size = QUANTITIES[name].size
     sigma = table.get("sigma", [float("nan")] * size)
-    return FittedNumbers(name, table["value"], sigma, **{key: str(one) for key, one in texts.items()})
+    return FittedNumbers(name, table["value"], sigma, **{key: str(text) for key, text in texts.items()})

@@ -103,7 +103,7 @@ class Mesh(Value):
                 break
             part = new
         used = np.unique(self.faces)
-        return [self.vertices[used[part[used] == one]] for one in np.unique(part[used])]
+        return [self.vertices[used[part[used] == label]] for label in np.unique(part[used])]
 
 
 def mesh(path: str | Path, *, scale: float = 1.0, at: Pose = ORIGIN) -> Mesh:
@@ -203,7 +203,7 @@ def _stl(data: bytes, file: Path) -> tuple[Array, Triangles]:
             )
         places = [k for k, word in enumerate(words) if word == b"vertex"]
         try:
-            corners = np.array([[float(one) for one in words[k + 1 : k + 4]] for k in places], float)
+            corners = np.array([[float(word) for word in words[k + 1 : k + 4]] for k in places], float)
         except ValueError as error:
             raise unreadable(file, str(error), what="an STL file") from None
         if corners.ndim != 2 or corners.shape[1] != 3 or len(corners) % 3:

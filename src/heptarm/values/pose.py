@@ -362,7 +362,7 @@ class Pose(Value):
         """One line: millimetres and degrees, and the same in SI units."""
         a, b, c = (fixed(v, 2) for v in np.degrees(self.abc))
         x, y, z = (fixed(v * 1e3, 1) for v in self.xyz)
-        si, quat = (" ".join(fixed(v, 4) for v in one) for one in (self.xyz, self.quat))
+        si, quat = (" ".join(fixed(v, 4) for v in numbers) for numbers in (self.xyz, self.quat))
         return f"x {x}  y {y}  z {z} mm   a {a}  b {b}  c {c} deg   ({si} m, xyzw {quat})"
 
     def __repr__(self) -> str:

@@ -62,9 +62,9 @@ class Body(Value):
             return self
         com = (self.mass * self.com + other.mass * other.com) / mass
         inertia = np.zeros((3, 3))
-        for one in (self, other):
-            by = one.com - com
-            inertia += symmetric(one.inertia) + one.mass * (float(by @ by) * np.eye(3) - np.outer(by, by))
+        for body in (self, other):
+            by = body.com - com
+            inertia += symmetric(body.inertia) + body.mass * (float(by @ by) * np.eye(3) - np.outer(by, by))
         return Body(mass, com, _entries(inertia))
 
 
@@ -113,8 +113,8 @@ class Friction(Value):
             ("asymmetry", asymmetry, -_STRONGEST_FRICTION),
         ):
             numbers = one_or_each(value, 7, name)
-            for index, one in enumerate(numbers.tolist()):
-                within(one, f"{name}[{index}]", least, _STRONGEST_FRICTION)
+            for index, number in enumerate(numbers.tolist()):
+                within(number, f"{name}[{index}]", least, _STRONGEST_FRICTION)
             object.__setattr__(self, name, numbers)
         for name, speed in (("transition", transition), ("stribeck", stribeck)):
             object.__setattr__(self, name, within(speed, name, 0.0, 10.0, above=True, unit="rad/s"))
@@ -198,8 +198,8 @@ class Flange(Value):
 
 #: The flanges whose height is established, by name; from frames taught on real robots.
 FLANGES: dict[str, Flange] = {
-    one.name: one
-    for one in (Flange("plain", "no media flange", 0.0), Flange("touch", "Media Flange Touch", 0.026))
+    flange.name: flange
+    for flange in (Flange("plain", "no media flange", 0.0), Flange("touch", "Media Flange Touch", 0.026))
 }
 _PLAIN = FLANGES["plain"]
 
@@ -225,7 +225,7 @@ def flange(name: str | float) -> Flange:
             hint='for example flange="touch", for the Media Flange Touch of the station setup',
         ) from None
     within(height, "flange", 0.0, _HIGHEST_FLANGE, unit="m")
-    same = [one for one in FLANGES.values() if one.height == height]
+    same = [flange for flange in FLANGES.values() if flange.height == height]
     return same[0] if same else Flange(f"{height:g}", f"a flange {1e3 * height:g} mm high", height)
 
 
@@ -314,8 +314,8 @@ class RobotModel(Value):
 
     def __str__(self) -> str:
         """A few lines: its name, its dimensions, and the limits of its joints."""
-        low, high, fastest = (np.degrees(one) for one in (self.q_min, self.q_max, self.dq_max))
-        lengths = ", ".join(fixed(1e3 * one, 0) for one in (self.d_bs, self.d_se, self.d_ew, self.d_wf))
+        low, high, fastest = (np.degrees(limit) for limit in (self.q_min, self.q_max, self.dq_max))
+        lengths = ", ".join(fixed(1e3 * length, 0) for length in (self.d_bs, self.d_se, self.d_ew, self.d_wf))
         rows = {
             "links": f"{lengths} mm: base, shoulder, elbow, wrist, flange",
             "flange": f"{self.flange.name}: {self.flange.title}",
@@ -471,8 +471,8 @@ _SPEED_14, _TORQUE_14 = (85, 85, 100, 75, 130, 135, 135), (320, 320, 176, 176, 1
 #: All robots by name. The Med variants have the limits of the iiwa ones. The Med 14's base is taken as the iiwa 14's,
 #: since its source differs by 0.5 mm.
 ROBOTS: dict[str, RobotModel] = {
-    one.name: one
-    for one in (
+    model.name: model
+    for model in (
         _robot(
             "iiwa7",
             "LBR iiwa 7 R800",

@@ -42,20 +42,20 @@ class Sealed:
 
 def meant(name: str, known: Iterable[str]) -> str:
     """The question after a mistyped name: "did you mean 'speed'?"; "" if nothing is like it."""
-    by_lower = {one.lower(): one for one in known}
+    by_lower = {name.lower(): name for name in known}
     found = get_close_matches(name.lower(), by_lower, n=1)
     return f"did you mean {by_lower[found[0]]!r}?" if found else ""
 
 
 def _declarations(kind: type) -> dict[str, bool]:
     found: dict[str, bool] = {}
-    for one in reversed(kind.__mro__):
-        for name, annotation in inspect.get_annotations(one).items():
+    for base in reversed(kind.__mro__):
+        for name, annotation in inspect.get_annotations(base).items():
             text = str(annotation).rpartition("typing.")[2]
             found[name] = text.startswith("Final")
             if text.startswith("ClassVar"):
                 del found[name]
-        for name, entry in vars(one).items():
+        for name, entry in vars(base).items():
             if hasattr(entry, "__set__") and getattr(entry, "fset", True) is not None:
                 found[name] = False
             elif callable(entry) or isinstance(entry, property):
@@ -66,13 +66,13 @@ def _declarations(kind: type) -> dict[str, bool]:
 def _refusal(owner: Sealed, name: str) -> UnknownSetting:
     """The error of an attribute that cannot be set."""
     kind = type(owner)
-    settings = sorted(one for one, is_final in kind._declared.items() if not is_final)
+    settings = sorted(key for key, is_final in kind._declared.items() if not is_final)
     listed = f"settings are {', '.join(settings)}" if settings else "it has no settings"
     if name in kind._declared or hasattr(kind, name):
         text, question = f"{name} of {kind.__name__} cannot be set", ""
     else:
         text = f"{kind.__name__} has no setting {name!r}"
-        question = meant(name, settings) or meant(name, (one for one in dir(kind) if one[:1] != "_"))
+        question = meant(name, settings) or meant(name, (key for key in dir(kind) if key[:1] != "_"))
     return UnknownSetting(
         text, parameter=name, allowed=", ".join(settings), hint=f"{question} {listed}" if question else listed
     )

@@ -161,7 +161,7 @@ def checked_shapes(value: Sequence[Shape], name: str) -> tuple[Shape, ...]:
             parameter=name,
             value=len(value),
         )
-    return tuple(instance(one, Shape, f"{name}[{index}]") for index, one in enumerate(value))
+    return tuple(instance(shape, Shape, f"{name}[{index}]") for index, shape in enumerate(value))
 
 
 def _made(kind: ShapeKind, sizes: tuple[float, ...], at: Pose) -> Shape:

@@ -190,15 +190,15 @@ class SimulatorOptions:
     def arguments(self) -> list[str]:
         """Command line of the cabinet's process for all values that differ from their default."""
         result: list[str] = []
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if value == one.default:
+        for option in fields(self):
+            value = getattr(self, option.name)
+            if value == option.default:
                 continue
             if isinstance(value, bool):
-                result.append(flag(one.name))
+                result.append(flag(option.name))
                 continue
             for part in value if isinstance(value, tuple) else (value,):
-                result += [flag(one.name), str(part)]
+                result += [flag(option.name), str(part)]
         return result
 
 
@@ -214,7 +214,7 @@ def check_target_option(name: str, value: str) -> None:
         ValueError: there is no such option, or its value is out of range.
     """
     known: dict[str, Field[Any]] = {
-        one.name: one for one in fields(SimulatorOptions) if one.metadata["in_target"]
+        field.name: field for field in fields(SimulatorOptions) if field.metadata["in_target"]
     }
     if name not in known:
         raise ValueError(f"option must be one of {', '.join(known)}; got {name!r}")

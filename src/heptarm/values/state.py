@@ -120,7 +120,7 @@ class Wrench(Value):
 
     def __str__(self) -> str:
         """One line."""
-        force, torque = (" ".join(fixed(v, 2) for v in one) for one in (self.force, self.torque))
+        force, torque = (" ".join(fixed(v, 2) for v in vector) for vector in (self.force, self.torque))
         doubt = "" if self.valid() else "   inaccurate here"
         return f"force {force} N   torque {torque} Nm{doubt}"
 
@@ -347,7 +347,7 @@ class Groups(Value):
 
 
 #: Names of all groups, as in `arm.subscribe(groups=...)`.
-GROUP_NAMES = tuple(one.name for one in fields(Groups) if one.init)
+GROUP_NAMES = tuple(field.name for field in fields(Groups) if field.init)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

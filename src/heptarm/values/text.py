@@ -64,7 +64,7 @@ def degrees(values: npt.ArrayLike, digits: int = 2) -> Cells:
     given = np.atleast_1d(np.asarray(values, dtype=np.float64))
     turned = [fixed(value, digits) for value in np.degrees(given)]
     same = [fixed(value, digits + 2) for value in given]
-    both = tuple(f"{one} deg\n{other} rad" for one, other in zip(turned, same, strict=True))
+    both = tuple(f"{angle} deg\n{other} rad" for angle, other in zip(turned, same, strict=True))
     return _cells(f"{' '.join(turned)} deg ({' '.join(same)} rad)", both)
 
 
@@ -97,15 +97,15 @@ def described(value: Any, title: str) -> Listing:
 
 
 def _rows(value: Any) -> Iterable[tuple[str, str]]:
-    for one in sorted(fields(value), key=lambda one: one.name in _LAST):
-        entry = getattr(value, one.name)
-        default = one.default if one.default is not MISSING else None
+    for field in sorted(fields(value), key=lambda field: field.name in _LAST):
+        entry = getattr(value, field.name)
+        default = field.default if field.default is not MISSING else None
         if entry is default or (default is not None and _same(entry, default)):
             continue
-        if one.name in ("dynamics", "blending"):
+        if field.name in ("dynamics", "blending"):
             yield from ((name, text) for name, text in _rows(entry) if text != "-")
         else:
-            yield one.name, _text(one.name, entry)
+            yield field.name, _text(field.name, entry)
 
 
 def _same(entry: Any, default: Any) -> bool:
@@ -123,14 +123,14 @@ def _text(name: str, value: Any) -> str:
         if name in _ANGLES:
             return degrees(value)
         numbers = np.unique(value) if value.ndim == 1 else value
-        text = " ".join(f"{one:g}" for one in (numbers if len(numbers) == 1 else value.reshape(-1)))
+        text = " ".join(f"{number:g}" for number in (numbers if len(numbers) == 1 else value.reshape(-1)))
         return f"{text} {_unit(name)}".rstrip()
     if isinstance(value, float):
         if name in _ANGLES:
             return degrees(value)
         return "-" if math.isnan(value) else f"{value:g} {_unit(name)}".rstrip()
     if isinstance(value, tuple) and len(value) > 0:
-        shown = [" ".join(str(one).split()) for one in value[:_SHOWN]]
+        shown = [" ".join(str(entry).split()) for entry in value[:_SHOWN]]
         more = [f"... {len(value) - _SHOWN} more"] if len(value) > _SHOWN else []
         return "\n".join(shown + more)
     return str(value)

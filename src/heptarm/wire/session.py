@@ -7,6 +7,41 @@ It has no socket, clock or thread::
     session.receive_data(received)
     for event in session.events():
         ...
+
+Theory of operation
+-------------------
+
+**States.** Both sides pass through the same ones, whether a message is sent or received::
+
+    start --Hello--> hello ----------------------Welcome--> open --Goodbye--> closed
+      |                +--Challenge--> challenged --Proof--> proved --Welcome--> open
+      +--Halt--> halting --Halted--> closed                 (a Refusal closes any of these)
+
+The table is generated (`states.TRANSITIONS`); nothing here asks for a state by its name, but for what the table
+allows. `_enter` derives from it once per state what the usual cases need: `simple_requests`, `takes_states`, the
+packers of servo targets.
+
+**Two kinds of error.** What this side may not send raises `LocalProtocolError`, and nothing has changed: no frame is
+counted, no request waits. What the other side may not send raises `RemoteProtocolError` and closes the session for
+good; every later call of `events` raises the same error again, since bytes behind a broken frame mean nothing.
+
+**Frames are counted, not trusted.** A frame carries the number of its predecessors in this direction. The first one
+that is not the next ends the session: a stream that has lost or doubled a frame, or that somebody has cut into, would
+let a request pass for another one. With a key, each frame has a tag from the Welcome on (`key`), which includes that
+number; where the numbers begin again, so do the tags.
+
+**Requests** are in `waiting` from the moment of their frame until their answer, by ids that the sender chooses; an
+answer of another id is a violation. Several may be under way, and events may come in between. A request that the
+cabinet refuses gets a Rejected, which is an answer; a Rejected without an id is about a message that was no request.
+
+**Proof of the key.** Hello and Challenge carry a nonce of each side, Proof and Welcome a MAC over all that came before
+them. A client that has a key takes no Welcome without one; a nonce that comes back to its sender is refused, since
+it would make this side prove the key to itself.
+
+**Calls.** One thread sends and one receives at a time, and the caller sees to it (`heptarm.arm.link.link` with its
+locks). `heptarm.io.exchange` sends simple requests and reads their answers in C: that is why `counts`, `waiting` and
+`tags` are plain lists and dictionaries that both change, and why `answer` takes a body without a frame. What it leaves,
+bytes of anything else, comes in by `receive_data` as ever.
 """
 
 from __future__ import annotations
@@ -207,18 +242,12 @@ class Session:
         Raises:
             LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
-        data = self.pack_numbers(kind, numbers, time=time, number=number)
-        self._count_sent()
-        return data
-
-    def pack_numbers(
-        self, kind: type[OneWay], numbers: Iterable[float], *, time: int, number: int = 0
-    ) -> bytes:
-        """Pack as `send_numbers` does, without counting the message as sent."""
         pack = self._packers.get(kind)
         if pack is None:
             raise self._illegal(kind)
-        return pack(self.counts[SENT], number, time, *numbers)
+        data = pack(self.counts[SENT], number, time, *numbers)
+        self._count_sent()
+        return data
 
     def datagrams(self, session: int, token: bytes) -> Datagrams:
         """This side's end of the datagrams beside the session.

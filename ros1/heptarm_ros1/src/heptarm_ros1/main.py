@@ -7,6 +7,7 @@ import sys
 
 import rospy
 
+from heptarm.errors import HeptarmError
 from heptarm_ros1.node import HeptarmNode
 
 
@@ -29,7 +30,11 @@ def main() -> int:
     log = logging.getLogger("heptarm")
     log.addHandler(RosLogHandler(logging.WARNING))
     log.propagate = False
-    node = HeptarmNode()
+    try:
+        node = HeptarmNode()
+    except HeptarmError as error:  # of a parameter
+        rospy.logfatal(str(error))
+        return 1
     rospy.on_shutdown(node.close)
     rospy.spin()
     return 0

@@ -14,6 +14,7 @@ import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from heptarm.errors import HeptarmError, NotReady
+from heptarm.fri import State as FriState
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.names import NameRole
 from heptarm.ros.node.driver import Driver
@@ -41,7 +42,7 @@ class HeptarmNode:
 
     def __init__(self) -> None:
         self.driver: Driver | None = None
-        self.configuration = NodeConfiguration.of({})
+        self.configuration = NodeConfiguration.of(parameters.read()[0])  # what it refuses no retry mends
         self._given: dict[str, Any] = {}
         self._states: StatePublisher | None = None
         self._presets: PresetPublisher | None = None
@@ -97,10 +98,8 @@ class HeptarmNode:
             if warning:
                 rospy.logwarn(warning)
             self.configuration = NodeConfiguration.of(self._given)
-            self._states, self._presets = (
-                StatePublisher(self.configuration),
-                PresetPublisher(self.configuration),
-            )
+            self._states = StatePublisher(self.configuration)
+            self._presets = PresetPublisher(self.configuration, fri=self._fri_state)
             self._events = EventPublisher(self.configuration)
             try:
                 self.driver = Driver(self.configuration, self)
@@ -207,6 +206,9 @@ class HeptarmNode:
     @property
     def _publishers(self) -> tuple[StatePublisher | PresetPublisher | TransformPublisher | None, ...]:
         return self._states, self._presets, self._transforms
+
+    def _fri_state(self) -> FriState | None:
+        return None if self.driver is None else self.driver.fri.newest
 
     # -------------------------------------------------------------------------- from the driver
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from heptarm.fri import State as FriState
 from heptarm.ros.interface.messages import class_of
 from heptarm.ros.interface.names import PRESETS, NameRole
 from heptarm.ros.interface.state_messages import preset_event, preset_message
@@ -12,10 +15,15 @@ from heptarm_ros1.publishers import publisher
 
 
 class PresetPublisher:
-    """Publishes states and events under the names that the parameter `names` adds."""
+    """Publishes states and events under the names that the parameter `names` adds.
 
-    def __init__(self, configuration: NodeConfiguration) -> None:
-        self._names = configuration
+    Args:
+        configuration: of the node.
+        fri: the newest message of the open FRI session; None: none is open.
+    """
+
+    def __init__(self, configuration: NodeConfiguration, *, fri: Callable[[], FriState | None]) -> None:
+        self._names, self._fri = configuration, fri
         self._publishers = [
             (entry, publisher(class_of(entry.type, "msg"), entry.name))
             for entry in PRESETS[configuration.values["names"]].published()
@@ -30,7 +38,7 @@ class PresetPublisher:
         for entry, one in self._publishers:
             if one.get_num_connections() == 0:
                 continue
-            message = preset_message(ROS, entry, one.data_class, state, self._names)
+            message = preset_message(ROS, entry, one.data_class, state, self._names, self._fri())
             if message is not None:
                 one.publish(message)
 

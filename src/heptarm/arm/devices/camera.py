@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout, require
 from heptarm.io.clock import Clock
 from heptarm.model.kinematics import forward
 from heptarm.record.camera import CameraFeed
@@ -115,8 +115,8 @@ class DrawnSource:
         if self._feed.is_over:
             raise CommandRejected("the process of the camera has ended", parameter="camera")
         return [
-            _Shot(one.sampled, one.sampled + self._latency, self._split(one.data))
-            for one in self._feed.take()
+            _Shot(sample.sampled, sample.sampled + self._latency, self._split(sample.data))
+            for sample in self._feed.take()
         ]
 
     def _split(self, data: bytes) -> dict[str, npt.NDArray[Any]]:
@@ -212,6 +212,28 @@ class CalledSource:
                 return
             moment = self._clock.nanos() - self._latency
             self._shots.append(_Shot(moment, 0, {"pixels": pixels}))
+
+
+def opened_camera(text: str) -> PictureSource:
+    """What reads the next picture of a camera of this computer, or of a stream.
+
+    Args:
+        text: its number, or the address of a stream, as OpenCV opens it.
+
+    Raises:
+        CommandRejected: it cannot be opened.
+        MissingExtra: OpenCV is not installed.
+    """
+    opened = require("cv2", extra="vision").VideoCapture(int(text) if text.isdigit() else text)
+    if not opened.isOpened():
+        raise CommandRejected(
+            f"the camera {text!r} cannot be opened",
+            parameter="camera",
+            value=text,
+            hint="give its number, from 0, the address of a stream, or sim for a simulated one",
+        )
+    read: PictureSource = opened.read
+    return read
 
 
 def _pixels(given: object) -> npt.NDArray[np.uint8]:
@@ -359,8 +381,8 @@ class CameraStream(Sealed, Iterator[Picture]):
         first = integer(after, "after", 0, 2**63 - 1)
 
         def is_new() -> bool:
-            one = self._newest
-            return one is not None and one.stamp > self._returned and one.stamp >= first
+            shot = self._newest
+            return shot is not None and shot.stamp > self._returned and shot.stamp >= first
 
         with self._changed:
             self._changed.wait_for(lambda: is_new() or self._is_over, seconds)
@@ -417,7 +439,7 @@ class CameraStream(Sealed, Iterator[Picture]):
         first = self._samples.get(_LOOK)
         batch = [] if first is None else [first, *self._samples.take(_BATCH)]
         if batch:
-            rows = state_rows([one.body for one in batch])
+            rows = state_rows([sample.body for sample in batch])
             for stamp, q in zip(rows["joints_stamp"].tolist(), rows["q"], strict=True):
                 if np.isfinite(q).all():
                     self._past.append((self._link.to_ours(stamp), stamp, q))

@@ -132,7 +132,7 @@ class Io(Sealed, Mapping[str, SignalValue]):
                 value=colour,
                 allowed=known,
             )
-        self.set({lamp: one == colour for one, lamp in lamps.items()})
+        self.set({lamp: key == colour for key, lamp in lamps.items()})
 
     @property
     def _lamps(self) -> dict[str, str]:

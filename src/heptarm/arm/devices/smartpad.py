@@ -19,9 +19,9 @@ _SLOTS = 4
 _MOST_BUTTONS = 12
 #: Longest wait for an answer between two checks of the link [s].
 _CHECK_INTERVAL = 0.2
-_KINDS = {one.name.lower(): one for one in wire.DialogKind}
-_SEVERITIES = {one.name.lower(): one for one in wire.Severity}
-_LEDS = {one.name.lower(): one for one in wire.KeyLed}
+_KINDS = {kind.name.lower(): kind for kind in wire.DialogKind}
+_SEVERITIES = {severity.name.lower(): severity for severity in wire.Severity}
+_LEDS = {led.name.lower(): led for led in wire.KeyLed}
 
 
 class Pad(Sealed):
@@ -223,7 +223,7 @@ class Pad(Sealed):
 
 def _labels(buttons: tuple[str, ...]) -> tuple[str, ...]:
     """The labels of a dialog's buttons. Raises ShapeError."""
-    labels = tuple(_text(one, f"buttons[{index}]", 64, least=1) for index, one in enumerate(buttons))
+    labels = tuple(_text(label, f"buttons[{index}]", 64, least=1) for index, label in enumerate(buttons))
     if not 1 <= len(labels) <= _MOST_BUTTONS or len(set(labels)) < len(labels):
         raise ShapeError(
             f"buttons must be 1 to {_MOST_BUTTONS} different labels, got {shown(list(labels))}",

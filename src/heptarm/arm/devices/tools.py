@@ -172,7 +172,7 @@ class Tooling:
     def _warn_of_load(self) -> None:
         """Log a warning if what is attached is heavier than the robot's rated load."""
         tool, held, _ = self._carried()
-        mass = sum(one.mass for one in (tool, held) if one is not None)
+        mass = sum(body.mass for body in (tool, held) if body is not None)
         robot = self._connection.robot
         if mass > robot.rated_load:
             _log.warning(

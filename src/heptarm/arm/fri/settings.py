@@ -202,9 +202,9 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
             hint="it needs FRI 1.14 or later; arm.io reads and writes them through the application",
         )
     known = connection.signals
-    all_names = tuple(one.name for one in known)
+    all_names = tuple(signal.name for signal in known)
     found = [known[find_name(name, all_names)] for name in names]
-    full = tuple(one.name for one in found)
+    full = tuple(signal.name for signal in found)
     if len(full) > MAX_IO:
         raise LimitError(
             f"FRI transmits at most {MAX_IO} signals, got {len(full)}",
@@ -213,16 +213,16 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
             value=len(full),
             allowed=f"[0, {MAX_IO}]",
         )
-    for place, one in enumerate(found):
-        if one.name in full[:place]:
+    for place, signal in enumerate(found):
+        if signal.name in full[:place]:
             raise CommandRejected(
-                f"io names {one.name} twice", code=int(Code.UNKNOWN_NAME), parameter=f"io[{place}]"
+                f"io names {signal.name} twice", code=int(Code.UNKNOWN_NAME), parameter=f"io[{place}]"
             )
-        if one.kind == "integer" or len(one.name) > MAX_NAME:
+        if signal.kind == "integer" or len(signal.name) > MAX_NAME:
             what = (
-                f"{one.name} is a signed integer, which FRI does not transmit"
-                if one.kind == "integer"
-                else f"FRI transmits names of at most {MAX_NAME} bytes, {one.name} has {len(one.name)}"
+                f"{signal.name} is a signed integer, which FRI does not transmit"
+                if signal.kind == "integer"
+                else f"FRI transmits names of at most {MAX_NAME} bytes, {signal.name} has {len(signal.name)}"
             )
             raise CommandRejected(
                 what, code=int(Code.UNSUPPORTED), parameter=f"io[{place}]", hint="arm.io reads and writes it"

@@ -873,7 +873,7 @@ class Connection:
     @property
     def signal_names(self) -> tuple[str, ...]:
         """Names of the cabinet's signals by their indices."""
-        return tuple(one.name for one in self.signals)
+        return tuple(signal.name for signal in self.signals)
 
     @property
     def state_rate(self) -> float:

@@ -122,12 +122,9 @@ class DatagramLine:
         self._last_target = now
         self._targets += 1
         number = self._targets & _NUMBERS
-        self._socket.send(self.pack(kind, numbers, number=number, now=now))
+        time = self._offset.to_cabinet(now)
+        self._socket.send(self._codec.pack_numbers(kind, numbers, time=time, number=number))
         return number
-
-    def pack(self, kind: type[OneWay], numbers: Iterable[float], *, number: int, now: int) -> bytes:
-        """Encode what `send_target` would send, without sending it."""
-        return self._codec.pack_numbers(kind, numbers, time=self._offset.to_cabinet(now), number=number)
 
     def needs_copy(self, now: int, silence: float) -> bool:
         """Whether a target has to go over TCP as well: no ping was answered for this long [s]."""

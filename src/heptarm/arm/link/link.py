@@ -49,7 +49,7 @@ from __future__ import annotations
 import logging
 import threading
 from _thread import get_ident
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from heptarm.arm.link.arrivals import Arrivals
@@ -471,13 +471,6 @@ class Link:
                     kind, numbers, time=self.offset.to_cabinet(now), number=number
                 )
                 self._transmit(data)
-
-    def pack_target(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
-        """Encode much as `send_target` does, without sending it."""
-        line = self._datagrams
-        if line is not None:
-            return line.pack(kind, numbers, number=0, now=now)
-        return self._session.pack_numbers(kind, numbers, time=self.offset.to_cabinet(now))
 
     def _ping(self, now: int) -> None:
         """The ping that is due."""

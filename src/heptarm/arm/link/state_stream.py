@@ -39,7 +39,7 @@ def groups_of(names: Sequence[str], offered: wire.Groups) -> wire.Groups:
     for name in names:
         group = wire.Groups.__members__.get(str(name).upper(), wire.Groups.NONE)
         if not group & offered:
-            known = ", ".join(one.name.lower() for one in wire.Groups if one & offered and one.name)
+            known = ", ".join(group.name.lower() for group in wire.Groups if group & offered and group.name)
             raise CommandRejected(
                 f"the cabinet offers no state group {shown(name)}",
                 parameter="groups",
@@ -94,7 +94,7 @@ class _KeptStates:
             last, bodies, times = self._last, list(self._bodies), list(self._received)
         before = last - len(bodies)  # number of the newest that is not kept any more
         kept = zip(count(before + 1), bodies, times, strict=False)  # the numbers have no end
-        return [StateSample(*one) for one in islice(kept, max(0, after - before), None)]
+        return [StateSample(*entry) for entry in islice(kept, max(0, after - before), None)]
 
 
 class StateFeed:
@@ -126,8 +126,8 @@ class StateFeed:
         sample = StateSample(1 if newest is None else newest.number + 1, body, received)
         self.newest = sample
         self._kept.append(sample)
-        for one in self._queues:
-            one.put(sample)
+        for queue in self._queues:
+            queue.put(sample)
         if self._waiting:
             self.wake()
 
@@ -151,8 +151,8 @@ class StateFeed:
 
     def note_gap(self, count: int) -> None:
         """Count states that never arrived as lost by all open streams."""
-        for one in self._queues:
-            one.skip(count, after=self.count)
+        for queue in self._queues:
+            queue.skip(count, after=self.count)
 
     def after(self, number: int, seconds: float) -> StateSample | None:
         """Wait for a sample newer than `number` and return the newest; None if none arrived in time."""
@@ -188,7 +188,7 @@ class StateFeed:
     def close(self, queue: SampleQueue) -> None:
         """Close a queue."""
         with self._changed:
-            self._queues = tuple(one for one in self._queues if one is not queue)
+            self._queues = tuple(other for other in self._queues if other is not queue)
 
 
 class Followed(Protocol):

@@ -73,10 +73,6 @@ class ClearTargets:
             known = {pair: distance for pair, distance in known.items() if pair in near}
         self.q, self._known, self.slowdown = q, known, FREE
 
-    def warm_up(self) -> None:
-        """Compute the last good target again: between two targets the code falls out of the caches."""
-        self._near(self.q)
-
     def _near(self, q: Array) -> dict[_Pair, float]:
         """Distances of the pairs that are nearer than the margin and not allowed to touch [m]."""
         model = self._model

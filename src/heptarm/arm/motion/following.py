@@ -6,6 +6,7 @@ the arm holds its position: a stop, a break condition or a safety function ends 
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -24,6 +25,7 @@ from heptarm.values.clearance import ChangingWorld, Clearance, TouchOnPath
 from heptarm.values.motion.motion import Motion, hold
 from heptarm.values.motion.planned_path import Path
 from heptarm.values.result import Cause, Result
+from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import lines
 
@@ -42,18 +44,23 @@ class Detour(Value):
     Attributes:
         clearance: the bodies that would have touched.
         reaction: from when the change was noticed to the command to brake [s].
-        seconds: likewise to the command to go on, after braking and searching [s].
+        braking: from there to when the arm held its position [s].
+        seconds: from when the change was noticed to the new path, after braking and searching [s].
         path: on which the arm went on.
     """
 
     clearance: Clearance
     reaction: float
+    braking: float
     seconds: float
     path: Path
 
     def __str__(self) -> str:
         """In words."""
-        return f"{self.clearance}; went on after {self.seconds:.2f} s: {self.path}"
+        return (
+            f"{self.clearance}; went on after {self.seconds:.2f} s, of which it braked for {self.braking:.2f} s: "
+            f"{self.path}"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,15 +78,15 @@ class FollowedPath(Value):
     def __str__(self) -> str:
         """A few lines."""
         rows = {"cause": self.result.cause.value}
-        rows |= {f"detour {number}": str(one) for number, one in enumerate(self.detours, 1)}
+        rows |= {f"detour {number}": str(detour) for number, detour in enumerate(self.detours, 1)}
         return lines("FollowedPath", rows)
 
 
 class PathSearch(Protocol):
-    """Searches a path from where the arm holds its position."""
+    """Searches a path from where the arm holds its position, or is about to."""
 
-    def __call__(self, *, start: Array, stop: Callable[[], bool]) -> Path:
-        """Find a path to the goal; raises NoPath."""
+    def __call__(self, *, start: Array, known: Path | None, stop: Callable[[], bool]) -> Path:
+        """Find a path to the goal, along a known one if that is free; raises NoPath."""
 
 
 class Sender(Protocol):
@@ -116,11 +123,13 @@ class _Blocked(Value):
 
     Attributes:
         clearance: the bodies that would touch.
+        stop: about where the arm comes to rest, shape (7,) [rad].
         noticed: when this was noticed, by `time.monotonic` [s].
         braked: when the arm was commanded to brake, likewise.
     """
 
     clearance: Clearance
+    stop: Array
     noticed: float
     braked: float
 
@@ -167,7 +176,7 @@ class PathFollower:
         if touch is None:
             return None
         self._running = self.terms.send(hold(), when="reject")
-        return _Blocked(touch.clearance, noticed, time.monotonic())
+        return _Blocked(touch.clearance, path.start, noticed, time.monotonic())
 
     def _watched(self, path: Path) -> _Blocked | None:
         """Watch the world until a body is in the way, and brake; None: the path has ended, or is to end."""
@@ -175,11 +184,13 @@ class PathFollower:
         while not running.done and not self._is_over():
             if self.terms.world.revision != self._seen:
                 noticed = time.monotonic()
-                index, rest = _rest(path.curve, self._commanded(self.connection.fresh()), index)
+                state = self.connection.fresh()
+                index, rest = _rest(path.curve, self._commanded(state), index)
                 touch = self._first_on(rest)
                 if touch is not None:
                     self._running = self.terms.send(hold(), when="replace")
-                    return _Blocked(touch.clearance, noticed, time.monotonic())
+                    stop = _stop(rest, state.dq, self.connection.robot)
+                    return _Blocked(touch.clearance, stop, noticed, time.monotonic())
             self.terms.on_progress(running.progress)
             self.terms.world.wait_for_change(self._seen, timeout=_CYCLE)
         return None
@@ -191,13 +202,21 @@ class PathFollower:
             NoPath: there is none in the world as it is now.
         """
         held, world = self._motion, self.terms.world
+
+        def is_over() -> bool:
+            return held.done or self._is_over()
+
+        known = None
+        with contextlib.suppress(NoPath):  # while the arm brakes, from about where it will rest
+            known = self.terms.search(start=blocked.stop, known=None, stop=is_over)
         start = self._held(held)
+        rests = time.monotonic()
         while start is not None:
             self._seen = world.revision
             try:
-                found = self.terms.search(start=start, stop=lambda: held.done or self._is_over())
+                found = self.terms.search(start=start, known=known, stop=is_over)
             except NoPath:
-                if held.done or self._is_over():
+                if is_over():
                     return None
                 if world.revision == self._seen:
                     raise
@@ -206,10 +225,9 @@ class PathFollower:
                 continue
             if held.wait().cause is not Cause.REPLACED:  # it was ended before: nothing moves on
                 return None
-            now = time.monotonic()
-            self._detours.append(
-                Detour(blocked.clearance, blocked.braked - blocked.noticed, now - blocked.noticed, found)
-            )
+            noticed, braked = blocked.noticed, blocked.braked
+            seconds = time.monotonic() - noticed
+            self._detours.append(Detour(blocked.clearance, braked - noticed, rests - braked, seconds, found))
             return found
         return None
 
@@ -218,7 +236,8 @@ class PathFollower:
         while not held.done and not self._is_over():
             if held.wait_started(_CYCLE) and not held.done:
                 state = self.connection.wait_for(
-                    lambda one: held.done or (one.motion is not None and one.motion.id == held.id), _SOON
+                    lambda state: held.done or (state.motion is not None and state.motion.id == held.id),
+                    _SOON,
                 )
                 return None if held.done else self._commanded(state)
         return None
@@ -287,3 +306,18 @@ def _rest(curve: Array, here: Array, first: int) -> tuple[int, Array]:
     gaps = np.linalg.norm(begins + parts[:, None] * steps - here, axis=1)
     index = first + int(np.flatnonzero(gaps <= gaps.min() + _SAME)[0])
     return index, np.vstack([here, curve[index + 1 :]])
+
+
+def _stop(rest: Array, dq: Array, robot: RobotModel) -> Array:
+    """About where an arm comes to rest that brakes on what is left of a path, shape (7,) [rad].
+
+    Args:
+        rest: as of `_rest`.
+        dq: velocities of the joints, shape (7,) [rad/s].
+        robot: the robot.
+    """
+    # with the acceleration that its joints have, which the limit of the jerk lets them reach in time
+    seconds = float((np.abs(dq) / robot.ddq_max + robot.ddq_max / robot.dddq_max).max())
+    marks = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rest, axis=0), axis=1))])
+    at = min(0.5 * seconds * float(np.linalg.norm(dq)), float(marks[-1]))
+    return np.array([np.interp(at, marks, column) for column in rest.T])

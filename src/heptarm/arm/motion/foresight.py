@@ -104,24 +104,24 @@ class Foresight:
             MissingExtra: the planner is not installed.
         """
         boundary = self.boundary()
-        has_path = any(isinstance(one, Path) for one in program.motions)
+        has_path = any(isinstance(motion, Path) for motion in program.motions)
         if self.check is None and boundary is None and not has_path:
             return
         state = self._connection.fresh()
         queues = program.terms.when == "queue"
         start = self._end if _is_busy(state) and queues and self._end is not None else state.q
-        items = list(takewhile(lambda one: not isinstance(one.motion, wire.HandGuide), program.items))
+        items = list(takewhile(lambda item: not isinstance(item.motion, wire.HandGuide), program.items))
         self._end = None
         if not items:
             return
-        finite = [_BRIEF if isinstance(one.motion, wire.Hold) else one for one in items]
+        finite = [_BRIEF if isinstance(item.motion, wire.Hold) else item for item in items]
         ahead = self._planned(finite, np.asarray(start), _STEP)
         for index, path in enumerate(_paths(ahead)):
             name = f"motions[{index}]" if len(program.items) > 1 else "motion"
             if boundary is not None:
                 _check_inside(path, boundary, name)
             checks = self._checks(program.motions[index], self.check)
-            touches = (self._tooling.loaded(one).first_on(path) for one in checks)
+            touches = (self._tooling.loaded(check).first_on(path) for check in checks)
             touch = next(filter(None, touches), None)
             if touch is not None:
                 of = f"motions[{index}]: " if len(program.items) > 1 else ""
@@ -139,7 +139,7 @@ class Foresight:
     def _checks(motion: Motion, check: CollisionCheck | None) -> list[CollisionCheck]:
         """What checks a motion: a model, and of a path the world around which it was found, as it is now."""
         world = motion.world if isinstance(motion, Path) else None
-        return [one for one in (check, world if world is not check else None) if one is not None]
+        return [model for model in (check, world if world is not check else None) if model is not None]
 
     def find_path(
         self,
@@ -153,6 +153,7 @@ class Foresight:
         states: int,
         improve: int,
         seed: int,
+        known: Path | None = None,
         stop: Callable[[], bool] | None,
         progress: Callable[[int, float], object] | None,
     ) -> Path:
@@ -184,6 +185,7 @@ class Foresight:
             states=states,
             improve=improve,
             seed=seed,
+            known=known,
             stop=stop,
             progress=progress,
         )
@@ -217,7 +219,7 @@ class Foresight:
         rows = ((ahead.q[k], ahead.dq[k], ahead.ddq[k]) for k in kept.tolist())
         torques = np.array([inverse_dynamics(robot, *row, load=load) for row in rows])
         tau = np.array([np.interp(ahead.t, ahead.t[kept], column) for column in torques.T]).T
-        checks = [self._checks(one, self.check if check is None else check) for one in motions]
+        checks = [self._checks(motion, self.check if check is None else check) for motion in motions]
         return ProgramPreview(
             robot,
             ahead.t,
@@ -258,7 +260,9 @@ class Foresight:
         state = self._connection.fresh()
         try:  # the last state may be older than the end of the last motion
             state = (
-                self._connection.wait_for(lambda one: not _is_busy(one), _SOON) if _is_busy(state) else state
+                self._connection.wait_for(lambda state: not _is_busy(state), _SOON)
+                if _is_busy(state)
+                else state
             )
         except Timeout:
             raise ModeConflict(
@@ -315,7 +319,10 @@ def _paths(program: PlannedProgram) -> list[Array]:
 def _listed(motions: Sequence[Motion], program: PlannedProgram) -> list[PreviewedMotion]:
     ends = [*program.begins[1:], program.duration]
     rows = zip(motions, program.begins, ends, program.is_blended, strict=True)
-    return [PreviewedMotion(type(one).__name__, begin, end - begin, flows) for one, begin, end, flows in rows]
+    return [
+        PreviewedMotion(type(motion).__name__, begin, end - begin, flows)
+        for motion, begin, end, flows in rows
+    ]
 
 
 def _time_of(touch: TouchOnPath, t: Array, path: Array) -> float:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.servo import Servo, ServoStats, StreamTerms
-from heptarm.errors import HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.model.boundary import TOLERANCE
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.model.velocity import (
@@ -167,6 +167,14 @@ class JogServo(Servo):
     def _check_of_targets(self) -> None:
         """None: the path brakes before bodies, so no target of it is refused."""
 
+    def _check_may_change(self, limit: str) -> None:
+        """Refuse it: `set` has the velocity of each moment."""
+        raise CommandRejected(
+            f"a stream of velocities keeps its limits, got another {limit}",
+            parameter=limit,
+            hint="set() takes the velocity; for a higher limit leave the with block and begin another one",
+        )
+
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
         self._ending.set()
@@ -236,8 +244,8 @@ class JogServo(Servo):
         sample = self._connection.feed.newest
         state = None if sample is None else self._connection.build(sample)
         behind = lag(path, dq, state, now=now, rate=self._connection.real_time_factor)
-        held = [one for one in (behind, self._obstacle(path, dq), self._wall(path, dq)) if one]
-        least = min((*done, path.advance(dq, dt, held)), key=lambda one: one.factor)
+        held = [slowdown for slowdown in (behind, self._obstacle(path, dq), self._wall(path, dq)) if slowdown]
+        least = min((*done, path.advance(dq, dt, held)), key=lambda slowdown: slowdown.factor)
         if self._leaves(path.q):
             path.stay_at(before)
             least = Slowdown("workspace", 0.0)
@@ -388,7 +396,7 @@ class TwistServo(JogServo):
         dq, singular = resolved_twist(
             self._connection.robot, path, slowed, point, elbow=self._elbow, idle=wanted is None
         )
-        return dq, [one for one in (singular, wall) if one.reason]
+        return dq, [slowdown for slowdown in (singular, wall) if slowdown.reason]
 
     def _unbounded(self, path: VelocityPath, command: Array) -> Array:
         limits = self._twist_limits

@@ -205,7 +205,7 @@ class ProgramPreview(Value):
         return Chart(
             f"preview: {self.robot.title}, {len(self.motions)} motions, {self.duration:.2f} s",
             tuple(rows),
-            tuple(Band(one.begin, one.begin + one.duration) for one in self.motions),
+            tuple(Band(motion.begin, motion.begin + motion.duration) for motion in self.motions),
             tuple(Mark(found.t, "collision", is_alarm=True) for found in self.collisions),
         )
 

@@ -53,12 +53,12 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
             parameter="motion",
             hint="make motions with ptp, lin, lin_rel, circ, spline and hold",
         )
-    for index, one in enumerate(motions):
-        if not isinstance(one, Motion):
+    for index, entry in enumerate(motions):
+        if not isinstance(entry, Motion):
             raise ShapeError(
-                f"motions[{index}] must be a motion, got {one!r}",
+                f"motions[{index}] must be a motion, got {entry!r}",
                 parameter=f"motions[{index}]",
-                value=one,
+                value=entry,
                 hint="make motions with ptp, lin, lin_rel, circ, spline and hold; joint positions alone are ptp(q)",
             )
     return tuple(motions)
@@ -123,23 +123,23 @@ def resolved(
         StaleState: the newest state is too old, or lacks the joints.
     """
     place = _Place(start)
-    if start is None and any(isinstance(one, Ptp) and one.keeps for one in motions):
+    if start is None and any(isinstance(motion, Ptp) and motion.keeps for motion in motions):
         place = _Place(_rest(connection, connection.fresh()))
-    elif start is None and any(isinstance(one, Circ | Spline | Path) for one in motions):
+    elif start is None and any(isinstance(motion, Circ | Spline | Path) for motion in motions):
         newest = connection.newest()
         place = _Place(None if newest is None or newest.groups.joints is None else _rest(connection, newest))
     made: list[Motion] = []
     for index, motion in enumerate(motions):
         with inside(f"motions[{index}]" if len(motions) > 1 else ""):
-            one = in_base(motion, tooling.taught)
-            if isinstance(one, Ptp) and one.keeps:
-                one = _with_kept(one, place.q, index)
-            elif isinstance(one, Circ | Spline):
-                _check_arcs(one, place.seen(one.moving, tooling))
-            elif isinstance(one, Path):
-                _check_path(one, place.q, connection.robot.name)
-        place = place.behind(one)
-        made.append(one)
+            placed = in_base(motion, tooling.taught)
+            if isinstance(placed, Ptp) and placed.keeps:
+                placed = _with_kept(placed, place.q, index)
+            elif isinstance(placed, Circ | Spline):
+                _check_arcs(placed, place.seen(placed.moving, tooling))
+            elif isinstance(placed, Path):
+                _check_path(placed, place.q, connection.robot.name)
+        place = place.behind(placed)
+        made.append(placed)
     return tuple(made)
 
 
@@ -190,11 +190,11 @@ def _check_arcs(motion: Circ | Spline, start: Pose | None) -> None:
         if start is not None:
             circle_through(start, motion.via, motion.end)
         return
-    for index, one in enumerate(motion.segments):
-        if isinstance(one, Circ) and start is not None:
+    for index, segment in enumerate(motion.segments):
+        if isinstance(segment, Circ) and start is not None:
             with inside(f"segments[{index}]"):
-                circle_through(start, one.via, one.end)
-        start = _end(one)
+                circle_through(start, segment.via, segment.end)
+        start = _end(segment)
 
 
 def _text(value: object) -> str:

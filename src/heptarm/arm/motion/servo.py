@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from math import nan
@@ -23,13 +22,11 @@ from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
 from heptarm.errors import (
     CollisionForeseen,
     CommandRejected,
-    HeptarmError,
     LocalProtocolError,
     ShapeError,
     Timeout,
     Unreachable,
 )
-from heptarm.io.tcp import WarmUpConnection
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
@@ -49,7 +46,7 @@ from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode
 from heptarm.values.notebook import as_html
 from heptarm.values.pose import Pose, check_pose
-from heptarm.values.result import Result
+from heptarm.values.result import Cause, Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import fixed, lines
@@ -387,8 +384,6 @@ def documented(method: _Method) -> _Method:
 _PATIENCE = 5.0
 #: Calls of `set` whose cost is kept for the statistics.
 _COSTS = 4096
-#: Time before a tick at which its thread wakes to warm up the caches [s].
-_EARLY = 200e-6
 _DOUBLES = np.dtype(np.float64)
 #: Of a straight servo motion: time between two looks for what slows it down, the time that one takes at most [ns], and
 #: that in which it would be at its target, where nothing slows it down any more [s].
@@ -465,6 +460,8 @@ class StreamTerms:
 
     Attributes:
         message: that opens the motion.
+        request: of which the message was made.
+        ceiling: of the speed, a fraction in (0, 1].
         period: time between two ticks [s].
         watchdog: longest gap between two targets; a longer one stops the arm [s].
         boundary: of the workspace; None: there is none.
@@ -474,12 +471,20 @@ class StreamTerms:
     """
 
     message: wire.ServoOpen
+    request: ServoRequest
+    ceiling: float
     period: float
     watchdog: float
     boundary: Boundary | None = None
     clear: ClearanceModel | None = None
     until: tuple[Condition, ...] = ()
     breaks: tuple[BreakRule, ...] = ()
+
+    def changed(self, settings: dict[str, Any]) -> StreamTerms:
+        """The same stream with other settings of its request; errors as `ServoRequest` and its `message`."""
+        request = replace(self.request, **settings)
+        message = replace(request.message(self.ceiling), until=self.message.until)
+        return replace(self, request=request, message=message)
 
 
 class Servo(Block):
@@ -515,8 +520,6 @@ class Servo(Block):
         self._began = self._due = self._last = 0
         self._first_sent = self._last_sent = 0
         self._sent = self._late_ticks = self._clamped = 0
-        self._warm_up_socket: WarmUpConnection | None = None
-        self._last_target: tuple[type[wire.OneWay], tuple[float, ...]] | None = None
         self._costs: deque[int] = deque(maxlen=_COSTS)
 
     # ------------------------------------------------------------------------------------ life
@@ -531,30 +534,33 @@ class Servo(Block):
         if self._handle is not None:
             raise LocalProtocolError("a servo is used once", hint="make another one with arm.servo(...)")
         self._connection.check_may_wait("the with block of arm.servo()")
+        self._open(self._wait_for_start)
+        self._began = self._due = self._last = self._clock.nanos()
+        return self
+
+    def _open(self, prepare: Callable[[], None] = lambda: None) -> None:
+        """Begin the motion, wait until it runs, and prepare for targets; raises what keeps it from that."""
         handle = self._handle = MotionHandle.send(
             self._connection, self._message, until=self._terms.until, breaks=self._terms.breaks
         )
         try:
-            self._wait_until_started(handle)
+            if not handle.wait_started(_PATIENCE):
+                raise Timeout(
+                    f"the servo motion did not begin within {_PATIENCE:g} s",
+                    hint="check in arm.state.safety whether the robot is ready to move, or paused",
+                )
+            if handle.done:
+                self._result = handle.wait()  # raises the error that ended it
+            prepare()
         except BaseException:  # there will be no targets
             handle.cancel()
             raise
-        self._warm_up_socket = WarmUpConnection()
-        self._began = self._due = self._last = self._clock.nanos()
         self._number, self._active = handle.id, True
         self._connection.enter_block(handle, "arm.servo()")
         handle.add_done_callback(self._on_end)
-        return self
 
-    def _wait_until_started(self, handle: MotionHandle) -> None:
-        """Wait until the motion runs and its start is known; raises what keeps it from that."""
-        if not handle.wait_started(_PATIENCE):
-            raise Timeout(
-                f"the servo motion did not begin within {_PATIENCE:g} s",
-                hint="check in arm.state.safety whether the robot is ready to move, or paused",
-            )
-        if handle.done:
-            self._result = handle.wait()  # raises the error that ended it
+    def _wait_for_start(self) -> None:
+        """Wait until the state at the start is known."""
         newest = self._connection.newest()
         before = 0 if newest is None or newest.joints is None else newest.joints.stamp
         self._start = self._connection.wait_for(
@@ -570,8 +576,6 @@ class Servo(Block):
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
         handle = self._handle
-        if self._warm_up_socket is not None:
-            self._warm_up_socket.close()
         if handle is None or self._result is not None:
             return
         if not handle.done:
@@ -585,8 +589,9 @@ class Servo(Block):
         state = "not begun" if self._handle is None else "active" if self._active else "ended"
         return f"<{type(self).__name__}, {state}, {self._sent} targets sent>"
 
-    def _on_end(self, _: MotionHandle) -> None:
-        self._active = False
+    def _on_end(self, handle: MotionHandle) -> None:
+        if handle is self._handle:  # not one that ended for a change of the limits
+            self._active = False
 
     @property
     def active(self) -> bool:
@@ -627,8 +632,6 @@ class Servo(Block):
         now = clock.nanos()
         if now < self._due:
             self._look_ahead(now)
-            clock.sleep((self._due - now) * 1e-9 - _EARLY)
-            self._warm_up()
             clock.sleep_until(self._due)
             now = clock.nanos()
         late = (now - self._due) * 1e-9
@@ -640,14 +643,6 @@ class Servo(Block):
         self._last = now
         return passed if self._active else None
 
-    def _warm_up(self) -> None:
-        """Encode and send the last target to nowhere: between two ticks the code falls out of the caches."""
-        if self._clear is not None:
-            self._clear.warm_up()
-        if self._last_target is not None and self._warm_up_socket is not None:
-            with suppress(HeptarmError):  # the link has ended: sending the next target raises
-                self._warm_up_socket.send(self._link.pack_target(*self._last_target, now=self._clock.nanos()))
-
     def _look_ahead(self, now: int) -> None:
         """Use the time until the next tick, on the clock of this machine [ns]."""
 
@@ -655,24 +650,93 @@ class Servo(Block):
         if not self._active:
             _ = self.start  # raises unless it has begun
             return
-        self._last_target = kind, (self._number, self.watchdog, *target)
-        self._link.send_target(*self._last_target, now=began, watchdog=self.watchdog)
+        numbers = (self._number, self.watchdog, *target)
+        self._link.send_target(kind, numbers, now=began, watchdog=self.watchdog)
         self._sent += 1
         self._last_sent = now = self._clock.nanos()
         self._costs.append(now - began)
         if self._sent == 1:
             self._first_sent = now
 
-    def change(self, mode: Mode) -> None:
-        """Change the parameters of the control mode while the arm follows.
+    def change(
+        self,
+        mode: Mode | None = None,
+        *,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        speed_mps: float | None = None,
+        acceleration_mps2: float | None = None,
+        speed_radps: float | None = None,
+        acceleration_radps2: float | None = None,
+    ) -> None:
+        """Change the parameters of the control mode, or limits, of the running servo motion; None keeps them.
+
+        The mode changes while the arm follows. Sunrise takes other limits only at the start of a servo motion: the arm
+        brakes, and a servo motion with the new limits takes its place, which follows the next target. What the cabinet
+        counts for `stats` begins again.
+
+        Args:
+            mode: of the same kind as the one with which the servo motion began.
+            speed: these are the limits of `Arm.servo`.
+            acceleration: likewise.
+            speed_mps: likewise.
+            acceleration_mps2: likewise.
+            speed_radps: likewise.
+            acceleration_radps2: likewise.
 
         Raises:
             ModeConflict: another kind of mode than the one with which the servo motion began.
+            LimitError: a value outside its range; nothing has changed.
+            CommandRejected: nothing is to change, or a limit that this kind of servo motion does not obey.
+            MotionAborted: the motion could not begin again; it has ended.
         """
-        message = mode_message(instance(mode, MODES, "mode"))
-        assert message is not None
+        limits = {
+            "speed": speed,
+            "acceleration": acceleration,
+            "speed_mps": speed_mps,
+            "acceleration_mps2": acceleration_mps2,
+            "speed_radps": speed_radps,
+            "acceleration_radps2": acceleration_radps2,
+        }
+        settings: dict[str, Any] = {name: value for name, value in limits.items() if value is not None}
+        if mode is None and not settings:
+            raise CommandRejected(
+                "change must have something to change, got nothing",
+                parameter="mode",
+                hint="give a mode or a limit, for example change(speed=0.5)",
+            )
+        if settings:
+            self._check_may_change(next(iter(settings)))
+            self._connection.check_may_wait("change() of the limits of a servo motion")
+        message = None if mode is None else mode_message(instance(mode, MODES, "mode"))
+        terms = self._terms.changed(settings if mode is None else settings | {"mode": mode})
         _ = self.start  # raises unless it has begun
-        self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
+        if message is not None:
+            self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
+        self._terms, self._message = terms, terms.message
+        if settings:
+            self._begin_again()
+
+    def _check_may_change(self, limit: str) -> None:
+        """Refuse a change of the limits of a stream that cannot begin again; `limit` is the name of one."""
+        if self._message.engine is wire.ServoEngine.DIRECT:
+            raise CommandRejected(
+                'the engine "direct" follows targets that go on from where the arm is; it cannot brake in between',
+                parameter=limit,
+                hint='use engine="smart", or leave the with block and begin another one',
+            )
+
+    def _begin_again(self) -> None:
+        """End the motion at rest and begin one with the present limits; no effect if it has ended by itself."""
+        handle = self._handle
+        assert handle is not None
+        if not handle.done:
+            self._active = False
+            self._connection.cancel(handle)
+        result = handle.wait(timeout=_PATIENCE)  # raises the error that ended it
+        if result.cause is Cause.CANCELLED:
+            self._connection.leave_block(handle)
+            self._open()
 
     @property
     def refused(self) -> int:
@@ -786,11 +850,6 @@ class JointServo(Servo):
         if boundary.refuses and boundary.excess(q) > max(boundary.excess(last), TOLERANCE):
             raise boundary.refusal(q, "the target", parameter="q")
         return boundary.clamped(q, last)
-
-    def _warm_up(self) -> None:
-        if self._newest is not None:
-            self._clip(self._newest)
-        super()._warm_up()
 
 
 class PoseServo(Servo):

@@ -158,9 +158,9 @@ def _(motion: LinRel, robot: RobotModel) -> dict[str, Any]:
 @_fields.register
 def _(motion: Spline, robot: RobotModel) -> dict[str, Any]:
     segments = []
-    for index, one in enumerate(motion.segments):
+    for index, segment in enumerate(motion.segments):
         with inside(f"segments[{index}]"):
-            segments.append(_message(f"{type(one).__name__}Segment", one, robot))
+            segments.append(_message(f"{type(segment).__name__}Segment", segment, robot))
     return {"segments": tuple(segments)}
 
 

@@ -28,7 +28,7 @@ from heptarm.wire.state_groups import StateGroups
 
 #: The bits of the safety state in the order of the fields of `values.Safety` behind its stamp and mode.
 _SAFETY = tuple(int(wire.SafetyBits[field.name.upper()]) for field in fields(values.Safety)[2:])
-_MODES = {one: values.OperationMode(one.name.lower()) for one in wire.OperationMode}
+_MODES = {mode: values.OperationMode(mode.name.lower()) for mode in wire.OperationMode}
 
 
 class _Received:
@@ -136,7 +136,9 @@ def read_signals(infos: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
 
 def _signals(message: wire.IoState, signals: Sequence[Signal]) -> SignalValues:
     known = {value.index: value.value for value in message.values}
-    named = {one.name: one.value(known[place]) for place, one in enumerate(signals) if place in known}
+    named = {
+        signal.name: signal.value(known[place]) for place, signal in enumerate(signals) if place in known
+    }
     return SignalValues(message.stamp, named)
 
 

@@ -25,7 +25,7 @@ def _cleaned(value: Any, *, lines: bool) -> Any:
     if isinstance(value, str):
         return printable(value, lines=lines)
     if isinstance(value, tuple):
-        new = tuple(_cleaned(one, lines=lines) for one in value)
+        new = tuple(_cleaned(element, lines=lines) for element in value)
         return value if all(a is b for a, b in zip(value, new)) else new
     if not is_dataclass(value) or isinstance(value, type) or not _has_text(type(value)):
         return value

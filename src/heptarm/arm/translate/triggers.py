@@ -29,11 +29,11 @@ def trigger_messages(motion: Motion, signals: Sequence[Signal]) -> tuple[wire.Tr
         LimitError: a value that the output cannot have.
     """
     made = []
-    for place, one in enumerate(triggers_of(motion)):
+    for place, trigger in enumerate(triggers_of(motion)):
         with inside(f"triggers[{place}]"):
-            condition, parts = condition_message(one.condition, signals)
+            condition, parts = condition_message(trigger.condition, signals)
             _check(motion, parts)
-            made.append(wire.Trigger(condition=condition, action=_action(one.action, signals)))
+            made.append(wire.Trigger(condition=condition, action=_action(trigger.action, signals)))
     return tuple(made)
 
 

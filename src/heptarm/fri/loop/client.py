@@ -238,7 +238,7 @@ class Client(Sealed, Reader):
         signals = self._signals
         full, number = signals.output(name, value)
         self._writes += 1  # with a count, because the loop may read several writes at once
-        outputs = {one: write for one, write in self._outputs.items() if one in signals.names}
+        outputs = {name: write for name, write in self._outputs.items() if name in signals.names}
         self._outputs = {**outputs, full: (self._writes, number)}
         self._send_outputs()
 
@@ -266,7 +266,7 @@ class Client(Sealed, Reader):
             )
         given = pose if isinstance(pose, Pose) else array(pose, 7, "pose")
         placed = given if isinstance(given, Pose) else Pose.of(given[:3], given[3:])
-        frames = {one: numbers for one, numbers in self._frames.items() if one in requested}
+        frames = {name: numbers for name, numbers in self._frames.items() if name in requested}
         self._frames = {**frames, name: placed.array.tolist()}
         self._send_outputs()
 

@@ -91,7 +91,9 @@ def arity(function: Callable[..., object]) -> int:
         found = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return WITH_MEMORY - 1
-    return sum(one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) for one in found)
+    return sum(
+        argument.kind in (argument.POSITIONAL_ONLY, argument.POSITIONAL_OR_KEYWORD) for argument in found
+    )
 
 
 class NumbaLaw(CompiledLaw):
@@ -358,7 +360,7 @@ class LawTrial(Sealed):
             self._follower.begin(self._follower.target)
         self.t += self._dt
         code = self._function(
-            *(one.ctypes.data for one in (self._state, self._command, self._params, self._memory))
+            *(words.ctypes.data for words in (self._state, self._command, self._params, self._memory))
         )
         if code != self._law.success:
             raise CommandRejected(f"the law has failed: it returned {code}", parameter="law")

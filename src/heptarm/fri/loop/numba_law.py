@@ -186,7 +186,9 @@ def _refusal(function: Callable[..., object], error: NumbaError) -> CommandRejec
     places = re.findall(r'File "([^"]+)", line (\d+)', text)
     place = next((line for file, line in places if file.endswith(code.co_filename.rpartition("/")[2])), None)
     line = int(place) if place else getattr(getattr(error, "loc", None), "line", code.co_firstlineno)
-    reason = next((one for one in lines if not one.startswith(_HEADINGS)), lines[0] if lines else str(error))
+    reason = next(
+        (line for line in lines if not line.startswith(_HEADINGS)), lines[0] if lines else str(error)
+    )
     reason = re.sub(r"of type (state|out|params|memory)\(.*", r"of \1", reason)
     hint = next((hint for pattern, hint in _REMEDIES if re.search(pattern, text)), _REMEDY)
     return CommandRejected(

@@ -137,8 +137,8 @@ class Param(Value):
 
     def _refuse(self, given: Array, name: str, index: int) -> None:
         """Raise the error of the entry at a flat index."""
-        number, low, high = (float(one.flat[index]) for one in (given, self.low, self.high))
-        place = ", ".join(str(int(one)) for one in np.unravel_index(index, given.shape))
+        number, low, high = (float(array.flat[index]) for array in (given, self.low, self.high))
+        place = ", ".join(str(int(place)) for place in np.unravel_index(index, given.shape))
         where, unit = f"{name}[{place}]" if given.ndim else name, f" {self.unit}" if self.unit else ""
         ends = "(" if self.above or low == -math.inf else "[", ")" if high == math.inf else "]"
         allowed = f"{ends[0]}{low:g}, {high:g}{ends[1]}{unit}"
@@ -241,7 +241,7 @@ def merged(known: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[st
 
 def rates(declared: Mapping[str, Param]) -> Array:
     """Largest changes in a second of all parameters, in their order, shape (n,)."""
-    return np.concatenate([np.zeros(0), *(one.rate.reshape(-1) for one in declared.values())])
+    return np.concatenate([np.zeros(0), *(parameter.rate.reshape(-1) for parameter in declared.values())])
 
 
 @functools.cache
@@ -276,7 +276,7 @@ class RateLimiter:
 
     def step(self, dt: float) -> None:
         """Let the values follow for a cycle of so many seconds."""
-        at = (one.ctypes.data for one in (self._values, self.target, self._rates))
+        at = (words.ctypes.data for words in (self._values, self.target, self._rates))
         _follow()(*at, len(self.target), dt)
 
 

@@ -81,9 +81,9 @@ class Signals:
             is_output: True for outputs only, False for inputs only; None for all.
         """
         return {
-            one.name: one.value(number)
-            for one, number in zip(self._signals, numbers, strict=False)
-            if is_output is None or one.is_output is is_output
+            signal.name: signal.value(number)
+            for signal, number in zip(self._signals, numbers, strict=False)
+            if is_output is None or signal.is_output is is_output
         }
 
     def output(self, name: str, value: SignalValue) -> tuple[str, int | float]:
@@ -93,7 +93,7 @@ class Signals:
             CommandRejected: the session has no output of that name.
             LimitError: the value is outside the range of the output.
         """
-        outputs = ", ".join(one.name for one in self._signals if one.is_output) or "none"
+        outputs = ", ".join(signal.name for signal in self._signals if signal.is_output) or "none"
         check_name(name, "name")
         try:
             signal = self._signals[find_name(name, self.names)]
@@ -287,7 +287,7 @@ class Params(Fields):
         """
         if self._changed is None:
             raise AttributeError("parameters are read-only in a law")
-        for start, given in [one for name, value in values.items() for one in self._within(name, value)]:
+        for start, given in [write for name, value in values.items() for write in self._within(name, value)]:
             self._values[start : start + given.size] = given
         self._changed()
 
@@ -645,7 +645,7 @@ class Stats:
 
     def __str__(self) -> str:
         """A few aligned lines with units."""
-        times = (" / ".join(f"{t * 1e6:.0f}" for t in one) for one in (self.latency, self.jitter))
+        times = (" / ".join(f"{t * 1e6:.0f}" for t in row) for row in (self.latency, self.jitter))
         spread = [f"{text} us (median / 99 % / 99.9 % / longest)" for text in times]
         rows = {
             "messages": f"{self.received} received, {self.lost} lost, {self.duplicated} twice, "

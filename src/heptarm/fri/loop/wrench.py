@@ -34,6 +34,6 @@ def external_wrench(arm: RobotModel, q: npt.ArrayLike, tau_ext: npt.ArrayLike) -
         Unavailable: the compiled part is missing.
     """
     chain, found = np.array(chain_of(arm)), np.zeros(6)
-    places = (np.ascontiguousarray(one, dtype=np.float64) for one in (q, tau_ext))
+    places = (np.ascontiguousarray(vector, dtype=np.float64) for vector in (q, tau_ext))
     library().fri_wrench(chain.ctypes.data, *(place.ctypes.data for place in places), found.ctypes.data)
     return found

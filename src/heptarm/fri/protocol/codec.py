@@ -330,10 +330,10 @@ def decode_command(datagram: bytes, version: Version) -> m.Command:
         wrench=None if wrench is None else doubles(wrench.get(1, []), "wrench", exactly=6),
         tau=_joints(data, 3, "commanded torque"),
         transformations=tuple(
-            _transformation(one, quaternion=quaternion)
-            for one in _subs(data, 4, "transformations", MAX_TRANSFORMATIONS)
+            _transformation(part, quaternion=quaternion)
+            for part in _subs(data, 4, "transformations", MAX_TRANSFORMATIONS)
         ),
-        io=tuple(_io(one) for one in _subs(data, 5, "IO values", MAX_IO)),
+        io=tuple(_io(part) for part in _subs(data, 5, "IO values", MAX_IO)),
         pose=None if pose is None else _transformation(pose, quaternion=True),
         redundancy=_redundancy(data, 7),
     )

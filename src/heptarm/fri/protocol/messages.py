@@ -199,9 +199,9 @@ class MonitorData:
 #: The joint arrays of `MonitorData` by name: number of the field in a message, and what it is. The codecs, the shared
 #: memory and the simulator's messages follow this table.
 MONITORED: dict[str, tuple[int, str]] = {
-    one.name: (one.metadata["tag"], one.metadata["text"])
-    for one in fields(MonitorData)
-    if "tag" in one.metadata
+    field.name: (field.metadata["tag"], field.metadata["text"])
+    for field in fields(MonitorData)
+    if "tag" in field.metadata
 }
 
 

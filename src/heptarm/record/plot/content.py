@@ -80,7 +80,7 @@ class ChartRow:
     def box(self) -> npt.NDArray[np.float64]:
         """Lowest and highest corner of a path's box, shape (2, 3) [mm]: no side is less than a fifth of the longest."""
         every = [(line.x, line.y, line.z) for line in self.lines if line.z is not None]
-        ends = np.array([extremes([one[axis] for one in every]) for axis in range(3)])
+        ends = np.array([extremes([path[axis] for path in every]) for axis in range(3)])
         middle, spans = ends.mean(axis=1), np.ptp(ends, axis=1)
         spans = np.maximum(spans, max(float(spans.max()) * _LEAST_EXTENT, _LEAST_PATH * 1e3)) * (1 + _MARGIN)
         return np.array([middle - spans / 2, middle + spans / 2])
@@ -132,8 +132,8 @@ def extremes(arrays: Sequence[npt.NDArray[np.float64]]) -> tuple[float, float]:
     """Smallest and largest finite value of arrays; 0 and 0 if they have none."""
     finite = [array[np.isfinite(array)] for array in arrays]
     known = [array for array in finite if array.size]
-    return min((float(one.min()) for one in known), default=0.0), max(
-        (float(one.max()) for one in known), default=0.0
+    return min((float(values.min()) for values in known), default=0.0), max(
+        (float(values.max()) for values in known), default=0.0
     )
 
 

@@ -186,7 +186,7 @@ def _colour(mark: Mark) -> str:
 def _apart(marks: Sequence[Mark], distance: float) -> list[Mark]:
     """The events whose names are at least so far apart [s]; stops and errors come before notes."""
     found: list[Mark] = []
-    for mark in sorted(marks, key=lambda one: not one.is_alarm):
+    for mark in sorted(marks, key=lambda mark: not mark.is_alarm):
         if all(abs(mark.t - other.t) >= distance for other in found):
             found.append(mark)
     return found

@@ -136,14 +136,14 @@ def _trace(line: Line, row: ChartRow, x: str, y: str, *, is_first: bool) -> dict
 
 
 def _path(line: Line, scene: str) -> dict[str, Any]:
-    every = [np.zeros(0) if one is None else one for one in (line.x, line.y, line.z)]
+    every = [np.zeros(0) if axis is None else axis for axis in (line.x, line.y, line.z)]
     step = max(1, len(every[0]) // _POINTS)
     ends = [0] * len(every[0][::step])
     return (
         {
             "type": "scatter3d",
             "mode": "lines",
-            **{name: _numbers(one[::step], "f4") for name, one in zip("xyz", every, strict=True)},
+            **{name: _numbers(axis[::step], "f4") for name, axis in zip("xyz", every, strict=True)},
             "scene": scene,
             "name": line.label or "path",
             "showlegend": False,

@@ -122,7 +122,7 @@ def compare(
     rows = tuple(_row(name, recordings, zeros, kind) for name in names)
     patterns = ("solid", "dashed", "dotted", "dash-dotted")
     files = ", ".join(
-        f"{one.path.name} ({pattern})" for one, pattern in zip(recordings, patterns, strict=False)
+        f"{recording.path.name} ({pattern})" for recording, pattern in zip(recordings, patterns, strict=False)
     )
     if kind != "time":
         return Chart(files, rows)
@@ -198,16 +198,22 @@ def _zero(recording: RecordedData, at: str) -> float:
 
 def _row(name: str, recordings: Sequence[RecordedData], zeros: Sequence[float], kind: Kind) -> ChartRow:
     if name == PATH:
-        lines = tuple(path_line(one["xyz"], one.path.name, index) for index, one in enumerate(recordings))
+        lines = tuple(
+            path_line(recording["xyz"], recording.path.name, index)
+            for index, recording in enumerate(recordings)
+        )
         return path_row("motion frame", lines)
     short = name.removeprefix(FRI)
     quantity = _QUANTITIES.get(short, _Quantity(short))
     by_limit = _by_limit(recordings[0].robot, quantity) if kind == "time" else None
     factor = quantity.factor if by_limit is None else 1.0 / by_limit
-    columns = [(one[name][:, None] if one[name].ndim == 1 else one[name]) * factor for one in recordings]
+    columns = [
+        (recording[name][:, None] if recording[name].ndim == 1 else recording[name]) * factor
+        for recording in recordings
+    ]
     times = [
-        one[f"{FRI}t" if name.startswith(FRI) else "t"] - zero
-        for one, zero in zip(recordings, zeros, strict=True)
+        recording[f"{FRI}t" if name.startswith(FRI) else "t"] - zero
+        for recording, zero in zip(recordings, zeros, strict=True)
     ]
     label = labels(name, columns[0].shape[1]) if columns[0].shape[1] > 1 else ("",)
     least, unit = (quantity.least, quantity.unit) if by_limit is None else (0.0, "fraction of limit")
@@ -298,8 +304,8 @@ def _spectrum(
 def _bands(recording: RecordedData, first: float, last: float) -> tuple[Band, ...]:
     """Motions; a part of a recording has motions that began before it or end behind it."""
     return tuple(
-        Band(max(one.begin, first), last if np.isnan(one.end) else min(one.end, last), one.text)
-        for one in recording.motions
+        Band(max(motion.begin, first), last if np.isnan(motion.end) else min(motion.end, last), motion.text)
+        for motion in recording.motions
     )
 
 

@@ -110,11 +110,14 @@ class ActionDispatcher:
         except BaseException:
             self._places.release()
             raise
-        return partial(self._carry_out, work)
+        return partial(self._carry_out, action.name, work)
 
-    def _carry_out(self, work: GoalWork, client: GoalClient) -> ActionResult:
+    def _carry_out(self, name: str, work: GoalWork, client: GoalClient) -> ActionResult:
         try:
-            return work(client)
+            result = work(client)
+            if result.outcome is GoalOutcome.ABORTED:
+                _log.warning("%s: %s", name, result.text)  # not every type of result has a text
+            return result
         except Exception as error:  # a goal without a result would block its client for ever
             _log.exception("carrying out a goal")
             return ActionResult(GoalOutcome.ABORTED, f"internal error of the node: {error!r}")

@@ -25,6 +25,7 @@ from heptarm.ros.interface.action import (
     result_of_motion,
     wait_for_task,
 )
+from heptarm.ros.interface.calibration import calibrate
 from heptarm.ros.interface.conditions import condition_of
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.events import with_triggers
@@ -491,6 +492,7 @@ ACTIONS = (
     RosAction("~/move_spline", "heptarm_msgs/MoveSpline", move_spline),
     RosAction("~/run_program", "heptarm_msgs/RunProgram", run_program),
     RosAction("~/plan_and_execute", "heptarm_msgs/PlanAndExecute", plan_and_execute),
+    RosAction("~/calibrate", "heptarm_msgs/Calibrate", calibrate),
     RosAction("~/touch", "heptarm_msgs/Touch", touch),
     RosAction("~/wait_for_taps", "heptarm_msgs/WaitForTaps", wait_for_taps),
     RosAction("~/ask", "heptarm_msgs/Ask", ask),

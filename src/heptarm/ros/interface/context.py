@@ -7,6 +7,7 @@ import contextlib
 from heptarm.arm.arm import Arm
 from heptarm.errors import NotReady, Timeout
 from heptarm.ros.interface.messages import RosAdapter
+from heptarm.ros.interface.pictures import ImageFeed
 from heptarm.ros.interface.planning.world import NodeWorld
 from heptarm.ros.interface.presets.iiwa_settings import IiwaStackSettings
 from heptarm.ros.node.driver import Driver
@@ -35,6 +36,7 @@ class NodeContext:
         gripper_goal: number of its newest goal; 0: none.
         iiwa_stack: what the services with names of iiwa_stack have set.
         world: the bodies around the arm.
+        images: pictures of the camera whose topic is remapped to `image`.
     """
 
     def __init__(self, driver: Driver, ros: RosAdapter) -> None:
@@ -46,6 +48,7 @@ class NodeContext:
         self.gripper_goal = 0
         self.iiwa_stack = IiwaStackSettings()
         self.world = NodeWorld(driver)
+        self.images = ImageFeed()
         self._mode = contextlib.ExitStack()
 
     @property

@@ -24,16 +24,16 @@ def with_triggers(motion: Motion, messages: Sequence[Any]) -> Motion:
         return motion
     if not isinstance(motion, Triggered):
         raise CommandRejected("hand guiding cannot have triggers", parameter="triggers")
-    for index, one in enumerate(messages):
+    for index, message in enumerate(messages):
         name = f"triggers[{index}].condition"
-        condition = condition_of(one.condition, name)
+        condition = condition_of(message.condition, name)
         if condition is None:
             raise CommandRejected(
                 f"{name} must be a condition, got an empty text",
                 parameter=name,
                 hint='such as "path.before_end(0.02)"',
             )
-        action = SetOutput(one.signal, float(one.value)) if one.signal else Notify(one.label)
+        action = SetOutput(message.signal, float(message.value)) if message.signal else Notify(message.label)
         motion = motion.trigger(condition, action)
     return motion
 

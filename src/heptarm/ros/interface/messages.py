@@ -123,7 +123,7 @@ def trajectory_goal(ros: RosAdapter, message: Any, *, now: Callable[[], float]) 
 def _moment(ros: RosAdapter, stamp: float, now: Callable[[], float]) -> float:
     """A ROS time [s] on another clock [s]: of several readings of both clocks the one with the least time between."""
     readings = ((ros.now(), now(), ros.now()) for _ in range(_READINGS))
-    before, here, after = min(readings, key=lambda one: one[2] - one[0])
+    before, here, after = min(readings, key=lambda reading: reading[2] - reading[0])
     return here + (stamp - 0.5e-9 * (before + after))
 
 

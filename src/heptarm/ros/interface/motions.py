@@ -49,7 +49,7 @@ def velocities(driver: Driver, names: Sequence[str], values: Sequence[float]) ->
 
 def _ordered(driver: Driver, names: Sequence[str], values: Sequence[float], others: Array) -> Array:
     joints = driver.configuration.joints
-    order = list(names) or list(joints)
+    order = list(driver.configuration.own(names) or joints)
     if len(order) != len(values) or len(set(order)) != len(order):
         raise ShapeError(
             f"each of the joints {order} must have one number and appear once, got {len(values)} numbers"
@@ -154,7 +154,7 @@ def frame_in_base(header: Any, driver: Driver) -> Pose | None:
     base = driver.configuration.frame("base")
     if name in ("", base):
         return None
-    taught = {one.lstrip("/"): pose for one, pose in driver.arm.frames.items()}
+    taught = {name.lstrip("/"): pose for name, pose in driver.arm.frames.items()}
     if name not in taught:
         raise ShapeError(
             f"frame of the pose must be one of {', '.join((base, *driver.arm.frames))}, got {name!r}",
@@ -189,8 +189,8 @@ def program_of(driver: Driver, messages: Sequence[Any]) -> tuple[Motion, ...]:
     if not messages:
         raise ShapeError("a program must have motions, got no motions", parameter="motions")
     return tuple(
-        with_triggers(motion_of(driver, one, f"motions[{index}]"), one.triggers)
-        for index, one in enumerate(messages)
+        with_triggers(motion_of(driver, message, f"motions[{index}]"), message.triggers)
+        for index, message in enumerate(messages)
     )
 
 

@@ -377,12 +377,12 @@ def signals(context: NodeContext, request: Any) -> ServiceResponse:
     known = tuple(context.arm.io.signals.values())
     values = context.arm.io.values_now if known else {}
     fields = {
-        "names": [one.name for one in known],
-        "outputs": [one.is_output for one in known],
-        "kinds": [one.kind for one in known],
-        "values": [float(values[one.name]) for one in known],
-        "low": [one.low for one in known],
-        "high": [one.high for one in known],
+        "names": [signal.name for signal in known],
+        "outputs": [signal.is_output for signal in known],
+        "kinds": [signal.kind for signal in known],
+        "values": [float(values[signal.name]) for signal in known],
+        "low": [signal.low for signal in known],
+        "high": [signal.high for signal in known],
     }
     return ServiceResponse(True, f"{len(known)} signals", fields)
 

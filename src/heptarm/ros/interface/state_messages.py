@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from heptarm.fri import State as FriState
 from heptarm.model.kinematics import forward
 from heptarm.ros.interface import messages
 from heptarm.ros.interface.messages import RosAdapter
@@ -234,7 +235,12 @@ def _stamped(message: Any, stamp: Any, frame: str = "") -> Any:
 
 
 def preset_message(
-    ros: RosAdapter, entry: PresetName, kind: Any, state: State, names: NodeConfiguration
+    ros: RosAdapter,
+    entry: PresetName,
+    kind: Any,
+    state: State,
+    names: NodeConfiguration,
+    fri: FriState | None = None,
 ) -> Any:
     """Make a message for a topic of another driver; None: the state lacks what it needs.
 
@@ -244,6 +250,7 @@ def preset_message(
         kind: type of the message.
         state: the state.
         names: of joints and frames.
+        fri: newest message of the open FRI session; None: none is open.
     """
     stamp = ros.time(_measured(ros, state, state.groups.joints))
     if entry.role is NameRole.OWN_STATE:
@@ -257,7 +264,8 @@ def preset_message(
         stamped = entry.role is NameRole.STAMPED_WRENCH
         return _stamped(kind(wrench=wrench), stamp, names.frame("base")) if stamped else wrench
     if entry.role is NameRole.LBR_STATE:
-        return _lbr_state(kind(), state, max(0, ros.now() - max(0, round(state.age * 1e9))))
+        message = _lbr_state(kind(), state, max(0, ros.now() - max(0, round(state.age * 1e9))))
+        return message if fri is None else _with_session(message, fri)
     message = messages.joint_state(ros, state, names.joints, external=entry.external)
     return _stamped(message, stamp)
 
@@ -282,7 +290,7 @@ _DRIVE_OFF, _DRIVE_ON = 0, 2
 
 
 def _lbr_state(message: Any, state: State, stamp: int) -> Any:
-    """Fill a lbr_fri_idl/LBRState with what the cabinet reports without FRI; sessions have a topic of our own.
+    """Fill a lbr_fri_idl/LBRState with what the cabinet reports without FRI.
 
     The codes are those of FRI's enumerations: 0 is an idle session of poor quality that commands nothing.
     """
@@ -300,6 +308,18 @@ def _lbr_state(message: Any, state: State, stamp: int) -> Any:
         message.safety_state = (
             _EMERGENCY if safety.emergency_stop else _PROTECTIVE if safety.protective_stop else _SAFE
         )
+    return message
+
+
+def _with_session(message: Any, fri: FriState) -> Any:
+    """Add to a lbr_fri_idl/LBRState what an open FRI session reports."""
+    message.sample_time = fri.period
+    message.session_state, message.connection_quality = int(fri.session), int(fri.quality)
+    message.client_command_mode = int(fri.mode)
+    message.overlay_type, message.control_mode = int(fri.overlay or 0), int(fri.control_mode or 0)
+    message.tracking_performance = float(np.nan_to_num(fri.tracking))
+    if np.isfinite(fri.q_ipo).all():
+        message.ipo_joint_position = fri.q_ipo.tolist()
     return message
 
 

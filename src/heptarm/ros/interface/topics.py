@@ -200,8 +200,12 @@ def _seven(message: Any, unit: str) -> Array:
 
 
 def lbr_position(context: NodeContext, message: Any) -> None:
-    """Follow the positions of a lbr_fri_idl/LBRJointPositionCommand."""
-    context.driver.follow_stream(array(list(message.joint_position), 7, "joint_position [rad]"))
+    """Follow the positions of a lbr_fri_idl/LBRJointPositionCommand: by the open FRI session, if there is one."""
+    q = array(list(message.joint_position), 7, "joint_position [rad]")
+    if context.driver.fri.active:
+        context.driver.fri.command(q=q)
+    else:
+        context.driver.follow_stream(q)
 
 
 def lbr_torque(context: NodeContext, message: Any) -> None:
@@ -242,6 +246,11 @@ def fri_pose(context: NodeContext, message: Any) -> None:
     context.driver.fri.command(pose=stamped_pose(message, context.driver))
 
 
+def camera_image(context: NodeContext, message: Any) -> None:
+    """Keep the newest sensor_msgs/Image of the camera that the action `calibrate` measures."""
+    context.images.put(message)
+
+
 _JOINTS, _POSE = "sensor_msgs/JointState", "geometry_msgs/PoseStamped"
 _SCENE = "moveit_msgs/PlanningScene"
 _FORWARD_POSITION, _FORWARD_VELOCITY = (
@@ -269,6 +278,7 @@ TOPICS = (
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
     Topic("~/fri/pose", _POSE, fri_pose),
     Topic("~/points", "sensor_msgs/PointCloud2", scene.points, aside=True, is_sensor=True),
+    Topic("~/image", "sensor_msgs/Image", camera_image, aside=True, is_sensor=True),
     Topic("planning_scene", _SCENE, scene.planning_scene, depth=100, aside=True),
     Topic("collision_object", "moveit_msgs/CollisionObject", scene.collision_object, depth=100, aside=True),
     Topic(

@@ -264,6 +264,7 @@ class Driver:
             raise GoalRefused("the node is not active", hint="activate it")
         if self.link_error:
             raise GoalRefused(f"no connection: {self.link_error}")
+        goal = goal.renamed(self.configuration.own)
         # what is malformed must not end another motion
         check_form(goal, self.configuration.joints, self._execution.settings.rules)
         try:

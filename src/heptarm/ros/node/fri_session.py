@@ -9,6 +9,7 @@ from typing import Any, Literal
 from heptarm.arm.arm import Arm
 from heptarm.arm.fri.session import Fri
 from heptarm.errors import HeptarmError, ModeConflict, NotReady
+from heptarm.fri import State as FriState
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
 
@@ -36,6 +37,12 @@ class NodeFriSession:
         """Whether a session is open."""
         session = self._session
         return session is not None and session.active
+
+    @property
+    def newest(self) -> FriState | None:
+        """The newest message of the open session; None: none is open."""
+        session = self._session
+        return session.state if session is not None and session.active else None
 
     def open(self, kind: Kind, **settings: Any) -> str:
         """Open a session; it holds the arm until the first command.

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from heptarm.arm.link.target import parse_target
 from heptarm.arm.watchdog import ROS_NODE, TARGETS
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.trajectory.check import GoalRules
@@ -19,6 +21,12 @@ from heptarm.ros.trajectory.tolerances import StateTolerances, TrajectoryToleran
 from heptarm.skills.gripper import PATIENCE, SETTLE
 from heptarm.values.checks import Array, frozen, within
 from heptarm.values.sealed import meant
+
+#: Names of the joints, from the base to the flange, in versions of the drivers that the parameter `names` selects:
+#: messages may have any of them. lbr_stack's have the name of the robot before them, or not.
+SPELLINGS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
+    {"lbr_stack": tuple(tuple(f"{robot}A{i}" for i in range(1, 8)) for robot in ("lbr_", ""))}
+)
 
 Plain = str | bool | int | float | list[str]
 
@@ -271,6 +279,19 @@ PARAMETERS = (
 )
 
 
+def check_joint_names(names: Sequence[str]) -> None:
+    """Check the parameter `joint_names`.
+
+    Raises:
+        ShapeError: not seven different names.
+    """
+    if len(names) != 7 or len(set(names)) != 7:
+        raise ShapeError(
+            f"joint_names must have seven different names, got {', '.join(names) or 'none'}",
+            parameter="joint_names",
+        )
+
+
 def joint_parameters(joints: Sequence[str]) -> Iterator[Parameter]:
     """Make the parameters of single joints, by their names without prefix."""
     for joint in joints:
@@ -306,23 +327,38 @@ class NodeConfiguration:
 
         Raises:
             CommandRejected: a value is not allowed, or its name is unknown.
+            ConnectFailed: the target has none of the forms of `heptarm.connect`.
         """
         table = {parameter.name: parameter for parameter in PARAMETERS}
         names = table["joint_names"].check(values.get("joint_names", table["joint_names"].default))
         assert isinstance(names, list)
-        if len(names) != 7 or len(set(names)) != 7:
-            raise ShapeError(
-                f"joint_names must have seven different names, got {len(set(names))}",
-                parameter="joint_names",
-            )
+        check_joint_names(names)
         table.update({parameter.name: parameter for parameter in joint_parameters(names)})
         for name in values:
             if name not in table:
                 raise CommandRejected(f"unknown parameter {name!r}", parameter=name, hint=meant(name, table))
-        known = {name: one.check(values.get(name, one.default)) for name, one in table.items()}
+        known = {
+            name: parameter.check(values.get(name, parameter.default)) for name, parameter in table.items()
+        }
         made = NodeConfiguration(known, tuple(f"{known['prefix']}{name}" for name in names))
         _ = made.posture  # refused here, not with the first target
+        if known["target"]:
+            parse_target(str(known["target"]))  # what no attempt to connect mends
         return made
+
+    def own(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Replace names of joints in other versions of the driver that `names` selects by the node's own.
+
+        Args:
+            names: of joints in a message; unknown ones stay as they are.
+        """
+        others = {
+            name: own
+            for spelling in SPELLINGS.get(self.values["names"], ())
+            for name, own in zip(spelling, self.joints)
+            if name not in self.joints
+        }
+        return tuple(others.get(name, name) for name in names)
 
     @property
     def posture(self) -> Array | None:

@@ -277,8 +277,8 @@ class TargetStream:
         if kind == "pose":
             settings |= {"elbow": self._elbow} if self._posture is None else {"posture": self._posture}
         if kind != "lin":
-            one = options if limits is None else limits
-            return settings | {"engine": "smart", "speed": one.speed, "acceleration": one.acceleration}
+            chosen = options if limits is None else limits
+            return settings | {"engine": "smart", "speed": chosen.speed, "acceleration": chosen.acceleration}
         if limits is None:
             return settings | {"speed_mps": self._line_speed}
         return settings | {"speed_mps": limits.line_speed, "speed_radps": limits.turn_speed}

@@ -170,6 +170,8 @@ class _FriStream:
         """
         first, recent = self._session.start.sequence, self._session.history(round(_RECENT / self._period))
         # the message itself may be older than those if this process was held up
-        used = (state, *(one for one in recent if first <= one.sequence <= state.sequence))
-        fastest = min(one.received * 1e-9 - (one.sequence - state.sequence) * one.period for one in used)
+        used = (state, *(sample for sample in recent if first <= sample.sequence <= state.sequence))
+        fastest = min(
+            sample.received * 1e-9 - (sample.sequence - state.sequence) * sample.period for sample in used
+        )
         return fastest - state.t

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
 from heptarm.errors import CommandRejected
@@ -104,6 +105,24 @@ class TrajectoryGoal:
     extras: tuple[str, ...] = ()
     from_topic: bool = False
     sent: PublishInfo | None = None
+
+    def renamed(self, own: Callable[[Iterable[str]], tuple[str, ...]]) -> TrajectoryGoal:
+        """The same goal with other names of joints, in its tolerances, too.
+
+        Args:
+            own: replaces names.
+        """
+
+        def tolerances(given: tuple[Tolerance, ...]) -> tuple[Tolerance, ...]:
+            names = own(one.joint for one in given)
+            return tuple(replace(one, joint=name) for one, name in zip(given, names, strict=True))
+
+        return replace(
+            self,
+            joints=own(self.joints),
+            path_tolerance=tolerances(self.path_tolerance),
+            goal_tolerance=tolerances(self.goal_tolerance),
+        )
 
 
 @dataclass(frozen=True, slots=True)

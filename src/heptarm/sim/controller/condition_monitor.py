@@ -230,17 +230,17 @@ class ConditionMonitor:
 
     def forget(self, number: int) -> None:
         """Stop observing a condition."""
-        self._observers = {key: one for key, one in self._observers.items() if key != number}
+        self._observers = {key: observer for key, observer in self._observers.items() if key != number}
 
     def begin(self, plan: Plan, watches: Sequence[ConditionWatch]) -> tuple[WatchedCondition, ...]:
         """The conditions to evaluate while a motion runs, of a command with this plan."""
         made = tuple(
-            watched_condition(one.condition, _once(one.fired), breaks=one.breaks, part=one.part)
-            for one in watches
+            watched_condition(watch.condition, _once(watch.fired), breaks=watch.breaks, part=watch.part)
+            for watch in watches
         )
-        for one in made:
-            for point in one.points:
-                point.find(plan, one.part)
+        for watch in made:
+            for point in watch.points:
+                point.find(plan, watch.part)
         return made
 
     @property
@@ -274,7 +274,7 @@ class ConditionMonitor:
         self._inputs.update(q, external, wrench, elapsed)
         for observer in observers.values():
             observer.check(self._inputs)
-        breaks = [one.check(self._inputs) and one.breaks for one in watches if one.applies_to(part)]
+        breaks = [watch.check(self._inputs) and watch.breaks for watch in watches if watch.applies_to(part)]
         return any(breaks)
 
 
@@ -299,26 +299,28 @@ def watched_condition(
     return WatchedCondition(_predicate(condition, points), notify, breaks, part, tuple(points))
 
 
-def _predicate(one: seam.Condition, points: list[PathPoint]) -> Predicate:
+def _predicate(condition: seam.Condition, points: list[PathPoint]) -> Predicate:
     """The predicate of a condition; collects its points on the path."""
-    if isinstance(one, seam.AllOf | seam.AnyOf):
-        combine = all if isinstance(one, seam.AllOf) else any
-        parts = [_predicate(part, points) for part in one.parts]
+    if isinstance(condition, seam.AllOf | seam.AnyOf):
+        combine = all if isinstance(condition, seam.AllOf) else any
+        parts = [_predicate(part, points) for part in condition.parts]
         return lambda inputs: combine(part(inputs) for part in parts)
-    if isinstance(one, seam.Inverted):
-        inverted = _predicate(one.part, points)
+    if isinstance(condition, seam.Inverted):
+        inverted = _predicate(condition.part, points)
         return lambda inputs: not inverted(inputs)
-    if isinstance(one, seam.PathReached):
-        points.append(PathPoint(one.reference is seam.PathReference.START, one.distance, one.delay))
+    if isinstance(condition, seam.PathReached):
+        points.append(
+            PathPoint(condition.reference is seam.PathReference.START, condition.distance, condition.delay)
+        )
         return points[-1]
-    if isinstance(one, seam.SignalIs):
-        return lambda inputs: (inputs.signal(one.place) != 0.0) == one.value
-    if isinstance(one, seam.SignalOutside):
-        return lambda inputs: not one.low <= inputs.signal(one.place) <= one.high
-    if isinstance(one, seam.JointTorqueOutside):
-        return lambda inputs: not one.low <= float(inputs.external[one.joint]) <= one.high
-    frame = WrenchFrame.of(one.frame)
-    if isinstance(one, seam.WrenchAbove):
-        chosen = [i for i, component in enumerate(seam.WrenchComponents) if component in one.components]
-        return lambda inputs: hypot(*(inputs.wrench(frame)[i] for i in chosen)) > one.threshold
-    return lambda inputs: not one.low <= inputs.wrench(frame)[one.component] <= one.high
+    if isinstance(condition, seam.SignalIs):
+        return lambda inputs: (inputs.signal(condition.place) != 0.0) == condition.value
+    if isinstance(condition, seam.SignalOutside):
+        return lambda inputs: not condition.low <= inputs.signal(condition.place) <= condition.high
+    if isinstance(condition, seam.JointTorqueOutside):
+        return lambda inputs: not condition.low <= float(inputs.external[condition.joint]) <= condition.high
+    frame = WrenchFrame.of(condition.frame)
+    if isinstance(condition, seam.WrenchAbove):
+        chosen = [i for i, component in enumerate(seam.WrenchComponents) if component in condition.components]
+        return lambda inputs: hypot(*(inputs.wrench(frame)[i] for i in chosen)) > condition.threshold
+    return lambda inputs: not condition.low <= inputs.wrench(frame)[condition.component] <= condition.high

@@ -488,7 +488,7 @@ class Interpolator:
         run = self.run
         watches: Sequence[WatchedCondition] = () if run is None or run.has_braked else run.watches
         if run is not None and run.phase == "settling":  # only a trigger may be at the very end
-            watches = [one for one in watches if not one.breaks]
+            watches = [watch for watch in watches if not watch.breaks]
         elapsed, part = (0.0, 0) if run is None else (run.time, run.part)
         breaks = self.condition_monitor.check(
             self._q, self._load.torque, self._load.wrench, watches=watches, elapsed=elapsed, part=part

@@ -124,11 +124,11 @@ class MotionQueue:
         dropped: list[MotionCommand] = []
         with self._lock:
             for _ in range(len(self._inbox)):
-                one = self._inbox.popleft()
-                if cancellation.affects(one.serial, one.command):
-                    dropped.append(one.command)
+                motion = self._inbox.popleft()
+                if cancellation.affects(motion.serial, motion.command):
+                    dropped.append(motion.command)
                 else:
-                    self._inbox.append(one._replace(plan=None))
+                    self._inbox.append(motion._replace(plan=None))
         for command in dropped:
             self.close(command, "cancelled", "")
 
@@ -141,17 +141,17 @@ class MotionQueue:
         """The next command; None: none waits."""
         return self._inbox.popleft() if self._inbox else None
 
-    def planned(self, one: QueuedMotion, here: Array) -> Plan | None:
+    def planned(self, motion: QueuedMotion, here: Array) -> Plan | None:
         """The plan of the next command from the present position [rad]; None: it ended by a planning error."""
-        if one.plan is not None and float(np.abs(one.plan.start - here).max()) <= 1e-9:
-            return one.plan
+        if motion.plan is not None and float(np.abs(motion.plan.start - here).max()) <= 1e-9:
+            return motion.plan
         try:
-            planned = self._plan(one.command, here.copy())
+            planned = self._plan(motion.command, here.copy())
         except PlanError as error:
-            self.close(one.command, "error", str(error))
+            self.close(motion.command, "error", str(error))
             return None
         with self._lock:
-            if one.serial == self._serial:
+            if motion.serial == self._serial:
                 self._tail = planned.end
         return planned
 

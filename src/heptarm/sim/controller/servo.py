@@ -203,7 +203,7 @@ class OnlineTrajectory:
         acceleration = parameters.max_acceleration
         try:
             for factor in _SLIGHTLY:
-                parameters.max_acceleration = [factor * one for one in acceleration]
+                parameters.max_acceleration = [factor * limit for limit in acceleration]
                 plan = Trajectory(self._axes)
                 # a ValueError: a result that its Python has no name for
                 with suppress(RuckigError, ValueError):
@@ -218,7 +218,8 @@ def _stays(plan: Trajectory, start: Array, within: tuple[Array, Array]) -> bool:
     """Whether a trajectory stays within coordinates, or does not leave them further than at its start."""
     low, high = np.minimum(within[0], start) - _TINY, np.maximum(within[1], start) + _TINY
     return not any(
-        one.min < a or one.max > b for one, a, b in zip(plan.position_extrema, low, high, strict=True)
+        extremes.min < a or extremes.max > b
+        for extremes, a, b in zip(plan.position_extrema, low, high, strict=True)
     )
 
 
@@ -343,8 +344,8 @@ class StraightFollower:
 
     def ahead(self, dt: float) -> Array:
         """What `advance` would return if no further target came, shape (7,) [rad]; raises as it does."""
-        one = self._followed
-        return self._q if one is None else self._set_point(one, self._elapsed + dt)
+        trajectory = self._followed
+        return self._q if trajectory is None else self._set_point(trajectory, self._elapsed + dt)
 
     def advance(self, dt: float) -> Array:
         """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad].
@@ -353,30 +354,33 @@ class StraightFollower:
             Unreachable: the line leaves the workspace.
         """
         self._waited += dt
-        one, before = self._followed, self._q
-        if one is None:
+        trajectory, before = self._followed, self._q
+        if trajectory is None:
             self.resting += dt
         else:
-            step = self._followable(one, dt)
+            step = self._followable(trajectory, dt)
             self._elapsed += step
-            self._q = self._set_point(one, self._elapsed)
-            one.otg.time = one.profile.at(self._elapsed)[0]
-            self.resting = 0.0 if self._goal is not None else max(0.0, one.otg.over)
+            self._q = self._set_point(trajectory, self._elapsed)
+            trajectory.otg.time = trajectory.profile.at(self._elapsed)[0]
+            self.resting = 0.0 if self._goal is not None else max(0.0, trajectory.otg.over)
             if dt > 0.0:
                 self._speed = (self._q - before) / dt
-            if not (one.profile.is_whole or self._stopping) and self._elapsed > one.profile.next_look:
-                self._go_on(one, rate=one.profile.at(self._elapsed)[1])
+            if (
+                not (trajectory.profile.is_whole or self._stopping)
+                and self._elapsed > trajectory.profile.next_look
+            ):
+                self._go_on(trajectory, rate=trajectory.profile.at(self._elapsed)[1])
         if self._goal is not None and self._waited >= _AGAIN:
             self.aim(self._goal)
         self._step = self._q - before
         return self._q
 
-    def _followable(self, one: _Trajectory, dt: float) -> float:
+    def _followable(self, trajectory: _Trajectory, dt: float) -> float:
         """The step of time nearest to another one [s] with which no axis changes its speed too much.
 
         The profile was found from samples: between two of them an axis may need a few per cent more.
         """
-        step, later = dt, self._set_point(one, self._elapsed + dt)
+        step, later = dt, self._set_point(trajectory, self._elapsed + dt)
         for _ in range(_CORRECTIONS):
             if dt <= 0.0:
                 break
@@ -384,7 +388,7 @@ class StraightFollower:
             if nearest == 1.0:
                 break
             step *= nearest
-            later = self._set_point(one, self._elapsed + step)
+            later = self._set_point(trajectory, self._elapsed + step)
         return step
 
     def brake(self, *, scale: float, rate: float) -> None:
@@ -397,10 +401,10 @@ class StraightFollower:
         if self._stopping:
             return
         self._stopping, self._goal = True, None
-        one = self._followed
-        if one is None:
+        trajectory = self._followed
+        if trajectory is None:
             return
-        if self._elapsed >= one.profile.duration:  # at rest already
+        if self._elapsed >= trajectory.profile.duration:  # at rest already
             self._followed = None
             return
         place, turn, speed, change = self._state()
@@ -412,16 +416,16 @@ class StraightFollower:
         if otg.halt((_unrotated(place), along, by)) and self._follow(otg, centre, scale=scale):
             return
         # the axes cannot brake that hard: as soon as they can, on the trajectory they follow
-        now = one.profile.at(self._elapsed)[1] * scale
+        now = trajectory.profile.at(self._elapsed)[1] * scale
         for horizon in _STOPS:
-            if self._go_on(one, rate=now, horizon=horizon):
+            if self._go_on(trajectory, rate=now, horizon=horizon):
                 return
 
     @property
     def is_still(self) -> bool:
         """Whether a braked motion has come to rest."""
-        one = self._followed
-        return self._stopping and (one is None or self._elapsed >= one.profile.duration)
+        trajectory = self._followed
+        return self._stopping and (trajectory is None or self._elapsed >= trajectory.profile.duration)
 
     # ------------------------------------------------------------------------- trajectories ahead
 
@@ -468,22 +472,22 @@ class StraightFollower:
         profile = self._profile(otg, centre, rate=1.0)
         if profile is None:
             return False
-        one, ahead = _Trajectory(otg, centre, profile), [self._q]
+        trajectory, ahead = _Trajectory(otg, centre, profile), [self._q]
         try:
-            ahead += [self._set_point(one, elapsed) for elapsed in profile.first_ticks]
+            ahead += [self._set_point(trajectory, elapsed) for elapsed in profile.first_ticks]
         except Unreachable:  # between the samples of the profile
             return False
         if not self._axes.joins(scale * self._speed, *ahead):
             return False
-        self._followed, self._elapsed, self.resting = one, 0.0, 0.0
+        self._followed, self._elapsed, self.resting = trajectory, 0.0, 0.0
         return True
 
-    def _go_on(self, one: _Trajectory, *, rate: float, horizon: float = HORIZON) -> bool:
+    def _go_on(self, trajectory: _Trajectory, *, rate: float, horizon: float = HORIZON) -> bool:
         """Look farther ahead; False: that shows nothing better, so the arm comes to rest where it was to."""
-        profile = self._profile(one.otg, one.centre, rate=rate, horizon=horizon)
+        profile = self._profile(trajectory.otg, trajectory.centre, rate=rate, horizon=horizon)
         if profile is None:
             return False
-        self._followed, self._elapsed = replace(one, profile=profile), 0.0
+        self._followed, self._elapsed = replace(trajectory, profile=profile), 0.0
         return True
 
     def _profile(
@@ -501,12 +505,12 @@ class StraightFollower:
     def _new_trajectory(self) -> OnlineTrajectory:
         return OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
 
-    def _set_point(self, one: _Trajectory, elapsed: float) -> Array:
+    def _set_point(self, trajectory: _Trajectory, elapsed: float) -> Array:
         """Joint positions of a trajectory when so much time of its profile has passed, shape (7,) [rad]."""
-        time, rate = one.profile.at(elapsed)
-        near = one.profile.near(time)
+        time, rate = trajectory.profile.at(elapsed)
+        near = trajectory.profile.near(time)
         # where the axes are that slow, the samples are dense, and the noise of the inverse kinematics is not
-        return near if rate < _SLOW else self._joints(one.otg, one.centre, time, near)
+        return near if rate < _SLOW else self._joints(trajectory.otg, trajectory.centre, time, near)
 
     def _joints(self, otg: OnlineTrajectory, centre: Quat, time: float, near: Array) -> Array:
         """Joint positions at a time of a trajectory, next to others.
@@ -528,17 +532,17 @@ class StraightFollower:
 
     def _state(self) -> tuple[Array, Array, Array, Array]:
         """Position and rotation from the centre, shape (3,) each; velocity and acceleration, shape (6,)."""
-        one = self._followed
-        if one is None:
+        trajectory = self._followed
+        if trajectory is None:
             return self._place, np.zeros(3), np.zeros(6), np.zeros(6)
-        otg, time = one.otg, one.otg.time
+        otg, time = trajectory.otg, trajectory.otg.time
         x, v, a = otg.at(time)
         if np.abs(np.cross(x[3:], v[3:])).max() < _TINY and np.abs(np.cross(x[3:], a[3:])).max() < _TINY:
             change = np.array(a[3:])  # about one axis; exact also where the acceleration has a kink
         else:
             low, high = max(0.0, time - _STEP), time + _STEP
             change = (_spin(otg, high) - _spin(otg, low)) / (high - low)
-        rate, growth = one.profile.at(self._elapsed)[1], one.profile.change(self._elapsed)
+        rate, growth = trajectory.profile.at(self._elapsed)[1], trajectory.profile.change(self._elapsed)
         speed = np.concatenate([v[:3], _spin(otg, time)])
         change = rate * rate * np.concatenate([a[:3], change]) + growth * speed
         speed = rate * speed

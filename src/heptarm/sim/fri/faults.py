@@ -50,13 +50,13 @@ class LinkFaults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for one in fields(self)[:8]:
-            value = getattr(self, one.name)
-            is_time = one.name in ("delay", "jitter", "burst_time")
+        for setting in fields(self)[:8]:
+            value = getattr(self, setting.name)
+            is_time = setting.name in ("delay", "jitter", "burst_time")
             if not 0.0 <= value <= (float("inf") if is_time else 1.0):
                 raise LimitError(
-                    f"{one.name} must be in {'[0, inf) s' if is_time else '[0, 1]'}, got {value}",
-                    parameter=one.name,
+                    f"{setting.name} must be in {'[0, inf) s' if is_time else '[0, 1]'}, got {value}",
+                    parameter=setting.name,
                     value=value,
                     allowed="[0, inf) s" if is_time else "[0, 1]",
                 )
@@ -183,8 +183,8 @@ class FaultyLink:
         """Datagrams that have arrived by `now` [ns], in order of arrival, with their times of arrival."""
         found = []
         while self._in_transit and self._in_transit[0].due <= now:
-            one = heapq.heappop(self._in_transit)
-            found.append((one.datagram, one.due))
+            datagram = heapq.heappop(self._in_transit)
+            found.append((datagram.datagram, datagram.due))
         self.damage.passed += len(found)
         return found
 

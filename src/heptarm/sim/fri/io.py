@@ -132,9 +132,9 @@ class SessionSignal:
     high: float = inf
 
     @classmethod
-    def of(cls, one: FriSignal) -> SessionSignal:
+    def of(cls, signal: FriSignal) -> SessionSignal:
         """A signal as Java registers it."""
-        return cls(one.name, _TYPES[one.type], one.is_output, one.place, one.low, one.high)
+        return cls(signal.name, _TYPES[signal.type], signal.is_output, signal.place, signal.low, signal.high)
 
     def value(self, number: float) -> m.IoValue:
         """A value of the image as FRI transmits it."""
@@ -185,7 +185,7 @@ class IoImageSync:
         self._image[signal.place] = number
 
     def _found(self, written: m.IoValue) -> tuple[SessionSignal, float]:
-        signal = next(one for one in self._signals if one.name == written.name)
+        signal = next(signal for signal in self._signals if signal.name == written.name)
         number = float(written.value)
         if signal.low < 0.0 and signal.type is m.IoType.DIGITAL and number >= _SIGN / 2:
             number = float(int(written.value) - _SIGN)

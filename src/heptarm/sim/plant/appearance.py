@@ -73,13 +73,13 @@ class ArmMeshes:
             match = _FILE.fullmatch(path.name)
             if match is None:
                 continue
-            one = (match[1].lower(), (match[2] or COLOURS[0]).lower())
-            if one in found:
+            finish = (match[1].lower(), (match[2] or COLOURS[0]).lower())
+            if finish in found:
                 raise ValueError(
-                    f"meshes must have one file for a link and a colour, got {found[one].name} and {path.name}; "
+                    f"meshes must have one file for a link and a colour, got {found[finish].name} and {path.name}; "
                     "remove one of them"
                 )
-            found[one] = path
+            found[finish] = path
         missing = [link for link in LINKS if not any(link == known for known, _ in found)]
         if missing:
             raise ValueError(

@@ -61,12 +61,12 @@ class CarriedShapes(Value):
         """Add it to the description of an arm, as a body on its flange."""
         prefix = TOOL_PREFIX if self.is_tool else WORKPIECE_PREFIX
         body = _on_flange(arm, f"{prefix}{self.name}", self.pose)
-        for one in self.shapes:
+        for shape in self.shapes:
             body.add_geom(
-                type=GEOMS[one.kind],
-                size=mujoco_size(one.kind, one.size),
-                pos=one.pose.xyz,
-                quat=np.roll(one.pose.quat, 1),
+                type=GEOMS[shape.kind],
+                size=mujoco_size(shape.kind, shape.size),
+                pos=shape.pose.xyz,
+                quat=np.roll(shape.pose.quat, 1),
                 mass=0.0,
                 rgba=COLOUR,
             )
@@ -121,17 +121,17 @@ class FlangeShapes:
         model, disabled = self._model, self._disabled
         if not self._slots:
             return
-        shapes = [(one, body.pose @ one.pose) for body in bodies for one in body.shapes]
+        shapes = [(shape, body.pose @ shape.pose) for body in bodies for shape in body.shapes]
         model.geom_contype[self._slots] = model.geom_conaffinity[self._slots] = 0
         model.body_contype[self._body] = model.body_conaffinity[self._body] = _MEETS_ALL if shapes else 0
-        for geom, (one, pose) in zip(self._slots, shapes):
-            half = _half_extents(one.kind, one.size)
-            model.geom_type[geom] = GEOMS[one.kind]
-            model.geom_size[geom] = mujoco_size(one.kind, one.size)
+        for geom, (shape, pose) in zip(self._slots, shapes):
+            half = _half_extents(shape.kind, shape.size)
+            model.geom_type[geom] = GEOMS[shape.kind]
+            model.geom_size[geom] = mujoco_size(shape.kind, shape.size)
             model.geom_pos[geom], model.geom_quat[geom] = pose.xyz, np.roll(pose.quat, 1)
             model.geom_sameframe[geom] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
             model.geom_aabb[geom] = (0.0, 0.0, 0.0, *half)
-            model.geom_rbound[geom] = _radius(one.kind, half)
+            model.geom_rbound[geom] = _radius(shape.kind, half)
             model.geom_contype[geom] = model.geom_conaffinity[geom] = _MEETS_ALL
         model.opt.disableflags = disabled | NO_TREES if shapes else disabled
 

@@ -84,4 +84,4 @@ def driven_joints(model: mujoco.MjModel) -> list[int]:
     if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
         raise ValueError("the actuator `gripper` must drive a joint or a tendon of joints")
     first = int(model.tendon_adr[target])
-    return [int(one) for one in model.wrap_objid[first : first + int(model.tendon_num[target])]]
+    return [int(wrapped) for wrapped in model.wrap_objid[first : first + int(model.tendon_num[target])]]

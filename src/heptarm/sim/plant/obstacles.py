@@ -42,15 +42,15 @@ class Obstacle(Value):
         body.add_freejoint()
         # nothing falls or is pushed here, but MuJoCo needs a mass
         body.explicitinertial, body.mass, body.inertia = True, 1.0, [1.0, 1.0, 1.0]
-        for number, one in enumerate(self.shapes):
-            if isinstance(one, Mesh):
-                self._add_mesh(spec, body, one, number)
+        for number, shape in enumerate(self.shapes):
+            if isinstance(shape, Mesh):
+                self._add_mesh(spec, body, shape, number)
             else:
                 body.add_geom(
-                    type=GEOMS[one.kind],
-                    size=mujoco_size(one.kind, one.size),
-                    pos=one.pose.xyz,
-                    quat=np.roll(one.pose.quat, 1),
+                    type=GEOMS[shape.kind],
+                    size=mujoco_size(shape.kind, shape.size),
+                    pos=shape.pose.xyz,
+                    quat=np.roll(shape.pose.quat, 1),
                     rgba=_COLOUR,
                 )
         for place in self.points:

@@ -181,8 +181,8 @@ class Scene:
             ValueError: the file is not in MuJoCo's format.
         """
         world = self.read()
-        for one in (*world.texts, *world.keys):  # of the file as a whole, and of no meaning for the arm
-            world.delete(one)
+        for element in (*world.texts, *world.keys):  # of the file as a whole, and of no meaning for the arm
+            world.delete(element)
         for name in _CONTACT_OPTIONS:
             setattr(arm.option, name, getattr(world.option, name))
         tool = _top_level(world, TOOL)
@@ -198,7 +198,7 @@ class Scene:
 
     def place_of(self, name: str) -> Pose | None:
         """Where the scene has a site of that name, such as the base of another arm; None: it has none."""
-        found = next((one for one in self.read().worldbody.sites if one.name == name), None)
+        found = next((site for site in self.read().worldbody.sites if site.name == name), None)
         return None if found is None else Pose.of(found.pos, np.roll(found.quat, -1))
 
     @property
@@ -208,7 +208,7 @@ class Scene:
         Raises:
             ValueError: the text `gripper` of the scene names something else.
         """
-        return Wiring.of(" ".join(one.data for one in self.read().texts if one.name == GRIPPER))
+        return Wiring.of(" ".join(text.data for text in self.read().texts if text.name == GRIPPER))
 
 
 def _check_numbers(file: Path) -> None:
@@ -217,13 +217,13 @@ def _check_numbers(file: Path) -> None:
     Raises:
         CommandRejected: there is one; the text names the element and its attribute. Or it is no XML.
     """
-    for one in read_xml(file, "a scene", name="scene").iter():
-        for attribute, text in one.attrib.items():
+    for element in read_xml(file, "a scene", name="scene").iter():
+        for attribute, text in element.attrib.items():
             if attribute not in _NAMES and _has_no_number(text):
-                named = f" {one.get('name')!r}" if one.get("name") else ""
+                named = f" {element.get('name')!r}" if element.get("name") else ""
                 raise unreadable(
                     file,
-                    f"{attribute} of the {one.tag}{named} must be finite numbers, got {shown(text)}",
+                    f"{attribute} of the {element.tag}{named} must be finite numbers, got {shown(text)}",
                     what="a scene",
                     name="scene",
                 )
@@ -256,7 +256,9 @@ def find_body(model: mujoco.MjModel, name: str) -> int:
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, PREFIX + name)
     if index < 0:
         known = [model.body(body).name for body in range(model.nbody)]
-        listed = ", ".join(plain(one) for one in known if one.startswith(PREFIX)) or "none: there is no scene"
+        listed = (
+            ", ".join(plain(name) for name in known if name.startswith(PREFIX)) or "none: there is no scene"
+        )
         raise ValueError(f"body must be one of {listed}; got {name!r}")
     return int(index)
 
@@ -268,10 +270,12 @@ def plain(name: str) -> str:
 
 def _rename_assets(spec: mujoco.MjSpec) -> None:
     """Give meshes, materials and textures of a description other names, and those to what refers to them."""
-    for one in (*spec.meshes, *spec.hfields, *spec.textures):
-        one.name = _AROUND + (one.name or Path(one.file).stem)  # which MuJoCo names by its file otherwise
-    for one in spec.materials:
-        one.name = _AROUND + one.name
+    for asset in (*spec.meshes, *spec.hfields, *spec.textures):
+        asset.name = _AROUND + (
+            asset.name or Path(asset.file).stem
+        )  # which MuJoCo names by its file otherwise
+    for asset in spec.materials:
+        asset.name = _AROUND + asset.name
     for geom in spec.geoms:
         geom.hfieldname = geom.hfieldname and _AROUND + geom.hfieldname
         geom.meshname = geom.meshname and _AROUND + geom.meshname

@@ -62,10 +62,10 @@ def _mesh(model: mujoco.MjModel, index: int) -> tuple[Array, npt.NDArray[np.int6
     """Vertices and faces of a shape in its own frame."""
     kind = int(model.geom_type[index])
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        one = int(model.geom_dataid[index])
-        first, face = int(model.mesh_vertadr[one]), int(model.mesh_faceadr[one])
-        vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[one])]
-        faces = model.mesh_face[face : face + int(model.mesh_facenum[one])]
+        mesh = int(model.geom_dataid[index])
+        first, face = int(model.mesh_vertadr[mesh]), int(model.mesh_faceadr[mesh])
+        vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])]
+        faces = model.mesh_face[face : face + int(model.mesh_facenum[mesh])]
         return np.array(vertices, float), np.array(faces, np.int64)
     return solid(kind, model.geom_size[index])
 

@@ -157,9 +157,9 @@ def compiled(
     if scene is not None:
         scene.attach_to(spec, at=origin, flange=f"{tool_of}/flange" if tool_of else "flange")
     has_tool = spec.body(PREFIX + TOOL) is not None and not tool_of
-    for one in carried:
-        if not (one.is_tool and has_tool):
-            one.add_to(spec)
+    for mounted in carried:
+        if not (mounted.is_tool and has_tool):
+            mounted.add_to(spec)
     if room and not has_tool:
         make_room(spec)
     for number, box in enumerate(boxes):
@@ -210,8 +210,8 @@ def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
 def _add_arm(spec: mujoco.MjSpec, arm: OtherArm, meshes: ArmMeshes | None) -> None:
     """Add another arm to the world; its bodies, joints and sites are named "NAME/...", its joints come behind."""
     other = specification(arm.robot, meshes)
-    for one in arm.carried:
-        one.add_to(other)
+    for mounted in arm.carried:
+        mounted.add_to(other)
     for body in other.bodies[1:]:
         body.name = plain(body.name)
     adopt(other, spec)

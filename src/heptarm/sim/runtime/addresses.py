@@ -53,6 +53,6 @@ class AddressMap:
         """The old addresses that are in none of the texts."""
         left = dict.fromkeys(self.replaced)
         for text in texts:
-            for old in [one for one in left if AddressMap({one: ""}).apply(text) != text]:
+            for old in [address for address in left if AddressMap({address: ""}).apply(text) != text]:
                 del left[old]
         return list(left)

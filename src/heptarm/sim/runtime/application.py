@@ -129,17 +129,19 @@ def _source_folders(folder: Path) -> dict[Path, tuple[str, ...]]:
     except CommandRejected:
         return {}  # it is Eclipse's, and the sources are there without it
     return {
-        folder / path: tuple(filter(None, one.get("excluding", "").split("|")))
-        for one in entries
-        if one.get("kind") == "src"
-        and not (path := one.get("path", "")).startswith("/")
+        folder / path: tuple(filter(None, entry.get("excluding", "").split("|")))
+        for entry in entries
+        if entry.get("kind") == "src"
+        and not (path := entry.get("path", "")).startswith("/")
         and (folder / path).is_dir()
     }
 
 
 def _matches(path: str, patterns: tuple[str, ...]) -> bool:
     """Whether one of Eclipse's patterns fits a path: a folder with a slash at its end, a file, or with * and **."""
-    return any(path.startswith(one) if one.endswith("/") else fnmatch(path, one) for one in patterns)
+    return any(
+        path.startswith(pattern) if pattern.endswith("/") else fnmatch(path, pattern) for pattern in patterns
+    )
 
 
 def _descendants(sources: list[Path], roots: tuple[str, ...]) -> list[str]:
@@ -353,9 +355,11 @@ def find_projects(folder: Path) -> list[Path]:
 
 
 def _project_of(source: Path, folder: Path) -> Path:
-    above = [one for one in source.parents if one == folder or folder in one.parents]
-    marked = [one for one in above if (one / station.FILE).is_file() or (one / ".classpath").is_file()]
-    named = [one.parent for one in above if one.name == "src" and one != folder]
+    above = [parent for parent in source.parents if parent == folder or folder in parent.parents]
+    marked = [
+        parent for parent in above if (parent / station.FILE).is_file() or (parent / ".classpath").is_file()
+    ]
+    named = [parent.parent for parent in above if parent.name == "src" and parent != folder]
     return next(iter([*marked, *named[-1:], *above[-2:]]))
 
 

@@ -287,7 +287,7 @@ class VirtualCabinet:
         """Write statistics of the realtime loop and of memory to the file of the option `stats`."""
         if self.options.stats is not None:
             java, objects = self._java_memory(), gc.get_objects()
-            counts = {"objects": len(objects), "types": sum(isinstance(one, type) for one in objects)}
+            counts = {"objects": len(objects), "types": sum(isinstance(entry, type) for entry in objects)}
             text = json.dumps(asdict(self.loop.statistics) | {"memory": counts | java})
             partial = self.options.stats.with_suffix(".part")
             partial.write_text(text, encoding="utf-8")

@@ -71,7 +71,7 @@ class JavaListener:
 def _keywords(value: Any) -> dict[str, Any]:
     """Fields of a value of the seam by name, arrays as arrays."""
     found = {name: getattr(value, name) for name in value.__slots__}
-    return {name: np.array(one) if isinstance(one, tuple) else one for name, one in found.items()}
+    return {name: np.array(value) if isinstance(value, tuple) else value for name, value in found.items()}
 
 
 def mode_of(mode: seam.ImpedanceMode | None) -> tuple[Mode | None, tuple[float, ...] | None]:
@@ -127,12 +127,14 @@ def boxed(value: str | int | float | bool) -> Any:
 def add_project(station: Any, project: Project) -> None:
     """Give a station the templates and taught frames of a project."""
     made = jpype.JClass("heptarm.doubles.runtime.ObjectTemplate")
-    for one in project.templates:
-        template = made(one.is_tool, one.mass, _doubles(one.centre), _doubles(one.inertia), one.moved)
-        template.setType(one.type)
-        for path, placed in one.frames:
+    for entry in project.templates:
+        template = made(
+            entry.is_tool, entry.mass, _doubles(entry.centre), _doubles(entry.inertia), entry.moved
+        )
+        template.setType(entry.type)
+        for path, placed in entry.frames:
             template.addFrame(path, _doubles(placed))
-        station.addTemplate(one.name, template)
+        station.addTemplate(entry.name, template)
     for path, placed in project.frames:
         station.addFrame(path, _doubles(placed))
     for path, redundancy in project.redundancies:
@@ -291,8 +293,8 @@ def _body(load: Any) -> Body:
     return Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia))
 
 
-def _shape(one: seam.BodyShape) -> Shape:
-    return Shape(cast("ShapeKind", one.kind.name.lower()), np.array(one.size), _pose(one.pose))
+def _shape(shape: seam.BodyShape) -> Shape:
+    return Shape(cast("ShapeKind", shape.kind.name.lower()), np.array(shape.size), _pose(shape.pose))
 
 
 def _pose(numbers: Sequence[float]) -> Pose:

@@ -133,12 +133,12 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     if name == "place":
         return name, [words.split()[1], *_pose_values(words, rest[1:])]
     if name == "clear":
-        rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
+        rest = [_ALSO.get(word.replace("-", "_"), word.replace("-", "_")) for word in rest]
         if rest and rest[0] not in _REQUESTS:
             raise ValueError(f"{words!r}: clear takes one of {', '.join(_REQUESTS)}")
         return name, list(rest)
     try:
-        values = [float(one) for one in rest]
+        values = [float(word) for word in rest]
     except ValueError:
         raise ValueError(f"{words!r}: the values of {name} must be numbers") from None
     if name in ("drive_error", "joint_limit") and any(value not in range(1, 8) for value in values):
@@ -151,14 +151,14 @@ def understood(words: str) -> tuple[str, list[float | str]]:
 def _pose_values(words: str, rest: list[str]) -> list[float | str]:
     """Position and unit quaternion of a place; upright where only the position is given."""
     try:
-        values = [float(one) for one in rest]
+        values = [float(word) for word in rest]
     except ValueError:
         values = []
     place, quat = values[:3], values[3:] or [0.0, 0.0, 0.0, 1.0]
     norm = math.hypot(*quat)
     if len(quat) != 4 or not all(map(math.isfinite, values)) or abs(norm - 1.0) > 1e-3 or len(place) != 3:
         raise ValueError(f"{words!r}: a place must be three numbers, or seven with a unit quaternion")
-    return [*place, *(one / norm for one in quat)]
+    return [*place, *(part / norm for part in quat)]
 
 
 def _word_values(words: str, name: str) -> list[float | str]:

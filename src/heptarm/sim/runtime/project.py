@@ -100,9 +100,9 @@ def read_process_data(file: Path) -> StoredProcessData:
     root = read_xml(file, _WHAT, name="project", hint=_HINT)
     found: dict[str, Value] = {}
     unusable: dict[str, str] = {}
-    for one in root.iter("processData"):
-        name, kind = one.get("id"), one.get("dataType", "java.lang.String")
-        text = one.get("value", one.get("defaultValue"))
+    for element in root.iter("processData"):
+        name, kind = element.get("id"), element.get("dataType", "java.lang.String")
+        text = element.get("value", element.get("defaultValue"))
         if name is None or text is None:
             continue
         try:
@@ -174,7 +174,7 @@ def read_project(file: Path) -> Project:
     root = read_xml(file, _WHAT, name="project", hint=_HINT)
     try:
         return Project(
-            tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
+            tuple(_template(element) for kind in _KINDS for element in root.iter(kind)),
             tuple(frame for world in root.iter("world") for frame in _frames(world)),
             tuple(redundancy for world in root.iter("world") for redundancy in _redundancies(world)),
             tuple(parameter for world in root.iter("world") for parameter in _parameters(world)),
@@ -185,42 +185,42 @@ def read_project(file: Path) -> Project:
         raise _unreadable(file, "its frames are nested too deeply") from None
 
 
-def _template(one: ElementTree.Element) -> Template:
-    found = one.find("loadData")
+def _template(element: ElementTree.Element) -> Template:
+    found = element.find("loadData")
     load = ElementTree.Element("loadData") if found is None else found
     return Template(
-        one.get("name", ""),
-        _KINDS[one.tag],
+        element.get("name", ""),
+        _KINDS[element.tag],
         _number(load, "mass"),
         tuple(_number(load, f"cog{axis}", f"centerOfMass{axis}") for axis in "XYZABC"),
         tuple(_number(load, f"inertia{axis}") for axis in "XYZ"),
-        one.get("defaultMotionFrameRef", "").strip("/"),
-        tuple(_frames(one)),
-        one.get("class", ""),
+        element.get("defaultMotionFrameRef", "").strip("/"),
+        tuple(_frames(element)),
+        element.get("class", ""),
     )
 
 
 def _elements(parent: ElementTree.Element, path: str = "") -> Iterator[tuple[str, ElementTree.Element]]:
     """Path and element of each frame; parents first."""
-    for one in parent:
-        if one.tag == "frames":
-            yield from _elements(one, path)
-        elif one.tag == "frame":
-            name = f"{path}{one.get('name', '')}"
-            yield name, one
-            yield from _elements(one, f"{name}/")
+    for element in parent:
+        if element.tag == "frames":
+            yield from _elements(element, path)
+        elif element.tag == "frame":
+            name = f"{path}{element.get('name', '')}"
+            yield name, element
+            yield from _elements(element, f"{name}/")
 
 
 def _frames(parent: ElementTree.Element) -> Iterator[tuple[str, Six]]:
-    for name, one in _elements(parent):
-        found = one.find("transformation")
+    for name, element in _elements(parent):
+        found = element.find("transformation")
         placed = ElementTree.Element("transformation") if found is None else found
         yield name, tuple(_number(placed, axis) for axis in "xyzabc")
 
 
 def _redundancies(parent: ElementTree.Element) -> Iterator[tuple[str, Redundancy]]:
-    for name, one in _elements(parent):
-        for found in one.iterfind("redundancyData/redundancy"):
+    for name, element in _elements(parent):
+        for found in element.iterfind("redundancyData/redundancy"):
             infos = {info.get("type", "").rpartition("$")[2]: info for info in found.iterfind("info")}
             if _E1 in infos:
                 values = [_number(infos[key], "value") if key in infos else -1.0 for key in _PARAMETERS]
@@ -228,8 +228,8 @@ def _redundancies(parent: ElementTree.Element) -> Iterator[tuple[str, Redundancy
 
 
 def _parameters(parent: ElementTree.Element) -> Iterator[tuple[str, str, Value]]:
-    for name, one in _elements(parent):
-        for info in one.iterfind("additionalInformation/info"):
+    for name, element in _elements(parent):
+        for info in element.iterfind("additionalInformation/info"):
             key, text = info.get("key"), info.get("value")
             if key is not None and text is not None:
                 with suppress(

@@ -48,9 +48,9 @@ def find_station(place: Path) -> Path | None:
     """
     folder = place.resolve()
     folder = folder if folder.is_dir() else folder.parent
-    for one in (folder, *folder.parents[:_ABOVE]):
-        if (one / FILE).is_file():
-            return one / FILE
+    for parent in (folder, *folder.parents[:_ABOVE]):
+        if (parent / FILE).is_file():
+            return parent / FILE
     return None
 
 
@@ -72,8 +72,8 @@ def read_station(file: Path) -> StationSetup:
 
 def _flange(item: ElementTree.Element) -> tuple[Flange | None, str]:
     """The media flange of a robot's entry, and Workbench's name of it."""
-    for one in item.iterfind("Property[@key='MAM']"):
-        value = one.find("Value")
+    for element in item.iterfind("Property[@key='MAM']"):
+        value = element.find("Value")
         if value is not None:
             data = parse_qs(value.text or "").get("MADA", [""])[0]
             name = _MACHINE_DATA.get(data)

@@ -140,7 +140,7 @@ def jerk_limited(arm: Arm) -> None:
         due = 0.15 / speed[6] + speed[6] / acceleration[6] + acceleration[6] / jerk[6]
         _run(session, 1.2 * due + 0.1)
         near(session.state.q_sent, goal, 1e-6, "positions", unit="rad")
-        sent = np.array([one.q_sent for one in session.history(400) if np.isfinite(one.q_sent).all()])
+        sent = np.array([state.q_sent for state in session.history(400) if np.isfinite(state.q_sent).all()])
         below(float((sent - goal)[:, 5:].max()), 1e-6, "overshoot", unit="rad")
 
 
@@ -152,7 +152,7 @@ def low_pass(arm: Arm) -> None:
         _run(session, 0.1)
         session.params.goal = HOME + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, step]
         _run(session, 1.5)
-        states = [one for one in session.history(400) if one.is_answered]
+        states = [state for state in session.history(400) if state.is_answered]
     t = np.array([state.t for state in states])
     q = np.array([state.q_sent[6] for state in states]) - HOME[6]
     (moved,) = np.nonzero(q > 1e-9)

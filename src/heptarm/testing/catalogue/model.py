@@ -67,8 +67,8 @@ def inverse(arm: Arm) -> None:
     pose = Pose.from_matrix(model.forward(arm.robot, bent))
     found = model.solve_all(arm.robot, pose)
     above(len(found), 1.5, "arm positions that lead to another pose")
-    for one in found:
-        near(model.forward(arm.robot, one), pose.matrix, 1e-9, "each does")
+    for solution in found:
+        near(model.forward(arm.robot, solution), pose.matrix, 1e-9, "each does")
     near(model.solve(arm.robot, pose, near=bent.tolist()), bent, 1e-9, "the one next to a hint", unit="rad")
 
 

@@ -172,9 +172,9 @@ def progress(arm: Arm) -> None:
         if end is not None and state.stamp >= end:
             break
     pushed.close()
-    reported = np.array([one for one in seen if np.isfinite(one[2])])
+    reported = np.array([entry for entry in seen if np.isfinite(entry[2])])
     above(len(reported), 5, "states with the time to the destination")
-    holds((np.diff([one[1] for one in seen]) >= 0).all(), "progress never goes back")
+    holds((np.diff([entry[1] for entry in seen]) >= 0).all(), "progress never goes back")
     ends = reported[:, 0] + reported[:, 2]
     below(float(np.ptp(ends[2:])), 0.05, "the end that they foretell moves by", unit="s")
 
@@ -253,7 +253,7 @@ def preview(arm: Arm) -> None:
     # a robot's own planner shapes the blend, and times it
     path_tolerance, time_tolerance = (1.5e-3, 0.03) if arm.is_virtual else (0.02, 0.3)
     places = ahead.tcp[:, :3]
-    off = max(float(np.linalg.norm(places - one, axis=1).min()) for one in seen.xyz_cmd)
+    off = max(float(np.linalg.norm(places - place, axis=1).min()) for place in seen.xyz_cmd)
     below(off, path_tolerance + 0.5 * 0.2 * 0.01, "from the path of the preview", unit="m")
     near(seen.moving, ahead.duration, time_tolerance * ahead.duration + 0.05, "it took", unit="s")
     near(seen.q[-1], ahead.q[-1], 2e-3, "where it ended", unit="rad")

@@ -86,7 +86,7 @@ def stream(arm: Arm) -> None:
     near(periods[np.abs(periods - 0.01).argmin()], 0.01, 0.002, "period of the states", unit="s")
     below(len(stamps), (stamps[-1] - stamps[0]) * 1e-9 / 0.01 + 3, "number of states")
     seen = [state.motion for state in states if state.motion is not None]
-    holds(any(one.id == handle.id for one in seen), "they name the motion that runs")
+    holds(any(motion.id == handle.id for motion in seen), "they name the motion that runs")
     handle.wait()
     rested = arm.wait_for_rest().motion
     holds(rested is not None and not rested.active, "and that nothing runs any more")

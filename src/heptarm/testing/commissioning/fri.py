@@ -78,7 +78,7 @@ def quality(arm: Arm, person: Person) -> tuple[Comparison, ...]:
         states = session.history()
         missed = session.stats.missed
     ratings = [state.quality for state in states]
-    good = next((k for k, one in enumerate(ratings) if one >= Quality.GOOD), len(ratings))
+    good = next((k for k, rating in enumerate(ratings) if rating >= Quality.GOOD), len(ratings))
     return (
         near("messages until the quality is GOOD", good, _UNTIL_GOOD, 25.0),
         same("quality after 1.5 s", ratings[-1].name, Quality.EXCELLENT.name),
@@ -124,7 +124,7 @@ def lost_answer(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     ) as session:
         is_open = session.wait(1.2)
         state = session.state.session
-        states = [one for one in session.history() if one.session is SessionState.COMMANDING_ACTIVE]
+        states = [state for state in session.history() if state.session is SessionState.COMMANDING_ACTIVE]
     steps = [largest(after.q - before.q) for before, after in itertools.pairwise(states)]
     return (
         same("the session is", state.name if is_open else "closed", SessionState.COMMANDING_ACTIVE.name),
@@ -141,13 +141,17 @@ def command_delay(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     ) as session:
         session.wait(0.8)
         states = session.history()
-    moving = [one for one in states if one.session is SessionState.COMMANDING_ACTIVE and 0.3 < one.t < 0.6]
+    moving = [
+        state for state in states if state.session is SessionState.COMMANDING_ACTIVE and 0.3 < state.t < 0.6
+    ]
     # the law commanded an offset of velocity t^2 / 2; FRI 2 sends no set-points, so that the measured position counts
     offsets = [
-        float(one.q_cmd[6] if math.isfinite(one.q_cmd[6]) else one.q[6]) - one.q_ipo[6] for one in moving
+        float(state.q_cmd[6] if math.isfinite(state.q_cmd[6]) else state.q[6]) - state.q_ipo[6]
+        for state in moving
     ]
     delays = [
-        one.t - math.sqrt(max(0.0, 2.0 * offset / _SLOW)) for one, offset in zip(moving, offsets, strict=True)
+        state.t - math.sqrt(max(0.0, 2.0 * offset / _SLOW))
+        for state, offset in zip(moving, offsets, strict=True)
     ]
     if not delays:
         raise Unfit("the overlay did not last 0.3 s", hint="check the connection with heptarm doctor --fri")

@@ -133,7 +133,7 @@ class CommissioningReport:
                         verdict.value,
                     )
                 )
-        reasons = [one for one in self.outcomes if one.text]
+        reasons = [outcome for outcome in self.outcomes if outcome.text]
         if reasons:
             lines += ["", "## Reasons", ""]
             lines += [f"- `{reason.step.name}` {reason.verdict.value}: {reason.text}" for reason in reasons]

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import datetime
-import fnmatch
-import importlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, ModeConflict, NotReady
+from heptarm.errors import ConnectionLost, HeptarmError, ModeConflict, NotReady
 from heptarm.testing.commissioning.person import PATIENCE, PROVES, Person, PersonTask
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.step import STEPS, CommissioningStep
 from heptarm.testing.measure import Unfit
+from heptarm.testing.scenario import defined, selected
 from heptarm.testing.stage import HOME, REAL_SPEED, has_operator
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.state import OperationMode
@@ -29,9 +28,7 @@ _APPROACH = 120.0
 
 def steps() -> tuple[CommissioningStep, ...]:
     """All steps, group by group."""
-    for group in GROUPS:
-        importlib.import_module(f"heptarm.testing.commissioning.{group}")
-    return tuple(sorted(STEPS.values(), key=lambda one: GROUPS.index(one.group)))
+    return defined(STEPS, "heptarm.testing.commissioning", GROUPS)
 
 
 def find_steps(patterns: Sequence[str] = ()) -> tuple[CommissioningStep, ...]:
@@ -40,21 +37,7 @@ def find_steps(patterns: Sequence[str] = ()) -> tuple[CommissioningStep, ...]:
     Raises:
         CommandRejected: a pattern that fits none.
     """
-    every = steps()
-    for pattern in patterns:
-        if not any(_fits(one, pattern) for one in every):
-            raise CommandRejected(
-                f"no step {pattern!r} in the commissioning run",
-                parameter="only",
-                value=pattern,
-                allowed=", ".join(GROUPS),
-                hint="name a group, a step, or a pattern such as fri.*",
-            )
-    return tuple(one for one in every if not patterns or any(_fits(one, pattern) for pattern in patterns))
-
-
-def _fits(one: CommissioningStep, pattern: str) -> bool:
-    return one.group == pattern or fnmatch.fnmatchcase(one.name, pattern)
+    return selected(steps(), patterns, what="step")
 
 
 def commission(
@@ -95,10 +78,10 @@ def commission(
         arm.wait_until(lambda s: s.safety.mode is OperationMode.T1, timeout=20.0)
     try:
         check_mode(arm)
-        for one in chosen:
+        for step in chosen:
             if on_begin is not None:
-                on_begin(one)
-            outcomes.append(_try(one, arm, person))
+                on_begin(step)
+            outcomes.append(_try(step, arm, person))
             if on_end is not None:
                 on_end(report())
     finally:
@@ -126,37 +109,37 @@ def check_mode(arm: Arm) -> None:
         )
 
 
-def _try(one: CommissioningStep, arm: Arm, person: Person) -> StepOutcome:
-    lacks = [name for name in one.needs if name not in arm.capabilities]
+def _try(step: CommissioningStep, arm: Arm, person: Person) -> StepOutcome:
+    lacks = [name for name in step.needs if name not in arm.capabilities]
     if lacks:
-        return StepOutcome(one, Agreement.SKIPPED, text=f"this cabinet lacks {', '.join(lacks)}")
+        return StepOutcome(step, Agreement.SKIPPED, text=f"this cabinet lacks {', '.join(lacks)}")
     if not arm.connected:
         arm.reconnect()
-    if one.movement is not None:
+    if step.movement is not None:
         check_mode(arm)  # its error ends the run: nobody turns the key switch by accident
     try:
-        if one.movement is not None:
-            if not person.agrees(announcement(one, arm)):
-                return StepOutcome(one, Agreement.SKIPPED, text="not wanted")
+        if step.movement is not None:
+            if not person.agrees(announcement(step, arm)):
+                return StepOutcome(step, Agreement.SKIPPED, text="not wanted")
             prepare(arm, person)
-            arm.speed = one.movement.ceiling
-        comparisons = one.measure(arm, person)
+            arm.speed = step.movement.ceiling
+        comparisons = step.measure(arm, person)
     except Unfit as error:
         text = f"{PROVES} ({error.text})" if arm.is_virtual else error.text
-        return StepOutcome(one, Agreement.SKIPPED, text=text)
+        return StepOutcome(step, Agreement.SKIPPED, text=text)
     except NotReady as error:
-        return StepOutcome(one, Agreement.SKIPPED, text=f"the robot is not ready: {error}")
+        return StepOutcome(step, Agreement.SKIPPED, text=f"the robot is not ready: {error}")
     except ConnectionLost as error:  # the cabinet has stopped the arm; this settles nothing
-        return StepOutcome(one, Agreement.SKIPPED, text=f"the connection was lost: {error}")
+        return StepOutcome(step, Agreement.SKIPPED, text=f"the connection was lost: {error}")
     except HeptarmError as error:
-        return StepOutcome(one, Agreement.DIFFERS, text=f"{type(error).__name__}: {error}")
+        return StepOutcome(step, Agreement.DIFFERS, text=f"{type(error).__name__}: {error}")
     agrees = all(comparison.agrees for comparison in comparisons)
-    return StepOutcome(one, Agreement.AGREES if agrees else Agreement.DIFFERS, comparisons)
+    return StepOutcome(step, Agreement.AGREES if agrees else Agreement.DIFFERS, comparisons)
 
 
-def announcement(one: CommissioningStep, arm: Arm) -> str:
+def announcement(step: CommissioningStep, arm: Arm) -> str:
     """What is about to move, how far, how fast; empty movement: nothing moves."""
-    assert one.movement is not None
+    assert step.movement is not None
     away = float(np.degrees(np.abs(arm.state.q - HOME).max()))
     approach = ""
     if away > np.degrees(_AT_HOME):
@@ -164,8 +147,8 @@ def announcement(one: CommissioningStep, arm: Arm) -> str:
             f"First all axes go to 0 30 0 -90 0 60 0 deg, up to {away:.0f} deg away, at {REAL_SPEED:.0%} of their "
             "speed. "
         )
-    moves = one.movement
-    return f"{one.name}: {one.question} {approach}{moves.what} moves {moves.far}, {moves.fast}. Go on?"
+    moves = step.movement
+    return f"{step.name}: {step.question} {approach}{moves.what} moves {moves.far}, {moves.fast}. Go on?"
 
 
 def prepare(arm: Arm, person: Person) -> None:

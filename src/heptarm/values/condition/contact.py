@@ -83,7 +83,7 @@ class Contact(Value):
         """A few lines: where it was, and how strong."""
         rows = {
             "pose": str(self.pose),
-            "force": f"{' '.join(fixed(one, 2) for one in self.force)} N",
+            "force": f"{' '.join(fixed(component, 2) for component in self.force)} N",
             "travel": f"{fixed(self.travel * 1e3, 2)} mm",
             "joints": degrees(self.q),
             "spread": ""

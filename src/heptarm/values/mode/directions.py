@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import isnan, nan
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,6 @@ FORCE = ("N", "Nm")
 LENGTH = ("m", "rad")
 SPEED = ("m/s", "rad/s")
 
-_T = TypeVar("_T")
 
 #: Six numbers x y z, about x, about y, about z; or one number for each group of directions, such as "xyz", "z", "abc".
 Directional: TypeAlias = npt.ArrayLike | Mapping[str, float]
@@ -117,23 +116,6 @@ def limit(
         if not isnan(entry):
             within(entry, f"{name}[{index}]", 0.0, high, above=above, unit=units[index // 3])
     return result
-
-
-def choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
-    """The choice of that name.
-
-    Raises:
-        ShapeError: it is none of the choices.
-    """
-    if isinstance(name, str) and name in choices:
-        return choices[name]
-    allowed = ", ".join(choices)
-    raise ShapeError(
-        f"{parameter} must be one of {allowed}, got {shown(name)}",
-        parameter=parameter,
-        value=name,
-        allowed=allowed,
-    )
 
 
 def at(indices: Sequence[int], values: Sequence[float]) -> list[float]:

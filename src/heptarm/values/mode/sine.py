@@ -12,7 +12,7 @@ from math import isnan, nan, pi
 import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.checks import Array, Value, finite, flag, optional, shown
+from heptarm.values.checks import Array, Value, choice, finite, flag, optional, shown
 from heptarm.values.mode.directions import (
     DIRECTIONS,
     FORCE,
@@ -20,7 +20,6 @@ from heptarm.values.mode.directions import (
     PLANES,
     Directional,
     at,
-    choice,
     limit,
     one,
     put,

@@ -68,7 +68,7 @@ def orientation_of(kind: str, reference: str, *, segment: bool = False) -> Orien
             'orientation must not be "ignore" outside a spline',
             parameter="orientation",
             value=kind,
-            allowed=", ".join(one for one in TYPES if one != "ignore"),
+            allowed=", ".join(kind for kind in TYPES if kind != "ignore"),
             hint="use it in spl(...)",
         )
     return result

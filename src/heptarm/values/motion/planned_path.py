@@ -49,7 +49,7 @@ class Path(JointSpline):
         clearance: the nearest two bodies on it; None: none are nearer than 0.2 m.
         stats: what the search took.
         goal: what it was searched for: joint positions, poses or regions, of which it reaches one.
-        keep: constraints along it.
+        keep: constraints along it; an `Upright` has its direction, so that a path which goes on keeps the same one.
         world: the model of bodies that it keeps clear of, and against which it is checked again before it is sent.
     """
 
@@ -84,25 +84,30 @@ class Path(JointSpline):
         return f"{self.duration:.2f} s, {points}, {room}, {took}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Upright(Value):
     """A constraint along a path: an axis of the tool frame keeps its direction, as that of a full glass.
 
     Attributes:
         axis: "x", "y" or "z" of the tool frame.
-        within: largest angle between its direction and the one at the start [rad], 0.01 to pi.
+        within: largest angle between the axis and its direction [rad], 0.01 to pi.
+        direction: of the axis, in the base, shape (3,); its length does not matter. None: the one that the axis has
+            where the path begins, which is written down in `Path.keep`.
 
     Raises:
-        ShapeError: no such axis.
-        LimitError: an angle outside its range.
+        ShapeError: no such axis, or another shape.
+        LimitError: an angle outside its range, or a direction of length 0.
     """
 
     axis: Literal["x", "y", "z"] = "z"
     within: float = 0.1
+    direction: npt.ArrayLike | None = None
 
     def __post_init__(self) -> None:
         word(self.axis, "axis", tuple(_AXES))
         object.__setattr__(self, "within", within(self.within, "within", 0.01, pi, unit="rad"))
+        if self.direction is not None:
+            object.__setattr__(self, "direction", unit_vector(self.direction, "direction"))
 
     @property
     def column(self) -> int:
@@ -241,8 +246,8 @@ def unit_vector(value: npt.ArrayLike, name: str) -> Array:
     return frozen(given / length)
 
 
-def _check_place(one: OnPlane | OnLine, direction: str) -> None:
+def _check_place(part: OnPlane | OnLine, direction: str) -> None:
     """Check a plane or a line, and give its direction the length 1."""
-    object.__setattr__(one, "point", array(one.point, 3, "point"))
-    object.__setattr__(one, direction, unit_vector(getattr(one, direction), direction))
-    object.__setattr__(one, "within", within(one.within, "within", 1e-3, 1.0, unit="m"))
+    object.__setattr__(part, "point", array(part.point, 3, "point"))
+    object.__setattr__(part, direction, unit_vector(getattr(part, direction), direction))
+    object.__setattr__(part, "within", within(part.within, "within", 1e-3, 1.0, unit="m"))

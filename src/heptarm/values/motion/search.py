@@ -50,7 +50,7 @@ class Spiral(Value):
         """Points along it, shape (n, 2) [m]: r = pitch * angle / 2 pi, twelve in a turn."""
         last = 2.0 * pi * self.radius / self.pitch
         count = max(4, round(last / _STEP))
-        angles = [last * one / count for one in range(1, count + 1)]
+        angles = [last * turn / count for turn in range(1, count + 1)]
         return np.array([_at(angle, self.pitch) for angle in angles])
 
 

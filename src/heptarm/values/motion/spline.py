@@ -89,8 +89,10 @@ class Spline(DynamicMotion):
 
     def longest_duration(self, robot: RobotModel) -> float:
         """Slowest plausible estimate of its duration [s]."""
-        limits = [one.dynamics.filled_from(self.dynamics) for one in self.segments]
-        paths = (each.path_time(one.longest_path) for each, one in zip(limits, self.segments, strict=True))
+        limits = [segment.dynamics.filled_from(self.dynamics) for segment in self.segments]
+        paths = (
+            each.path_time(segment.longest_path) for each, segment in zip(limits, self.segments, strict=True)
+        )
         return self.dynamics.turn_time(robot) * len(self.segments) + sum(paths)
 
 
@@ -164,7 +166,7 @@ def spline(
         CommandRejected: a segment has something that a segment cannot have, such as blending or joint limits.
     """
     made = Spline(
-        tuple(_segment(one, index) for index, one in enumerate(_listed(segments, "segments"))),
+        tuple(_segment(segment, index) for index, segment in enumerate(_listed(segments, "segments"))),
         moving,
         given_in(frame)[0],
         **settings("spline", SplineSettings, limits),
@@ -183,7 +185,9 @@ def placed(motion: _Aimed, frame: Pose) -> _Aimed:
         frame: pose of that frame in the base.
     """
     if isinstance(motion, Spline):
-        return replace(motion, segments=tuple(placed(one, frame) for one in motion.segments), frame=BASE)
+        return replace(
+            motion, segments=tuple(placed(segment, frame) for segment in motion.segments), frame=BASE
+        )
     if isinstance(motion, Circ):
         return replace(motion, via=frame @ motion.via, end=frame @ motion.end, frame=BASE)
     if isinstance(motion, Spl):
@@ -203,27 +207,27 @@ def _listed(values: Sequence[object], name: str) -> Sequence[object]:
     return values
 
 
-def _segment(one: object, index: int) -> Segment:
+def _segment(segment: object, index: int) -> Segment:
     name = f"segments[{index}]"
-    if isinstance(one, Pose):
-        return Spl(one)
-    if isinstance(one, Spl):
-        return one
-    if not isinstance(one, Lin | Circ):
+    if isinstance(segment, Pose):
+        return Spl(segment)
+    if isinstance(segment, Spl):
+        return segment
+    if not isinstance(segment, Lin | Circ):
         raise ShapeError(
-            f"{name} must be a segment of a spline, got {shown(one)}",
+            f"{name} must be a segment of a spline, got {shown(segment)}",
             parameter=name,
-            value=one,
+            value=segment,
             hint="give a pose, spl(...), lin(...) or circ(...)",
         )
     for what, given in (
-        ("near", one.near is not None),
-        ("redundancy", one.redundancy is not None),
-        ("moving", one.moving != TOOL),
-        ("frame", one.frame != BASE),
-        ("blending", one.blending != EXACT),
-        ("joint limits", any(limit.startswith("joint_") for limit in one.dynamics.given())),
-        ("triggers", bool(one.triggers)),
+        ("near", segment.near is not None),
+        ("redundancy", segment.redundancy is not None),
+        ("moving", segment.moving != TOOL),
+        ("frame", segment.frame != BASE),
+        ("blending", segment.blending != EXACT),
+        ("joint limits", any(limit.startswith("joint_") for limit in segment.dynamics.given())),
+        ("triggers", bool(segment.triggers)),
     ):
         if given:
             raise CommandRejected(
@@ -231,7 +235,7 @@ def _segment(one: object, index: int) -> Segment:
                 parameter=name,
                 hint="give it to the spline, or leave it out",
             )
-    return one
+    return segment
 
 
 @keywords(JointSplineSettings)
@@ -250,8 +254,8 @@ def spline_joints(
         CommandRejected: a point with blending or triggers, or dynamics with limits along a path.
     """
     made = []
-    for index, one in enumerate(_listed(points, "points")):
-        point = one if isinstance(one, Ptp) else Ptp(array(one, 7, f"points[{index}]"))  # type: ignore[arg-type]
+    for index, entry in enumerate(_listed(points, "points")):
+        point = entry if isinstance(entry, Ptp) else Ptp(array(entry, 7, f"points[{index}]"))  # type: ignore[arg-type]
         finite_entries(point.q, f"points[{index}]")
         if point.blending != EXACT:
             raise CommandRejected(

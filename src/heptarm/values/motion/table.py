@@ -38,7 +38,7 @@ def read_table(path: Path, *, rate: float) -> tuple[Array, Array]:
     ]
     if not lines:
         raise unreadable(path, "it is empty", what=_WHAT, hint=_HINT)
-    separator = next((one for one in (";", "\t", ",") if one in lines[0][1]), None)
+    separator = next((mark for mark in (";", "\t", ",") if mark in lines[0][1]), None)
     cells = [(number, [cell.strip().strip('"') for cell in line.split(separator)]) for number, line in lines]
     names = [] if _is_number(cells[0][1][-1]) else cells[0][1]
     rows = cells[1:] if names else cells

@@ -86,7 +86,7 @@ class Trajectory(Value):
             "duration": f"{self.duration:.2f} s, {len(self)} points",
             "begin": degrees(self.q[0]),
             "end": degrees(self.q[-1]),
-            "fastest": f"{' '.join(fixed(one, 1) for one in np.degrees(self.fastest))} deg/s",
+            "fastest": f"{' '.join(fixed(speed, 1) for speed in np.degrees(self.fastest))} deg/s",
         }
         return lines("Trajectory", rows)
 

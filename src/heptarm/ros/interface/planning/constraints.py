@@ -1,4 +1,4 @@
-"""MoveIt's requests as those of `Arm.find_path`: constraints become goals, links the tool frame.
+"""MoveIt's requests as those of `Arm.find_path`: constraints become goals and what a path keeps, links the tool frame.
 
 What a request asks for is never loosened: a tolerance that has another shape here becomes one inside of it.
 """
@@ -9,18 +9,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import pi, sqrt
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from heptarm.errors import CollisionForeseen, CommandRejected, HeptarmError, LimitError, NoPath, Unreachable
-from heptarm.model.kinematics import forward
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.motions import pose_of, positions, stamped_pose
 from heptarm.ros.interface.planning.scene import BOX, SPHERE, tool_on_flange
 from heptarm.values.checks import Array
-from heptarm.values.motion.planned_path import Region, Upright
+from heptarm.values.motion.planned_path import OnPlane, PathConstraint, Region, Upright
 from heptarm.values.pose import Pose
+from heptarm.values.workspace import Workspace
 
 #: Tolerances below are met by the pose itself: position [m], angle [rad].
 _EXACT_POSITION, _EXACT_ANGLE = 0.005, 0.02
@@ -28,6 +28,11 @@ _EXACT_POSITION, _EXACT_ANGLE = 0.005, 0.02
 _GROUP = "arm"
 #: Angle between an axis that a path constraint leaves free and one of the tool frame [rad].
 _ALONG = 1e-3
+#: A point of a link so near to the tool frame is its origin [m].
+_LEVER = 1e-6
+#: Of a box along a path: the farthest from the planes through its middle [m], which is as far as a constraint goes.
+_WIDEST = 1.0
+_AXES: tuple[Literal["x", "y", "z"], ...] = ("x", "y", "z")
 
 
 class MoveItCode(IntEnum):
@@ -83,6 +88,8 @@ def code_of(error: HeptarmError) -> MoveItCode:
     if isinstance(error, RequestRefused):
         return error.moveit
     if isinstance(error, NoPath):
+        if error.reason == "constraint" and error.parameter == "start":
+            return MoveItCode.START_STATE_VIOLATES_PATH_CONSTRAINTS
         return _OF_REASON.get(error.reason, MoveItCode.FAILURE)
     if isinstance(error, CollisionForeseen):
         return MoveItCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
@@ -120,8 +127,8 @@ def start_of(context: NodeContext, state: Any) -> Array | None:
             MoveItCode.INVALID_ROBOT_STATE,
             hint="publish them on attached_collision_object",
         )
-    own = set(context.joints)
-    pairs = [pair for pair in zip(state.joint_state.name, state.joint_state.position) if pair[0] in own]
+    names = context.driver.configuration.own(state.joint_state.name)
+    pairs = [pair for pair in zip(names, state.joint_state.position) if pair[0] in context.joints]
     if not pairs:
         return None
     return positions(context.driver, [name for name, _ in pairs], [value for _, value in pairs])
@@ -138,7 +145,7 @@ def goals_of(context: NodeContext, constraints: Sequence[Any]) -> list[Array | P
     """
     if not constraints:
         raise RequestRefused("there is no goal", MoveItCode.INVALID_GOAL_CONSTRAINTS)
-    return [_goal_of(context, one) for one in constraints]
+    return [_goal_of(context, constraint) for constraint in constraints]
 
 
 def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
@@ -150,7 +157,9 @@ def _goal_of(context: NodeContext, message: Any) -> Array | Pose | Region:
         )
     joints = message.joint_constraints
     if joints and not any(counts):
-        return positions(context.driver, [one.joint_name for one in joints], [one.position for one in joints])
+        return positions(
+            context.driver, [joint.joint_name for joint in joints], [joint.position for joint in joints]
+        )
     if joints or not counts[0]:
         raise RequestRefused(
             "a goal must be joint positions, or a position with or without an orientation",
@@ -168,15 +177,16 @@ def _pose_goal(context: NodeContext, place: Any, turns: Sequence[Any]) -> Pose |
     has_lever = bool(np.abs(to_tool.xyz).max() > 0.0)
     centre, radius = _ball(context, place)
     if turns:
-        one = turns[0]
-        if one.link_name not in ("", place.link_name):
+        orientation = turns[0]
+        if orientation.link_name not in ("", place.link_name):
             raise RequestRefused(
-                f"position and orientation must be of the same link, got {place.link_name!r} and {one.link_name!r}",
+                "position and orientation must be of the same link, "
+                f"got {place.link_name!r} and {orientation.link_name!r}",
                 MoveItCode.INVALID_GOAL_CONSTRAINTS,
             )
-        quat = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).quat
-        cone = min(one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, pi)
-        turn = min(one.absolute_z_axis_tolerance, pi)
+        quat = _in_base(context, orientation.header, (0.0, 0.0, 0.0), orientation.orientation).quat
+        cone = min(orientation.absolute_x_axis_tolerance, orientation.absolute_y_axis_tolerance, pi)
+        turn = min(orientation.absolute_z_axis_tolerance, pi)
     elif has_lever:
         raise RequestRefused(
             "a position with any orientation must be of the tool frame itself",
@@ -197,21 +207,27 @@ def _pose_goal(context: NodeContext, place: Any, turns: Sequence[Any]) -> Pose |
 
 def _ball(context: NodeContext, message: Any) -> tuple[Pose, float]:
     """Centre, in the base, and radius of the largest ball in the region of a position constraint [m]."""
+    primitive, middle = _primitive(context, message)
+    sizes = list(primitive.dimensions)
+    return middle, sizes[0] if primitive.type == SPHERE else min(sizes) / 2.0
+
+
+def _primitive(context: NodeContext, message: Any, *, turned: bool = False) -> tuple[Any, Pose]:
+    """The box or sphere of a position constraint, and its pose in the base; its orientation only if it is `turned`."""
     region = message.constraint_region
     if region.meshes or len(region.primitives) != 1 or len(region.primitive_poses) != 1:
         raise RequestRefused(
             "a region of positions must be one primitive with its pose", MoveItCode.INVALID_GOAL_CONSTRAINTS
         )
     primitive, at = region.primitives[0], region.primitive_poses[0]
-    sizes = list(primitive.dimensions)
-    if primitive.type not in (BOX, SPHERE) or not sizes:
+    if len(primitive.dimensions) != {BOX: 3, SPHERE: 1}.get(primitive.type):
         raise RequestRefused(
-            f"a region of positions must be a box or a sphere, got a primitive of type {primitive.type}",
+            f"a region of positions must be a box with three edges or a sphere with a radius, got a primitive of type "
+            f"{primitive.type} with {len(primitive.dimensions)} numbers",
             MoveItCode.INVALID_GOAL_CONSTRAINTS,
         )
     point = (at.position.x, at.position.y, at.position.z)
-    radius = sizes[0] if primitive.type == SPHERE else min(sizes) / 2.0
-    return _in_base(context, message.header, point, None), radius
+    return primitive, _in_base(context, message.header, point, at.orientation if turned else None)
 
 
 def _in_base(context: NodeContext, header: Any, point: tuple[float, float, float], turn: Any) -> Pose:
@@ -253,52 +269,85 @@ def stamped_in_base(context: NodeContext, message: Any) -> Pose:
 # ---------------------------------------------------------------------------------- path constraints
 
 
-def keep_of(context: NodeContext, message: Any, start: Array) -> Upright | None:
-    """What a moveit_msgs/Constraints along a path keeps; None: nothing.
-
-    MoveIt's constraint is about a fixed orientation, ours about that at the start: what lies between tightens it.
+def keep_of(context: NodeContext, message: Any) -> list[PathConstraint]:
+    """What a moveit_msgs/Constraints along a path keeps.
 
     Args:
         context: of the node.
         message: the constraints.
-        start: joint positions at the beginning, shape (7,) [rad].
 
     Raises:
-        RequestRefused: it is another kind of constraint, or the start violates it.
+        RequestRefused: a constraint that none of heptarm's is.
+        HeptarmError: a number outside its range.
     """
-    if message.joint_constraints or message.position_constraints or message.visibility_constraints:
+    if message.visibility_constraints:
         raise RequestRefused(
-            "a path constraint must be one of an orientation",
+            "a path constraint must be of joints, a position or an orientation, got one of visibility",
             MoveItCode.INVALID_GOAL_CONSTRAINTS,
-            hint="leave out the other kinds",
         )
-    if not message.orientation_constraints:
-        return None
-    one = message.orientation_constraints[0]
+    kept: list[PathConstraint] = [_upright(context, one) for one in message.orientation_constraints]
+    for one in message.position_constraints:
+        kept += _box(context, one)
+    if message.joint_constraints:
+        kept.append(_ranges(context, message.joint_constraints))
+    return kept
+
+
+def _upright(context: NodeContext, one: Any) -> Upright:
+    """An axis of the tool frame keeps the direction that an orientation gives it."""
     tolerances = (one.absolute_x_axis_tolerance, one.absolute_y_axis_tolerance, one.absolute_z_axis_tolerance)
     free = [index for index, tolerance in enumerate(tolerances) if tolerance >= pi]
-    if len(message.orientation_constraints) > 1 or len(free) != 1:
+    if len(free) != 1:
         raise RequestRefused(
-            f"a path constraint must leave free one axis, with a tolerance of at least pi, got tolerances "
+            f"an orientation along a path must leave free one axis, with a tolerance of at least pi, got tolerances "
             f"{', '.join(f'{value:g}' for value in tolerances)} rad",
             MoveItCode.INVALID_GOAL_CONSTRAINTS,
         )
-    link = link_on_flange(context, one.link_name)
-    to_tool = link.inverse() @ tool_on_flange(context)
-    along = np.abs(to_tool.rotation.T[:, free[0]])
-    if along.max() < np.cos(_ALONG):
+    to_tool = link_on_flange(context, one.link_name).inverse() @ tool_on_flange(context)
+    along = to_tool.rotation.T[:, free[0]]
+    axis = int(np.abs(along).argmax())
+    if abs(along[axis]) < np.cos(_ALONG):
         raise RequestRefused(
             "the axis that stays upright must be one of the tool frame", MoveItCode.INVALID_GOAL_CONSTRAINTS
         )
     wanted = _in_base(context, one.header, (0.0, 0.0, 0.0), one.orientation).rotation[:, free[0]]
-    flange = Pose.from_matrix(forward(context.arm.robot, start))
-    here = (flange @ link).rotation[:, free[0]]
-    tilt = float(np.arccos(np.clip(wanted @ here, -1.0, 1.0)))
-    left = min(tolerance for index, tolerance in enumerate(tolerances) if index != free[0]) - tilt
-    if left < 0.01:
+    within = min(tolerance for index, tolerance in enumerate(tolerances) if index != free[0])
+    return Upright(_AXES[axis], within=within, direction=np.sign(along[axis]) * wanted)
+
+
+def _box(context: NodeContext, one: Any) -> list[PathConstraint]:
+    """The tool frame stays in a box: near the three planes through its middle, by half an edge."""
+    to_tool = link_on_flange(context, one.link_name).inverse() @ tool_on_flange(context)
+    offset = one.target_point_offset
+    if np.abs(to_tool.xyz - (offset.x, offset.y, offset.z)).max() > _LEVER:
         raise RequestRefused(
-            f"at the start the axis is turned by {tilt:.3f} rad already, which leaves {left:.3f} rad; at least "
-            "0.01 rad are needed",
-            MoveItCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+            "a position along a path must be of the tool frame itself",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+            hint="name the tool's link",
         )
-    return Upright(("x", "y", "z")[int(along.argmax())], within=min(left, pi))
+    primitive, pose = _primitive(context, one, turned=True)
+    if primitive.type != BOX:
+        raise RequestRefused(
+            f"a region of positions along a path must be a box, got a primitive of type {primitive.type}",
+            MoveItCode.INVALID_GOAL_CONSTRAINTS,
+        )
+    halves = [min(0.5 * edge, _WIDEST) for edge in primitive.dimensions]
+    return [
+        OnPlane(pose.xyz, normal, within=half) for normal, half in zip(pose.rotation.T, halves, strict=True)
+    ]
+
+
+def _ranges(context: NodeContext, joints: Sequence[Any]) -> Workspace:
+    """Joints stay between a position less one tolerance and that position plus another."""
+    robot, names = context.arm.robot, context.joints
+    low, high = robot.q_min.copy(), robot.q_max.copy()
+    for one in joints:
+        index = names.index(one.joint_name) if one.joint_name in names else None
+        if index is None:
+            raise RequestRefused(
+                f"joint must be one of {', '.join(names)}, got {one.joint_name!r}",
+                MoveItCode.INVALID_GOAL_CONSTRAINTS,
+            )
+        low[index] = max(low[index], one.position - one.tolerance_below)
+        high[index] = min(high[index], one.position + one.tolerance_above)
+    return Workspace(joints=(low, high))

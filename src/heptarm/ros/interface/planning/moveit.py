@@ -141,7 +141,7 @@ class _Request:
         self.is_here = start is None or bool(np.abs(start - here).max() < _HERE)
         self.start = here if start is None or self.is_here else start
         self._goals = goals_of(context, message.goal_constraints)
-        self._keep = keep_of(context, message.path_constraints, self.start)
+        self._keep = keep_of(context, message.path_constraints)
         draft = context.world.draft()
         if difference is not None:
             change_scene(context, draft, difference)
@@ -256,8 +256,9 @@ def _check_free(context: NodeContext, message: Any) -> None:
     Raises:
         CollisionForeseen: they would.
     """
-    order = [message.joint_names.index(name) for name in context.joints if name in message.joint_names]
-    rows = [point.positions for point in message.points if len(point.positions) == len(message.joint_names)]
+    names = context.driver.configuration.own(message.joint_names)
+    order = [names.index(name) for name in context.joints if name in names]
+    rows = [point.positions for point in message.points if len(point.positions) == len(names)]
     if len(order) != 7 or not rows:
         return  # the driver refuses or completes it
     path = np.vstack([context.arm.state.q_cmd, np.array([[row[k] for k in order] for row in rows])])
@@ -347,14 +348,17 @@ def _cartesian(context: NodeContext, request: Any) -> Mapping[str, Any]:
     check_group(context, request.group_name)
     start = start_of(context, request.start_state)
     begin = context.arm.state.q_cmd if start is None else start
-    if keep_of(context, request.path_constraints, begin) is not None or not len(request.waypoints):
+    if keep_of(context, request.path_constraints) or not len(request.waypoints):
         raise RequestRefused(
             "a Cartesian path must have waypoints, and no constraints beside them",
             MoveItCode.INVALID_GOAL_CONSTRAINTS,
         )
     link = link_on_flange(context, request.link_name)
     stamped = class_of("geometry_msgs/PoseStamped", "msg")
-    poses = [stamped_in_base(context, stamped(header=request.header, pose=one)) for one in request.waypoints]
+    poses = [
+        stamped_in_base(context, stamped(header=request.header, pose=waypoint))
+        for waypoint in request.waypoints
+    ]
     speed = (
         getattr(request, "max_velocity_scaling_factor", 0.0) or context.driver.configuration.values["speed"]
     )

@@ -13,6 +13,7 @@ import numpy as np
 
 from heptarm.arm.motion.following import FollowedPath
 from heptarm.errors import HeptarmError, NoPath, ShapeError
+from heptarm.planning.constraints import constraint_from_text
 from heptarm.planning.search import STATES, TIMEOUT
 from heptarm.ros.interface.action import (
     ActionResult,
@@ -28,13 +29,11 @@ from heptarm.ros.interface.motions import positions, stamped_pose
 from heptarm.ros.interface.service import ServiceResponse
 from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.values.checks import Array
-from heptarm.values.motion.planned_path import Path, Region, Upright
+from heptarm.values.motion.planned_path import Path, Region
 from heptarm.values.pose import Pose
 
 #: Time between two points of a trajectory [s], and the most points that one has.
 _STEP, _MOST_POINTS = 0.02, 1000
-#: Default of the angle within which an axis stays upright [rad].
-_WITHIN = 0.1
 
 
 def plan(context: NodeContext, request: Any) -> ServiceResponse:
@@ -121,14 +120,10 @@ def _search(context: NodeContext, request: Any) -> Callable[[Callable[[], bool] 
     Raises:
         HeptarmError: refused; the text gives the reason.
     """
-    goals = [_goal(context, one, f"goals[{index}]") for index, one in enumerate(request.goals)]
+    goals = [_goal(context, goal, f"goals[{index}]") for index, goal in enumerate(request.goals)]
     if not goals:
         raise ShapeError("goals must have at least one goal, got none", parameter="goals")
-    if request.within and not request.upright:
-        raise ShapeError(
-            "within is given without upright", parameter="within", hint="name the axis that stays upright"
-        )
-    keep = Upright(request.upright, within=request.within or _WITHIN) if request.upright else None
+    keep = [constraint_from_text(one, f"keep[{index}]") for index, one in enumerate(request.keep)]
     world, speed = context.world.model, _speed(context, request)
 
     def find(stop: Callable[[], bool] | None) -> Path:

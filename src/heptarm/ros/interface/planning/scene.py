@@ -98,10 +98,10 @@ def change_scene(context: NodeContext, draft: WorldDraft, message: Any) -> None:
             parameter="allowed_collision_matrix",
             hint="remove the body, or attach it to the arm",
         )
-    for one in message.world.collision_objects:
-        change_body(context, draft, one)
-    for one in message.robot_state.attached_collision_objects:
-        change_attached(context, draft, one)
+    for body in message.world.collision_objects:
+        change_body(context, draft, body)
+    for body in message.robot_state.attached_collision_objects:
+        change_attached(context, draft, body)
 
 
 def change_body(context: NodeContext, draft: WorldDraft, message: Any) -> None:
@@ -128,11 +128,11 @@ def change_attached(context: NodeContext, draft: WorldDraft, message: Any) -> No
     """
     name, flange = message.object.id, flange_in_base(context)
     if _operation(message.object) == REMOVE:
-        held = [one for one, body in draft.bodies.items() if body.is_held]
-        for one in (name,) if name else held:
-            body = draft.body(one)
+        held = [body_name for body_name, body in draft.bodies.items() if body.is_held]
+        for body_name in (name,) if name else held:
+            body = draft.body(body_name)
             if body.is_held:
-                draft.move(one, flange @ body.pose)
+                draft.move(body_name, flange @ body.pose)
         return
     _check_links(context, message)
     if message.object.primitives or message.object.meshes or message.object.planes:
@@ -152,12 +152,12 @@ def _check_links(context: NodeContext, message: Any) -> None:
     configuration = context.driver.configuration
     prefix = configuration.values["prefix"]
     link_in_base(context, message.link_name)
-    for one in message.touch_links:
-        if one in {f"{prefix}link_{number}" for number in range(_NEIGHBOURS)}:
+    for link in message.touch_links:
+        if link in {f"{prefix}link_{number}" for number in range(_NEIGHBOURS)}:
             raise CommandRejected(
-                f"touch_links must be the flange, the tool, or links beside them, got {one!r}",
+                f"touch_links must be the flange, the tool, or links beside them, got {link!r}",
                 parameter="touch_links",
-                value=one,
+                value=link,
                 hint="attach a body where it touches no other link",
             )
 
@@ -176,8 +176,11 @@ def _body_of(context: NodeContext, draft: WorldDraft, message: Any, frame: Pose)
             "a plane is not supported: it has no end", parameter="planes", hint="send a box as large as it is"
         )
     parts: tuple[Part, ...] = (
-        *(_primitive(*one) for one in _pairs(message.primitives, message.primitive_poses, "primitive_poses")),
-        *(_mesh(*one) for one in _pairs(message.meshes, message.mesh_poses, "mesh_poses")),
+        *(
+            _primitive(*pair)
+            for pair in _pairs(message.primitives, message.primitive_poses, "primitive_poses")
+        ),
+        *(_mesh(*pair) for pair in _pairs(message.meshes, message.mesh_poses, "mesh_poses")),
     )
     if not parts:
         raise ShapeError(
@@ -199,7 +202,7 @@ def _body_of(context: NodeContext, draft: WorldDraft, message: Any, frame: Pose)
         )
     place = flange_in_base(context) @ before.pose if before.is_held else before.pose
     shift = place.inverse() @ body.pose
-    return SceneBody((*before.parts, *(replace(one, pose=shift @ one.pose) for one in parts)), place)
+    return SceneBody((*before.parts, *(replace(part, pose=shift @ part.pose) for part in parts)), place)
 
 
 def _pairs(found: Sequence[Any], poses: Sequence[Any], name: str) -> list[tuple[Any, Pose]]:
@@ -207,7 +210,7 @@ def _pairs(found: Sequence[Any], poses: Sequence[Any], name: str) -> list[tuple[
         return [(found[0], ORIGIN)]
     if len(poses) != len(found):
         raise ShapeError(f"{name} must have {len(found)} poses, got {len(poses)}", parameter=name)
-    return [(one, pose_of(pose)) for one, pose in zip(found, poses)]
+    return [(shape, pose_of(pose)) for shape, pose in zip(found, poses)]
 
 
 def _primitive(message: Any, at: Pose) -> shapes.Shape:
@@ -233,8 +236,8 @@ def _primitive(message: Any, at: Pose) -> shapes.Shape:
 
 
 def _mesh(message: Any, at: Pose) -> Mesh:
-    vertices = np.array([[one.x, one.y, one.z] for one in message.vertices])
-    faces = np.array([list(one.vertex_indices) for one in message.triangles])
+    vertices = np.array([[point.x, point.y, point.z] for point in message.vertices])
+    faces = np.array([list(triangle.vertex_indices) for triangle in message.triangles])
     return Mesh(vertices, faces, at)
 
 
@@ -246,7 +249,7 @@ def cloud_of(message: Any) -> Array:
     """
     if not message.width * message.height:
         return frozen(np.zeros((0, 3)))  # some drivers leave out the fields, too
-    order, fields = ">" if message.is_bigendian else "<", {one.name: one for one in message.fields}
+    order, fields = ">" if message.is_bigendian else "<", {field.name: field for field in message.fields}
     kinds = [_FLOATS.get(fields[name].datatype) if name in fields else None for name in "xyz"]
     if None in kinds:
         raise ShapeError(

@@ -56,7 +56,8 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         service.start();
         openDatagrams(port);
         reception.start();
-        log.info("heptarm " + ServerSettings.VERSION + " listens on " + settings.bind + ":" + port + ", TCP "
+        String sources = ServerSettings.SOURCES.length() > 0 ? " (sources " + ServerSettings.SOURCES + ")" : "";
+        log.info("heptarm " + ServerSettings.VERSION + sources + " listens on " + settings.bind + ":" + port + ", TCP "
                 + (datagrams.isOpen() ? "and UDP" : "only") + ", protocol " + Protocol.MAJOR + "." + Protocol.MINOR);
         if (settings.isOpenToAll()) {
             log.warn("any program in the network can move this robot: set the process data heptarm.key or heptarm.allow");

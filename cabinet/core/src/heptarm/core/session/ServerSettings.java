@@ -8,6 +8,8 @@ import java.util.Set;
 /** Settings of the server, from the cabinet's process data. */
 public final class ServerSettings {
     public static final String VERSION = "0.1.0";
+    /** Check sum of the installed sources, written by `heptarm install-cabinet`; empty in heptarm itself. */
+    public static final String SOURCES = "";
 
     private static final double MIN_KEY_BITS = 80;
     private static final int MIN_DIFFERENT = 8;

@@ -1,0 +1,52 @@
+"""What a calibration is about to move, in words, and the consent to it: nothing moves before both."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from heptarm.errors import CommandRejected
+from heptarm.model.kinematics import forward
+from heptarm.values.checks import Array, callback, frozen
+from heptarm.values.robot import RobotModel
+
+_log = logging.getLogger("heptarm.calibration")
+
+PlanT = TypeVar("PlanT")
+
+
+def swings(postures: Array, start: Array, axes: Iterable[int] = range(7)) -> str:
+    """How far axes move from a posture, in degrees: "A4 +0 to +30, A5 -90 to +90"."""
+    off = np.degrees(postures - start)
+    return ", ".join(f"A{axis + 1} {off[:, axis].min():+.0f} to {off[:, axis].max():+.0f}" for axis in axes)
+
+
+def flange_box(robot: RobotModel, postures: Sequence[Array] | Array) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of the flange in postures, in the base, shape (3,) each [m]."""
+    places = np.array([forward(robot, q)[:3, 3] for q in postures])
+    return frozen(places.min(axis=0)), frozen(places.max(axis=0))
+
+
+def box_text(low: Array, high: Array) -> str:
+    """A box in words: "x 0.50 to 0.62, y -0.10 to 0.10, z 0.30 to 0.41 m in the base"."""
+    pairs = zip("xyz", low, high, strict=True)
+    return ", ".join(f"{axis} {a:.2f} to {b:.2f}" for axis, a, b in pairs) + " m in the base"
+
+
+def agree(plan: PlanT, confirm: Callable[[PlanT], bool] | None, what: str) -> None:
+    """Log a plan, and show it to whom it concerns.
+
+    Args:
+        plan: what would move.
+        confirm: called with it; None: nobody is asked.
+        what: would be done, such as "measuring the load".
+
+    Raises:
+        CommandRejected: it was not confirmed.
+    """
+    _log.info("%s", plan)
+    if confirm is not None and not callback(confirm, "confirm")(plan):
+        raise CommandRejected(f"{what} was not confirmed: nothing moves", parameter="confirm")
