@@ -78,19 +78,21 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema, the diagram
 	$(PY) scripts/screens.py --check
 
 # Packages are unpacked on one processor while the other compiles. What installs system packages is all on one side: they
-# lock each other out. What fails of ROS is asked for again by its tests, and reported there.
+# lock each other out.
 .PHONY: prepared
 prepared: $(STAMPS)/demo
 	@$(MAKE) --no-print-directory $(STAMPS)/venv & packages=$$!; \
 	$(MAKE) --no-print-directory native cabinet $(STAMPS)/browser; compiled=$$?; \
-	$(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1; \
 	wait $$packages && exit $$compiled
 
-# Lint and what computes fill the time in which the others wait, and leave them the processor when they want it, to the
-# end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are shown at the end.
+# The set-up of ROS, lint and what computes fill the time in which the others wait, and leave them the processor when they
+# want it, to the end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are
+# shown at the end. What fails of the set-up is asked for again by the tests of ROS, and reported there.
 test: prepared  ## everything; what takes long begins first
-	@nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
+	@nice -n 5 $(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-ros.log 2>&1 & ros=$$!; \
+	nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
 	$(PY) -m pytest $(PARALLEL) $(LONGEST) -m "not computing and not alone"; failed=$$?; \
+	wait $$ros; cat build/test-ros.log; \
 	$(MAKE) --no-print-directory test-ros ROS_JOBS=2 || failed=1; \
 	wait $$beside || failed=1; cat build/test-beside.log; exit $$failed
 	$(PY) -m pytest $(LONGEST) -m alone $(ALONE)

@@ -16,14 +16,14 @@ import json
 import os
 import sys
 
-from bench.calibration import cameras, identification  # noqa: F401  every import registers its benchmarks
+from bench.calibration import cameras, flange, identification  # noqa: F401  every import registers its benchmarks
 from bench.contact import force  # noqa: F401
 from bench.fri import faults, guard, hold, loop  # noqa: F401
 from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark
 from bench.measure.store import Store
 from bench.motion import endpoints, follow, inverse_kinematics, paths  # noqa: F401
-from bench.planning import search  # noqa: F401
+from bench.planning import rivals, search  # noqa: F401
 from bench.protocol import garbage, round_trip  # noqa: F401
 from bench.rl import deploy, training  # noqa: F401
 from bench.ros import nodes  # noqa: F401
@@ -32,7 +32,7 @@ from bench.servo import stream  # noqa: F401
 from bench.simulator import life, tick  # noqa: F401
 from bench.speed import dynamics, fleet, idle, kinematics, request, unpaced  # noqa: F401
 from bench.state import push  # noqa: F401
-from bench.strangers import programs  # noqa: F401
+from bench.strangers import libiiwa, programs  # noqa: F401
 from bench.trust import lost_client as lost_clients  # noqa: F401
 from bench.trust import network, outsiders, readings, soak  # noqa: F401
 

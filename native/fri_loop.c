@@ -137,29 +137,32 @@ static int conclude(struct fri_loop *l, int answer) {
     return 0;
 }
 
+/* Receive and answer one datagram, or wait for one in vain; 0: it was answered, or was a stranger's. */
+static int take_one(struct fri_loop *l) {
+    struct sockaddr_in from;
+    word received;
+    ssize_t size = next_message(l, &from, &received);
+    if (size < 0) {
+        if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNREFUSED) {
+            l->seam->error = errno;
+            return SOCKET_ERROR;
+        }
+        word now = l->header[H_BEAT] = clock_now(CLOCK_MONOTONIC);
+        return is_over(l, now) ? ENDED : TIMEOUT;
+    }
+    int is_peer = l->peer_port && from.sin_addr.s_addr == l->peer && ntohs(from.sin_port) == l->peer_port;
+    if (!is_peer && !accept_sender(l, &from, (int)size, received)) /* a flood of strangers must not keep the loop */
+        return ++l->checked % CHECK_EVERY == 0 && is_over(l, clock_now(CLOCK_MONOTONIC)) ? ENDED : 0;
+    int answer = fri_turn(l, l->datagram, (int)size, received);
+    return answer == LAW ? CALL_LAW : conclude(l, answer);
+}
+
+/* Answer one datagram, or the law whose call the last step asked for; what `take_one` returns. For clients in C++. */
+int fri_step(struct fri_loop *l, int is_called) { return is_called ? conclude(l, fri_answer(l)) : take_one(l); }
+
 /* Receive and answer until Python has something to do. `is_called`: the law in Python was called, its command is to be sent. */
 int fri_run(struct fri_loop *l, int is_called) {
     int next = is_called ? conclude(l, fri_answer(l)) : 0;
-    while (!next) {
-        struct sockaddr_in from;
-        word received;
-        ssize_t size = next_message(l, &from, &received);
-        if (size < 0) {
-            if (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR && errno != ECONNREFUSED) {
-                l->seam->error = errno;
-                return SOCKET_ERROR;
-            }
-            word now = l->header[H_BEAT] = clock_now(CLOCK_MONOTONIC);
-            return is_over(l, now) ? ENDED : TIMEOUT;
-        }
-        int is_peer = l->peer_port && from.sin_addr.s_addr == l->peer && ntohs(from.sin_port) == l->peer_port;
-        if (!is_peer && !accept_sender(l, &from, (int)size, received)) {
-            if (++l->checked % CHECK_EVERY == 0 && is_over(l, clock_now(CLOCK_MONOTONIC))) return ENDED; /* a flood of strangers */
-            continue;
-        }
-        int answer = fri_turn(l, l->datagram, (int)size, received);
-        if (answer == LAW) return CALL_LAW;
-        next = conclude(l, answer);
-    }
+    while (!next) next = take_one(l);
     return next;
 }

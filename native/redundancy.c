@@ -506,10 +506,37 @@ static int take(const struct search *s, const double *found, double *q) {
     return FOUND;
 }
 
+static int is_found(const struct search *s) { return fmin(s->least, s->beyond_distance) < INFINITY; }
+
 static int choose(const struct search *s) {
     for (int class = 0; class < ANY; class++)
         if (s->distance[class] <= PREFERENCE * s->least + SAME) return class;
     return ANY;
+}
+
+/* Offers the postures next to `near` and those that the closed forms give. */
+static void offer_all(struct search *s) {
+    const struct request *request = s->request;
+    const double *near = s->near;
+    int is_exact = request->is_fixed && request->is_unlimited;
+    double first[N], loose[N];
+    memcpy(first, near, sizeof first);
+    first[2] = s->a3;
+    if (estimate(s->arm, s->target, near) < FAR_AWAY) {
+        if (!is_exact) offer_settled(s, request->is_fixed ? first : near, 0);
+        offer_settled(s, first, 1);
+    }
+    for (int status = 0; status < ALL; status++) {
+        double error[6], j[6][N], clear = with_a3(s->arm, s->target, s->a3, status, near, 0, first);
+        if (clear < 0.0) continue;
+        if (clear > VAGUE || miss(s->arm, s->target, first, error, j) <= TOLERANCE) offer(s, first);
+        if (clear > VAGUE) continue;
+        with_a3(s->arm, s->target, s->a3, status, near, 1, loose);
+        if (distance(loose, near) >= s->least) continue;
+        offer_settled(s, loose, 1);
+        if (!is_exact) offer_settled(s, loose, 0);
+    }
+    if (!request->is_fixed && (!(s->least < INFINITY) || largest_move(s->q[choose(s)], near) > LONG_WAY)) offer_sweep(s);
 }
 
 /* Joint positions for a pose of the flange, rotation by rows and place [m]. Returns FOUND, TOO_FAR or NO_POSTURE. */
@@ -524,32 +551,19 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
     for (int class = 0; class < CLASSES; class++) s.distance[class] = INFINITY;
     /* on a path A3 has no noise of a measurement: another A3 each time would add up */
     int is_given = request->is_fixed && request->status >= 0, is_exact = request->is_fixed && request->is_unlimited;
-    double first[N], loose[N];
+    double first[N];
     /* the usual case: the posture with A3 and Status is clear, and moves no joint farther than it must */
     double clear = with_a3(arm, &target, s.a3, s.status, near, 0, first), most = largest_move(first, near);
     if (is_exact && clear > ALONE && most <= NEAREST * clear) return take(&s, first, q);
     if (clear > (is_given && !request->near ? NO_SIGN : VAGUE) && (request->is_unlimited || excess(arm, first) <= ON_LIMIT)) {
         if (is_given || most <= SAME || (most <= LONG_WAY && distance(first, near) <= PREFERENCE * estimate(arm, &target, near))) return take(&s, first, q);
     }
-    memcpy(first, near, sizeof first);
-    first[2] = s.a3;
-    if (estimate(arm, &target, near) < FAR_AWAY) {
-        if (!is_exact) offer_settled(&s, request->is_fixed ? first : near, 0);
-        offer_settled(&s, first, 1);
+    offer_all(&s);
+    if (!is_found(&s) && s.border < BOTH_SIGNS) { /* a straight arm has the noise of the pose as 1e-8 rad in A4 to A6 */
+        s.border = BOTH_SIGNS;
+        offer_all(&s);
     }
-    for (int status = 0; status < ALL; status++) {
-        double error[6], j[6][N];
-        clear = with_a3(arm, &target, s.a3, status, near, 0, first);
-        if (clear < 0.0) continue;
-        if (clear > VAGUE || miss(arm, &target, first, error, j) <= TOLERANCE) offer(&s, first);
-        if (clear > VAGUE) continue;
-        with_a3(arm, &target, s.a3, status, near, 1, loose);
-        if (distance(loose, near) >= s.least) continue;
-        offer_settled(&s, loose, 1);
-        if (!is_exact) offer_settled(&s, loose, 0);
-    }
-    if (!request->is_fixed && (!(s.least < INFINITY) || largest_move(s.q[choose(&s)], near) > LONG_WAY)) offer_sweep(&s);
-    if (!(fmin(s.least, s.beyond_distance) < INFINITY)) return NO_POSTURE;
+    if (!is_found(&s)) return NO_POSTURE;
     return take(&s, s.least <= PREFERENCE * s.beyond_distance + SAME ? s.q[choose(&s)] : s.beyond, q);
 }
 

@@ -1,8 +1,10 @@
 """Generates the Python code of ROS 1 interface packages without catkin.
 
-    build/ros1/bin/python scripts/ros1_interfaces.py OUTPUT PACKAGE_FOLDER...
+    build/ros1/bin/python scripts/ros1_interfaces.py OUTPUT PACKAGE_FOLDER... --site SITE_PACKAGES
 
-For machines that have rospy from their distribution. In a catkin workspace, catkin does this.
+For machines that have rospy from their distribution. In a catkin workspace, catkin does this. The packages of OUTPUT
+count only where Python finds no others of their names: some are a part of packages that a distribution has whole, and
+which others need, as tf does tf2_msgs.
 """
 
 from __future__ import annotations
@@ -90,13 +92,26 @@ def generate(source: Path, out: Path, others: Sequence[Path] = ()) -> int:
     return count
 
 
+def fallback(folder: Path) -> str:
+    """Text of a path file by which Python finds the packages of a folder after all others, whenever installed."""
+    # one line, whose names are gone when the lambda is called
+    return (
+        "import sys; sys.meta_path.append(type('Interfaces', (), {'find_spec': staticmethod(lambda name, path=None, "
+        "target=None: None if path else __import__('importlib.machinery').machinery.PathFinder.find_spec("
+        f"name, [{str(folder)!r}]))}}))\n"
+    )
+
+
 def main() -> int:
     """Generates the packages named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("packages", nargs="+", type=Path)
+    parser.add_argument("--site", type=Path, required=True)
     given = parser.parse_args()
+    (given.site / "heptarm_interfaces.pth").write_text(fallback(given.out.resolve()), encoding="utf-8")
     for source in given.packages:
+        shutil.rmtree(given.site / source.name, ignore_errors=True)  # where earlier versions put it
         print(f"{source.name}: {generate(source, given.out, given.packages)} messages and services")
     return 0
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import importlib
 import inspect
 import io
@@ -51,6 +52,16 @@ GENERATORS = (
     ("rosidl_generator_py.cli", "GeneratePython", "py"),
 )
 RUNTIME = ("rosidl_runtime_c", "rcutils")
+#: What each generated file in C++ includes first; compiled once, a file takes a quarter of the time.
+COMMON = (
+    *("<cassert>", "<cstddef>", "<limits>", "<string>", '"fastcdr/Cdr.h"'),
+    '"rosidl_typesupport_fastrtps_c/serialization_helpers.hpp"',
+    '"rosidl_typesupport_fastrtps_c/wstring_conversion.hpp"',
+    '"rosidl_typesupport_fastrtps_cpp/message_type_support.h"',
+)
+# to optimise doubles the time of a set-up for tests
+FLAGS = ("-O0", "-fPIC", "-w")
+STANDARDS = {".c": ("gcc", "-std=gnu11"), ".cpp": ("g++", "-std=c++17")}
 
 
 #: What upstream's generators match definitions and descriptions with: by the name alone, which a message and an action
@@ -72,11 +83,12 @@ class Package:
         source: folder with msg/, srv/, action/.
         prefix: where to install.
         work: a folder to work in.
+        common: the header of `compiled_headers`.
     """
 
-    def __init__(self, source: Path, prefix: Path, work: Path) -> None:
+    def __init__(self, source: Path, prefix: Path, work: Path, common: Path) -> None:
         self.name = source.name
-        self.source, self.prefix, self.work = source, prefix, work
+        self.source, self.prefix, self.work, self.common = source, prefix, work, common
         self.generated = work / "generated"
         self.libraries = work / "lib"
         self.libraries.mkdir(parents=True)
@@ -201,12 +213,11 @@ class Package:
     def _object(self, source: Path, flags: Sequence[str]) -> str:
         target = self.work / "o" / (str(source.relative_to(self.generated)).replace("/", "__") + ".o")
         target.parent.mkdir(exist_ok=True)
-        plus = source.suffix == ".cpp"
-        includes = [f"-I{self.generated / place}" for _, _, place in GENERATORS[:4]]
-        includes += [f"-I{path}" for path in sorted((self.prefix / "include").iterdir()) if path.is_dir()]
-        # to optimise doubles the time of a set-up for tests
-        command = ["g++" if plus else "gcc", "-O0", "-fPIC", "-w", "-std=c++17" if plus else "-std=gnu11"]
-        command += [*flags, *includes, f"-I{self.prefix / 'include'}", "-c", str(source), "-o", str(target)]
+        command = [*STANDARDS[source.suffix], *FLAGS, *flags]
+        if source.suffix == ".cpp":
+            command += ["-include", str(self.common)]
+        command += [f"-I{self.generated / place}" for _, _, place in GENERATORS[:4]]
+        command += [*_includes(self.prefix), "-c", str(source), "-o", str(target)]
         subprocess.run(command, check=True)
         return str(target)
 
@@ -248,6 +259,26 @@ class Package:
         (index / self.name).touch()
 
 
+def _includes(prefix: Path) -> list[str]:
+    folders = sorted(path for path in (prefix / "include").iterdir() if path.is_dir())
+    return [f"-I{path}" for path in (*folders, prefix / "include")]
+
+
+def compiled_headers(prefix: Path, folder: Path) -> Path:
+    """Write a header with what is common to all files in C++, and compile it; g++ takes what is beside it."""
+    header = folder / "common.hpp"
+    header.write_text("".join(f"#include {name}\n" for name in COMMON))
+    command = [*STANDARDS[".cpp"], *FLAGS, *_includes(prefix), "-x", "c++-header", str(header)]
+    subprocess.run([*command, "-o", f"{header}.gch"], check=True)
+    return header
+
+
+def _parse_once() -> None:
+    """Keep what the parser of upstream's generators makes of a file; each of the five would parse it again."""
+    parser: Any = importlib.import_module("rosidl_parser.parser")
+    parser.get_ast_from_idl_string = functools.cache(parser.get_ast_from_idl_string)
+
+
 def _in_order(sources: Iterable[Path]) -> list[Path]:
     """Put packages that others refer to before these."""
     names = {name: place for place, name in enumerate(DEPENDENCIES)}
@@ -261,11 +292,15 @@ def main() -> int:
     prefix = Path(sys.prefix)
     os.environ["AMENT_PREFIX_PATH"] = str(prefix)
     logging.disable(logging.WARNING)
-    for source in _in_order(parser.parse_args().packages):
-        with tempfile.TemporaryDirectory(prefix="rosidl_") as work:
-            package = Package(source.resolve(), prefix, Path(work))
-            package.install()
-            print(f"{package.name}: {len(package.files)} interfaces")
+    sources = _in_order(parser.parse_args().packages)
+    _parse_once()
+    with tempfile.TemporaryDirectory(prefix="rosidl_") as shared:
+        common = compiled_headers(prefix, Path(shared))
+        for source in sources:
+            with tempfile.TemporaryDirectory(prefix="rosidl_") as work:
+                package = Package(source.resolve(), prefix, Path(work), common)
+                package.install()
+                print(f"{package.name}: {len(package.files)} interfaces")
     return 0
 
 

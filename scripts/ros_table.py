@@ -252,7 +252,8 @@ def page() -> str:
         "| name | default | allowed | meaning |",
         "|---|---|---|---|",
     ]
-    for one_parameter in (*PARAMETERS, *joint_parameters(["<joint>"])):
+    of_a_joint = tuple(joint_parameters(["<joint>", *"234567"]))[:2]
+    for one_parameter in (*PARAMETERS, *of_a_joint):
         live = "" if one_parameter.fixed else " *Live.*"
         text = one_parameter.text[0].upper() + one_parameter.text[1:]
         lines.append(

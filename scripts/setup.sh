@@ -59,6 +59,10 @@ torch() { # A version for which there is a build without CUDA here; any newer on
     }
 }
 
+# Of CMake only the tool that builds is used here: its testing and packaging tools and its help are 55 MB.
+lean() { rm -rf $venv/lib/python3*/site-packages/cmake/data/bin/ctest $venv/lib/python3*/site-packages/cmake/data/bin/cpack \
+    $venv/lib/python3*/site-packages/cmake/data/share/cmake-*/Help; }
+
 # Old versions of pip can search for a long time for a set of versions that fit.
 "$venv/bin/python" -c 'import sys, pip; sys.exit(int(pip.__version__.split(".")[0]) < 24)' || pip install -q -U "pip>=24"
 packages=".[$extras]"
@@ -71,7 +75,7 @@ dev | demo)
         torch || true
     fi
     if locked "$extras"; then
-        pip install -q --no-deps --no-build-isolation -e . && pip check && exit 0
+        pip install -q --no-deps --no-build-isolation -e . && pip check && lean && exit 0
     fi
     echo "the locked versions are not all to be had here, or do not suffice; the newest are installed, without checksums" >&2
     if [ "$extras" = demo ]; then packages=".[sim] matplotlib"; fi
@@ -80,3 +84,4 @@ dev | demo)
 esac
 # shellcheck disable=SC2086
 pip install -q -e $packages
+lean

@@ -51,6 +51,6 @@ packages() { # of one lock file, with its checksums; where they are not to be ha
 $venv/bin/python -c 'import numpy; assert (1, 22) <= tuple(map(int, numpy.__version__.split(".")[:2])) < (3, 0)' 2>/dev/null || packages numpy
 packages ros1
 site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
-$venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/*/ ros1/heptarm_msgs
+$venv/bin/python scripts/ros1_interfaces.py $venv/interfaces ros1/interfaces/*/ ros1/heptarm_msgs --site "$site"
 printf '%s\n' "$PWD/src" "$PWD/ros1/heptarm_ros1/src" >"$site/heptarm_sources.pth"
 echo "$venv/bin/python has ROS 1 and heptarm_ros1"

@@ -75,15 +75,15 @@ def load() -> Iterator[Figure]:
         target = f"sim://iiwa14?speed=5&sensors=noisy:7&scene={scene}"
         with ha.connect(target, state_rate=500.0, watchdog=5.0, timeout=60.0) as arm:
             arm.move(ha.ptp(HOME))
-            plan = calibration.load_plan(arm, excitation="short", speed=0.5)
-            found = calibration.load(arm, plan=plan)
+            found = calibration.load(arm, plan=calibration.load_plan(arm, speed=0.5))
+            moved = calibration.load(arm, plan=calibration.load_plan(arm, excitation="short", speed=0.5))
     detail = {"sigma_kg": found.sigma_mass, "sigma_mm": (1e3 * found.sigma_com).tolist()}
     yield Figure("load_mass", abs(found.mass / WEIGHT - 1.0), "fraction", limit=MASS, detail=detail)
     off = 1e3 * float(np.linalg.norm(found.com - MIDDLE))
     yield Figure("load_centre", off, "mm", limit=CENTRE, detail=detail)
     matters = inertia > 0.5 * inertia.max()
-    worst = float(np.abs(found.inertia[:3] / inertia - 1.0)[matters].max())
-    sigma = {"sigma": found.sigma_inertia.tolist(), "moments": inertia.tolist()}
+    worst = float(np.abs(moved.inertia[:3] / inertia - 1.0)[matters].max())
+    sigma = {"sigma": moved.sigma_inertia.tolist(), "moments": inertia.tolist()}
     yield Figure("load_inertia", worst, "fraction", limit=INERTIA, detail=sigma)
 
 
@@ -95,6 +95,7 @@ def calibration_sigma() -> Iterator[Figure]:
         "tip_by_touch": _touch,
         "load": _load,
         "hand_eye": _hand_eye,
+        "hand_eye_tags": _tags,
     }
     for name, off in kinds.items():
         inside = np.mean([off(seed) <= 2.0 for seed in range(RUNS)], axis=0)
@@ -132,7 +133,14 @@ def _load(seed: int) -> Array:
 
 
 def _hand_eye(seed: int) -> Array:
-    given = eye.views("flange", pixels=0.1, arm=1e-4, seed=seed)
-    found = calibration.estimate_hand_eye(given, matrix=eye.MATRIX)
+    return _camera(eye.views("flange", pixels=0.1, arm=1e-4, seed=seed))
+
+
+def _tags(seed: int) -> Array:
+    return _camera(eye.seen_tags(seed))
+
+
+def _camera(views: list[calibration.HandEyeView]) -> Array:
+    found = calibration.estimate_hand_eye(views, matrix=eye.MATRIX)
     sigma = np.concatenate([found.sigma, found.sigma_angle])
     return np.asarray(np.abs(eye.errors(found, eye.CAMERA)) / sigma)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import socket
 import struct
 import threading
 import time
@@ -17,66 +16,12 @@ import pytest
 from heptarm import Arm
 from heptarm.bridge.libiiwa import LibiiwaBridge, serve_libiiwa
 from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
+from tests.bridge.libiiwa import PATIENCE, LibiiwaProgram
 
-PATIENCE = 60.0
 NAN = math.nan
 HOME = [0.0, math.radians(30), 0.0, -math.pi / 2, 0.0, math.radians(60), 0.0]
 NEAR = [0.1, 0.6, 0.1, -1.5, 0.1, 0.9, 0.2]
 NONE, VALUE, ASYNCHRONOUS, CONFIGURATION = -10, -11, -14, -16
-
-
-class Program:
-    """What libiiwa's class is on the wire: waits, then sends one request after the other."""
-
-    def __init__(self, letter: str) -> None:
-        self.letter = letter
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.listener.settimeout(PATIENCE)
-        self.port: int = self.listener.getsockname()[1]
-        self.connection: socket.socket | None = None
-
-    def accept(self) -> None:
-        self.connection = self.listener.accept()[0]
-        self.connection.settimeout(PATIENCE)
-
-    def send(self, code: float, *arguments: float) -> None:
-        assert self.connection is not None
-        numbers = [code, *arguments, *[0.0] * (7 - len(arguments))]
-        self.connection.sendall(struct.pack(f"!8{self.letter}", *numbers))
-
-    def receive(self) -> tuple[float, ...]:
-        assert self.connection is not None
-        layout = struct.Struct(f"!38{self.letter}")
-        data = b""
-        while len(data) < layout.size:
-            more = self.connection.recv(layout.size - len(data))
-            assert more, "the bridge has closed the connection"
-            data += more
-        return layout.unpack(data)
-
-    def ask(self, code: float, *arguments: float) -> tuple[float, ...]:
-        self.send(code, *arguments)
-        return self.receive()
-
-    def command(self, code: float, *arguments: float) -> tuple[float, ...]:
-        answer = self.ask(code, *arguments)
-        assert answer[0] == 1.0, f"{code} is refused with {answer[34]}"
-        return answer
-
-    def until(self, holds: Callable[[tuple[float, ...]], bool]) -> tuple[float, ...]:
-        deadline = time.monotonic() + PATIENCE
-        while not holds(answer := self.ask(0)):
-            assert time.monotonic() < deadline, answer
-            time.sleep(0.005)
-        return answer
-
-    def rest(self) -> tuple[float, ...]:
-        return self.until(lambda answer: answer[37] == 0.0)
-
-    def close(self) -> None:
-        if self.connection is not None:
-            self.connection.close()
-        self.listener.close()
 
 
 @contextmanager
@@ -97,8 +42,8 @@ def bridge(arm: Arm, port: int) -> Iterator[list[str]]:
 
 
 @contextmanager
-def connected(arm: Arm, letter: str = "f") -> Iterator[Program]:
-    program = Program(letter)
+def connected(arm: Arm, letter: str = "f") -> Iterator[LibiiwaProgram]:
+    program = LibiiwaProgram(letter)
     try:
         with bridge(arm, program.port):
             program.accept()
@@ -319,7 +264,7 @@ def test_the_arm_stops_when_the_program_is_lost(
 
 
 def test_garbage_ends_neither_the_bridge_nor_its_next_program(arm: Arm) -> None:
-    program = Program("f")
+    program = LibiiwaProgram("f")
     with bridge(arm, program.port) as reports:
         program.accept()
         assert program.connection is not None

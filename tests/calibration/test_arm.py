@@ -11,12 +11,14 @@ import pytest
 
 import heptarm as ha
 from heptarm import calibration
-from heptarm.calibration import ArmSamples, FittedArm
+from heptarm.calibration import ArmSamples, FittedArm, FittedNumbers
 from heptarm.calibration.load_estimate import load_regressor
 from heptarm.cli import calibrate
+from heptarm.cli.rl import recipe_of
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.model.dynamics import GRAVITY
-from heptarm.rl.sim.randomisation import MILD, Randomisation
+from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
+from heptarm.rl.task import ReachTask
 from heptarm.sim.plant.plant import Plant, fitted_arm
 from heptarm.values.checks import Array
 from heptarm.values.robot import Body, robot
@@ -254,3 +256,15 @@ def test_learning_takes_its_ranges_from_the_arm() -> None:
     assert ranges.bandwidth == MILD.bandwidth
     with pytest.raises(LimitError, match="period must be"):
         Randomisation.of_arm(FittedArm("iiwa14"), period=0.0)
+
+
+def test_a_training_varies_about_the_fitted_arm(tmp_path: Path) -> None:
+    file = tmp_path / "my-arm.toml"
+    late = FittedNumbers("state_delay", np.array([0.04]), np.array([0.001]))
+    FittedArm("iiwa14", (late,)).save(file)
+    task = ReachTask("iiwa14")
+    recipe = recipe_of(task, seed=3, steps=1000, fitted=file)
+    assert recipe.randomisation.latency == (1, 2) and recipe.steps == 1000 and recipe.seed == 3
+    assert recipe_of(task, seed=3, steps=0, fitted=None).randomisation == STRONG
+    with pytest.raises(CommandRejected, match="no such file|cannot be read|does not exist"):
+        recipe_of(task, seed=0, steps=0, fitted=tmp_path / "none.toml")

@@ -18,6 +18,7 @@ from heptarm.calibration.hand_eye_estimate import HandEyeGuess, HandEyeModel
 from heptarm.cli.calibrate_eye import board, eye
 from heptarm.cli.options import Access, CommandTarget
 from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.io.targets import SavedTarget, add_target, save_tool, saved_targets, targets_file
 from heptarm.values.robot import robot
 from tests.drawing import cannot_draw
 from tests.long import longer
@@ -105,6 +106,29 @@ def test_the_standard_deviations_are_honest(frame: Frame, arm: float) -> None:
     assert np.mean(sizes) > 0.2, "and they are not far too large"
 
 
+def test_a_camera_goes_into_the_entry_of_a_saved_target(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    found = estimate_hand_eye(views(), matrix=MATRIX)
+    with pytest.raises(CommandRejected, match="there is no target lab1"):
+        found.save("lab1", "wrist")
+    add_target(SavedTarget("lab1", "172.31.1.147"))
+    save_tool("lab1", ha.Tool("gripper", mass=1.2))
+    for _ in range(2):  # the second one takes the place of the first
+        made = found.save("lab1", "wrist")
+    assert saved_targets()["lab1"].cameras == (made,) and saved_targets()["lab1"].tools[0].mass == 1.2
+    assert calibration.saved_camera("lab1", "wrist") == made and made.pose == found.pose
+    with pytest.raises(CommandRejected, match="saved target 'lab1', which has wrist; got 'head'"):
+        calibration.saved_camera("lab1", "head")
+    add_target(SavedTarget("lab1", "172.31.1.148"), replace=True)
+    assert calibration.saved_camera("lab1", "wrist") == made, "a new address keeps what was measured"
+    file = targets_file()
+    file.write_text(file.read_text().replace('frame = "flange"', 'frame = "tool"'))
+    with pytest.raises(CommandRejected, match=r"camera wrist of \[lab1\] in .*: frame must be"):
+        saved_targets()
+
+
 def test_a_wrong_view_is_named_and_the_others_predict_it() -> None:
     given = views(pixels=0.05)
     wrong = given[4]
@@ -160,14 +184,18 @@ def test_what_makes_no_sense_is_refused() -> None:
     "board", [Board(), Board(4, 3, 0.05, kind="apriltag"), Board(1, 1, 0.1, kind="apriltag")]
 )
 def test_a_board_is_found_in_its_own_picture(board: Board) -> None:
-    printed = np.pad(board.picture(pixels=60), 60, constant_values=255)
+    side = 64 if board.kind == "apriltag" else 60
+    printed = np.pad(board.picture(pixels=side), side, constant_values=255)
     found = board.find(printed)
     assert found is not None and len(found) == len(board.points)
-    scale = 60 / board.square
-    np.testing.assert_allclose(found.pixels, found.points[:, :2] * scale + 60 - 0.5, atol=0.6)
+    scale = side / board.square
+    np.testing.assert_allclose(found.pixels, found.points[:, :2] * scale + side - 0.5, atol=0.15)
     np.testing.assert_allclose(
         np.diff(found.pixels, axis=0).mean(), np.diff(found.points[:, :2] * scale, axis=0).mean(), atol=0.1
     )
+    if board.kind == "apriltag":
+        with pytest.raises(LimitError, match="a multiple of 8 for AprilTags, got 60"):
+            board.picture(pixels=60)
     assert board.find(np.full((200, 300, 3), 200, np.uint8)) is None
     assert board.find(np.ascontiguousarray(printed[:, ::-1])) is None, "a mirrored board is none"
 
@@ -192,6 +220,45 @@ def test_a_board_is_printed_in_its_true_size(tmp_path: Path) -> None:
     with pytest.raises(LimitError, match="at most 250 markers"):
         Board(30, 30)
     assert str(BOARD) == "charuco board, 7 by 5 squares of 30 mm, markers of 22.2 mm"
+
+
+def photographed(board: Board, seen: ha.Pose, rng: np.random.Generator) -> np.ndarray:
+    """A picture of 640 by 480 of a board at a pose in the camera, with blur and noise, shape (480, 640)."""
+    cv: Any = pytest.importorskip("cv2")
+    side, finer = 64, 3
+    printed = np.pad(board.picture(pixels=side), side, constant_values=255)
+    step = board.square / side
+    on_board = np.array([[step, 0, (0.5 - side) * step], [0, step, (0.5 - side) * step], [0, 0, 1]])
+    to_fine = np.array([[finer, 0, (finer - 1) / 2], [0, finer, (finer - 1) / 2], [0, 0, 1]])
+    plane = MATRIX @ np.column_stack([seen.rotation[:, :2], seen.xyz]) @ on_board
+    fine = cv.warpPerspective(printed, to_fine @ plane, (640 * finer, 480 * finer), borderValue=160)
+    drawn = cv.GaussianBlur(
+        cv.resize(fine, (640, 480), interpolation=cv.INTER_AREA).astype(float), (0, 0), 0.8
+    )
+    noisy = 30 + 0.75 * drawn + rng.normal(0, 3, drawn.shape)
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+
+def seen_tags(seed: int) -> list[HandEyeView]:
+    """Views of a grid of AprilTags, found in pictures with blur and noise."""
+    board, rng, found = Board(4, 3, 0.05, kind="apriltag"), np.random.default_rng(seed), []
+    for _ in range(12):
+        tilt = turned(*rng.uniform(-0.45, 0.45, 2), rng.uniform(-1, 1))
+        seen = ha.Pose.of((0, 0, rng.uniform(0.28, 0.4)), tilt.quat) @ ha.Pose.at(*-board.centre)
+        sighting = board.find(photographed(board, seen, rng))
+        if sighting is not None:
+            found.append(HandEyeView(PLACE @ seen.inverse() @ CAMERA.inverse(), sighting))
+    return found
+
+
+def test_tags_in_pictures_with_blur_and_noise_give_the_camera_and_an_honest_sigma() -> None:
+    runs, inside = longer(1, 20), 0
+    for seed in range(runs):
+        found = estimate_hand_eye(seen_tags(seed), matrix=MATRIX)
+        off, sigma = errors(found, CAMERA), np.concatenate([found.sigma, found.sigma_angle])
+        assert np.linalg.norm(off[:3]) < 0.15e-3 and np.linalg.norm(off[3:]) < math.radians(0.03)
+        inside += int((np.abs(off) < 2.0 * sigma).sum())
+    assert inside >= 0.85 * 6 * runs
 
 
 # -------------------------------------------------------------------------------------- with pictures, and an arm

@@ -112,7 +112,7 @@ def scene(folder: Path) -> Path:
 def over(surface: KnownSurface) -> Array:
     """Joint positions in which the tip is thought to be 6 mm over a surface."""
     x, y, z = surface.place
-    above = ha.Pose.xyz_abc(x, y, z + surface.radius + RADIUS + 0.006, c=np.pi)
+    above = ha.Pose.xyz_abc(x, y, z + surface.radius + RADIUS + 0.006, a=np.pi, c=np.pi)
     return model.solve(robot("iiwa14"), above @ GUESS.inverse(), near=ha.deg(0, 30, 0, -90, 0, 60, 0))
 
 

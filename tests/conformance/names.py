@@ -140,7 +140,10 @@ def a_program_for_lbr_stack(probe: NamesProbe) -> None:
     states = probe.listen("lbr/joint_states", "sensor_msgs/JointState")
     full = probe.listen("lbr/state", "lbr_fri_idl/LBRState")
     wrenches = probe.listen("lbr/force_torque_broadcaster/wrench", "geometry_msgs/WrenchStamped")
-    until(lambda: states and full and wrenches, "no states come")
+    controller = probe.listen(
+        "lbr/joint_trajectory_controller/controller_state", "control_msgs/JointTrajectoryControllerState"
+    )
+    until(lambda: states and full and wrenches and controller, "no states come")
     assert list(states[-1].name) == [f"lbr_A{i}" for i in range(1, 8)]
     assert wrenches[-1].header.frame_id == "lbr_link_0"
     until(lambda: full[-1].operation_mode == 2 and full[-1].safety_state == 0, "not in automatic mode")
@@ -169,3 +172,25 @@ def a_program_for_lbr_stack(probe: NamesProbe) -> None:
         lambda: push("lbr/forward_position_controller/commands", "std_msgs/Float64MultiArray", "data", goal),
         "the forward controller is not followed",
     )
+
+
+def a_tool_for_controllers(probe: NamesProbe) -> None:
+    """What the graphical tool for trajectories asks of a controller manager, and that nothing can be unloaded."""
+
+    def ask(name: str, kind: str, **request: Any) -> Any:
+        return probe.call(f"lbr/controller_manager/{name}", f"controller_manager_msgs/{kind}", **request)
+
+    found = {one.name: one for one in ask("list_controllers", "ListControllers").controller}
+    trajectories = found["joint_trajectory_controller"]
+    assert "JointTrajectoryController" in trajectories.type and trajectories.state == "active"
+    joints = [f"lbr_A{i}" for i in range(1, 8)]
+    assert list(trajectories.claimed_interfaces) == [f"{joint}/position" for joint in joints]
+    types = ask("list_controller_types", "ListControllerTypes")
+    assert trajectories.type in types.types and len(types.types) == len(types.base_classes)
+    for name, kind in (
+        ("load_controller", "LoadController"),
+        ("unload_controller", "UnloadController"),
+        ("switch_controller", "SwitchController"),
+        ("reload_controller_libraries", "ReloadControllerLibraries"),
+    ):
+        assert not ask(name, kind).ok

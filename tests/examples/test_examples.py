@@ -30,7 +30,7 @@ IN_LONG_RUN = tuple(
     for one in (
         *("12_straight_servo", "13_hand_guiding", "14_collision_guard", "15_pick_and_place", "16_insertion"),
         *("17_polishing", "18_teleoperation", "20_two_arms", "21_laws", "24_tool_shapes", "25_around_things"),
-        "26_calibrate",
+        *("26_calibrate", "27_learned_insertion"),
     )
 )
 RUNNER = """

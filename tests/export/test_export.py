@@ -20,6 +20,7 @@ from heptarm.model.kinematics import forward
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.world import compiled
 from heptarm.values.robot import robot
+from tests.calibration.hidden_arm import HIDDEN
 
 TOOL = ha.Tool(
     "gripper",
@@ -205,6 +206,27 @@ def test_a_scene_with_a_gripper(model: str, tmp_path: Path) -> None:
     own = compiled(model, scene=Scene.of("table"))
     assert again.nq == own.nq and again.body_mass.sum() == pytest.approx(own.body_mass.sum(), abs=1e-8)
     assert (tmp_path / f"{model}-meshes").is_dir()
+
+
+def test_friction_and_rotors_that_were_identified(tmp_path: Path) -> None:
+    """What the file of a fitted arm knows is in the joints; another robot's is refused."""
+    for suffix in ("xml", "urdf", "sdf"):
+        ha.export_model(tmp_path / f"arm.{suffix}", robot=MODEL, fitted=HIDDEN)
+    found = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    dofs = [int(found.joint(f"A{axis + 1}").dofadr[0]) for axis in range(7)]
+    assert found.dof_frictionloss[dofs] == pytest.approx(HIDDEN["coulomb"].value, abs=NEAR)
+    assert found.dof_damping[dofs] == pytest.approx(HIDDEN["viscous"].value, abs=NEAR)
+    assert found.dof_armature[dofs] == pytest.approx(HIDDEN["rotor"].value, abs=NEAR)
+    for joint in ET.parse(tmp_path / "arm.urdf").findall("joint[dynamics]"):
+        axis, dynamics = int(str(joint.get("name"))[1:]) - 1, joint.find("dynamics")
+        assert dynamics is not None
+        assert float(dynamics.get("friction", "nan")) == pytest.approx(
+            HIDDEN["coulomb"].value[axis], abs=NEAR
+        )
+    frictions = [float(one.text or "nan") for one in ET.parse(tmp_path / "arm.sdf").iter("friction")]
+    assert frictions == pytest.approx(HIDDEN["coulomb"].value.tolist(), abs=NEAR)
+    with pytest.raises(ha.CommandRejected, match="fitted must be an arm of the iiwa7, got one of the iiwa14"):
+        ha.export_model(tmp_path / "other.urdf", robot="iiwa7", fitted=HIDDEN)
 
 
 def test_what_cannot_be_exported(tmp_path: Path) -> None:

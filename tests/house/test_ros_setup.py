@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+
+from scripts.ros1_interfaces import fallback
 
 ROOT = Path(__file__).parents[2]
 PIP = "#!/bin/sh\ncase $* in *pip*) echo '{said}'; exit {code} ;; *) exit 0 ;; esac\n"
@@ -86,3 +89,25 @@ def test_a_set_up_that_fails_fails(copy: Path, said: str) -> None:
     done = make(copy)
     assert done.returncode != 0
     assert "setting up ROS 2 failed" in done.stderr and said in done.stderr
+
+
+def test_interfaces_of_ours_never_hide_those_of_the_distribution(tmp_path: Path) -> None:
+    """Debian's tf needs more of tf2_msgs than heptarm's part of it."""
+    for folder, packages in (("ours", ("tf2_msgs", "control_msgs")), ("debian", ("tf2_msgs",))):
+        for package in packages:
+            (tmp_path / folder / package).mkdir(parents=True)
+            (tmp_path / folder / package / "__init__.py").touch()
+            (tmp_path / folder / package / "msg.py").write_text(f"whose = {folder!r}")
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "heptarm_interfaces.pth").write_text(fallback(tmp_path / "ours"))
+    program = f"import site; site.addsitedir({str(tmp_path / 'site')!r})\n"
+    program += "import control_msgs.msg, tf2_msgs.msg; print(control_msgs.msg.whose, tf2_msgs.msg.whose)"
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", program],
+        check=True,
+        env={"PYTHONPATH": str(tmp_path / "debian")},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout == "ours debian\n"

@@ -256,6 +256,23 @@ def test_round_postures_and_back(robot: RobotModel) -> None:
 
 
 @each_robot
+@pytest.mark.parametrize("near", [None, deg(0, 30, 0, -90, 0, 60, 0)], ids=["alone", "from elsewhere"])
+def test_a_straight_arm_with_a6_at_0_is_found_by_its_e1_and_status(
+    robot: RobotModel, near: np.ndarray | None
+) -> None:
+    """Noise of 1e-16 in the pose is 1e-8 rad in A4 to A6 there, whose signs are Status: many were refused."""
+    rng = np.random.default_rng(5)
+    q = np.radians(15 * rng.integers(-7, 8, (longer(300, 10_000), 7)))
+    q[:, [3, 5]] = 0.0
+    q[q[:, 1] == 0.0, 1] = 0.5
+    own, poses = model.redundancy_batch(robot, q), model.forward_batch(robot, q)
+    found = model.solve_batch(robot, poses, e1=own.e1, status=own.status, near=near)
+    assert np.isfinite(found).all()
+    assert np.abs(model.forward_batch(robot, found) - poses).max() < 1e-7
+    assert np.abs(found[:, 2] - q[:, 2]).max() < 1e-6
+
+
+@each_robot
 def test_kukas_sample_moves_in_the_null_space(robot: RobotModel) -> None:
     """Sunrise's sample application: from 0,20,0,-110,0,-40,90 to the same frame with E1 at -80 degrees and back."""
     start = deg(0, 20, 0, -110, 0, -40, 90)

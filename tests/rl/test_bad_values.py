@@ -7,14 +7,28 @@ import pytest
 pytest.importorskip("gymnasium")
 
 from heptarm.rl.deploy import DeploySettings, circle
+from heptarm.rl.deploy_peg import InsertionSettings
 from heptarm.rl.env import ReachEnv
+from heptarm.rl.peg import PegInHole
+from heptarm.rl.peg_env import PegInHoleEnv
 from heptarm.rl.pilot import PolicyGuard
 from heptarm.rl.policy import shipped
 from heptarm.rl.sim.randomisation import Randomisation
 from heptarm.rl.task import ReachTask
 from tests.bad_values import Call, call_of, wrong
 
-MADE = (ReachTask, PolicyGuard, DeploySettings, Randomisation, ReachEnv, circle, shipped)
+MADE = (
+    ReachTask,
+    PegInHole,
+    PolicyGuard,
+    DeploySettings,
+    InsertionSettings,
+    Randomisation,
+    ReachEnv,
+    PegInHoleEnv,
+    circle,
+    shipped,
+)
 
 
 CALLS = [call_of(made.__name__, made) for made in MADE]

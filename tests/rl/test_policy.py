@@ -7,6 +7,7 @@ import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,7 @@ from heptarm.rl.task import ReachTask
 Layers = list[tuple[npt.ArrayLike, npt.ArrayLike]]
 
 
-def policy(task: ReachTask | None = None) -> Policy:
+def policy(task: ReachTask | None = None) -> Policy[Any]:
     task = task or ReachTask(feature="kinematic")
     random = np.random.default_rng(0)
     widths = (task.observation_size, 32, 16, task.action_size)

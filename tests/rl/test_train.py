@@ -41,7 +41,7 @@ def curve(trained: Trained) -> list[tuple[float | None, ...]]:
     return [tuple(None if v != v else v for v in row.values()) for row in rows]
 
 
-def same(one: Policy, other: Policy) -> bool:
+def same(one: Policy[Any], other: Policy[Any]) -> bool:
     pairs = zip(one.layers, other.layers, strict=True)
     return all((a == b).all() for layer in pairs for a, b in zip(*layer, strict=True)) and bool(
         (one.mean == other.mean).all() and (one.std == other.std).all()
@@ -269,11 +269,24 @@ def test_two_workers_learn_one_policy_and_go_on_after_an_interruption(tmp_path: 
 # ---------------------------------------------------------------------------------- that it learns
 
 
+#: The usual ones are for a longer training.
+QUICK = ppo.PpoSettings(action_cost=0.0, spread_end=-1.0)
+
+
 @pytest.mark.slow
+def test_a_few_seconds_of_training_halve_the_distance_to_the_target() -> None:
+    task, distances = ReachTask(feature="kinematic"), []
+    for steps in (8_192, 122_880):
+        trained = train(Recipe(task, steps=steps, seed=1, randomisation=MILD, settings=QUICK), threads=1)
+        distances.append(evaluate(trained.policy, 60).mean)
+    assert distances[1] < 0.5 * distances[0]
+
+
+@pytest.mark.slow
+@pytest.mark.long
 def test_it_learns_in_half_a_minute() -> None:
     task = ReachTask(feature="kinematic")
-    settings = ppo.PpoSettings(action_cost=0.0, spread_end=-1.0)  # the usual ones are for a longer training
-    trained = train(Recipe(task, steps=350_000, seed=1, randomisation=MILD, settings=settings))
+    trained = train(Recipe(task, steps=350_000, seed=1, randomisation=MILD, settings=QUICK))
     report = evaluate(trained.policy, 200)
     assert report.mean < 0.03
     assert report.success_rate > 0.9

@@ -32,11 +32,12 @@ def test_a_program_for_libiiwa(other: Client) -> None:
 @pytest.mark.parametrize("other", ["lbr_stack"], indirect=True)
 def test_a_program_for_lbr_stack(other: Client) -> None:
     names.a_program_for_lbr_stack(other)
+    names.a_tool_for_controllers(other)
 
 
 def test_types_have_the_fields_of_the_other_drivers() -> None:
     """Every type of a preset is generated, and has a hash by which two machines compare it."""
-    for package in ("libiiwa_msgs", "lbr_fri_idl"):
+    for package in ("libiiwa_msgs", "lbr_fri_idl", "controller_manager_msgs"):
         described = sorted((Path(sys.prefix) / "share" / package).rglob("*.json"))
         assert described
         for path in described:

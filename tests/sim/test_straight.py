@@ -13,6 +13,7 @@ import pytest
 from heptarm.model.kinematics import forward
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.controller.line_speed import AxisLimits
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
@@ -337,6 +338,12 @@ def test_whatever_targets_come_no_axis_leaves_its_limits(degrees: tuple[float, .
 
     q = followed(plant, target, 1500)
     assert np.ptp(q, axis=0).max() > 0.3 and ear.causes == ["started"]
+
+
+def test_axes_that_moved_and_rest_in_the_next_step_end_nothing() -> None:
+    """At the end of a profile, next to a singularity: the plant's tick ended with ValueError."""
+    robot = Plant("iiwa14", q=tuple(np.radians(HOME).tolist())).robot
+    assert AxisLimits(robot).fraction(np.array([-2.4e-5, 0, 0, 0, 5e-6, 1.4e-5, -1.8e-5]), np.zeros(7)) == 1.0
 
 
 @pytest.mark.parametrize("tick", [60, 250, 420, 560])

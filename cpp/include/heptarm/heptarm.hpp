@@ -4319,6 +4319,9 @@ public:
     }
     Motion start(const wire::Item& item) { return start(std::vector<wire::Item>{item}); }
 
+    /// The motion of a request that `submit` has sent, such as FriOpen.
+    Motion motion(std::uint32_t id) const { return Motion(link_, id); }
+
     /// Starts a servo motion at the current position.
     Servo servo(const ServoOptions& options = {}) { return Servo(link_, options); }
 

@@ -60,7 +60,9 @@ class HeptarmNode(LifecycleNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)  # a simulated clock may stand still, or jump
         for one in sorted(parameters.PARAMETERS, key=lambda one: one.name != "names"):
             self._declare(one)  # `names` first: it selects the defaults of the others
-        for one in parameters.joint_parameters(self.get_parameter("joint_names").value or []):
+        joints = self.get_parameter("joint_names").value or []
+        parameters.check_joint_names(joints)
+        for one in parameters.joint_parameters(joints):
             self._declare(one)
         self.configuration = NodeConfiguration.of(self._values())  # what it refuses no retry mends
         self._warn_of_unknown()

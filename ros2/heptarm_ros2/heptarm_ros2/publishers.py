@@ -14,6 +14,7 @@ from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 
 from heptarm.ros.interface.messages import RosAdapter
+from heptarm.ros.interface.names import PRESETS
 from heptarm.ros.interface.state_messages import StateMessages, TransformMessages
 from heptarm.ros.node.diagnostics import Diagnosis
 from heptarm.ros.node.driver import Driver
@@ -40,9 +41,13 @@ class StatePublisher:
         }
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._status = node.create_publisher(Status, "~/status", latched)
-        self._controller = node.create_publisher(
-            JointTrajectoryControllerState, "~/controller_state", 10, **mine
-        )
+        self._controllers = [
+            node.create_publisher(JointTrajectoryControllerState, "~/controller_state", 10, **mine)
+        ]
+        self._controllers += [
+            node.create_publisher(JointTrajectoryControllerState, name, 10, **mine)
+            for name in PRESETS[configuration.values["names"]].controller_states()
+        ]
         self._scaling = node.create_publisher(Float64, "~/speed_scaling", latched)
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
 
@@ -59,10 +64,11 @@ class StatePublisher:
 
     def controller_state(self, state: State, driver: Driver) -> None:
         """Publish where the trajectory is at the time of the state that was published last, and what the arm does."""
-        if self._controller.get_subscription_count() > 0:
-            sample = driver.at(1e-9 * state.sampled)
-            kind = JointTrajectoryControllerState
-            self._controller.publish(self._messages.controller_state(kind, state, sample))
+        for publisher in self._controllers:
+            if publisher.get_subscription_count() > 0:
+                sample = driver.at(1e-9 * state.sampled)
+                kind = JointTrajectoryControllerState
+                publisher.publish(self._messages.controller_state(kind, state, sample))
 
     def status(self, diagnosis: Diagnosis, state: State | None, *, connected: bool, active: bool) -> None:
         """Publish the status if it has changed."""
@@ -82,7 +88,7 @@ class StatePublisher:
         for publisher in (
             *self._states.values(),
             self._status,
-            self._controller,
+            *self._controllers,
             self._scaling,
             self._diagnostics,
         ):

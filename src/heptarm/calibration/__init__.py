@@ -7,6 +7,7 @@ target or the file of a fitted arm by `save`.
 
 from heptarm.calibration.arm_fit import ArmFit, Validation, simulator, validate
 from heptarm.calibration.arm_samples import ArmSamples
+from heptarm.calibration.base_parameters import BaseParameters, base_parameters
 from heptarm.calibration.board import Board, Sighting
 from heptarm.calibration.excitation import ExcitationPlan, excitation, record_excitation
 from heptarm.calibration.hand_eye_estimate import (
@@ -26,6 +27,7 @@ from heptarm.values.fitted_arm import FittedArm, FittedNumbers, load_fitted
 __all__ = [
     "ArmFit",
     "ArmSamples",
+    "BaseParameters",
     "Board",
     "ExcitationPlan",
     "FittedArm",
@@ -42,6 +44,7 @@ __all__ = [
     "TcpEstimate",
     "TouchPlan",
     "Validation",
+    "base_parameters",
     "estimate_hand_eye",
     "estimate_load",
     "estimate_touched_tcp",

@@ -142,11 +142,11 @@ def simulator(
             touches the arm all the time, or its robot is unknown.
         ShapeError: a wrong shape.
     """
-    samples, named = _samples(run, "run")
-    model = _model(robot, named)
+    samples, named = samples_of(run, "run")
+    model = model_of(robot, named)
     fall = array(acceleration, 3, "acceleration")
     found = estimate_arm(samples, model, acceleration=fall)
-    other = samples if validation is None else _samples(validation, "validation")[0]
+    other = samples if validation is None else samples_of(validation, "validation")[0]
     tried = validate(found.arm, other, declared=declared, acceleration=fall)
     contradictions = (*found.arm.contradictions, *tried.contradictions)
     if commissioning is not None:
@@ -169,7 +169,7 @@ def validate(
         CommandRejected: the recording cannot be used.
     """
     model = instance(arm, FittedArm, "arm").model
-    samples, _ = _samples(run, "run")
+    samples, _ = samples_of(run, "run")
     delay, fall = float(arm.value("state_delay", 0.0)[0]), array(acceleration, 3, "acceleration")
     windows = aligned_windows(samples, model, delay=delay, acceleration=fall).thinned(_MOST)
     used = None if declared is None else instance(declared, Body, "declared")
@@ -199,7 +199,7 @@ def _rms(values: Array) -> Array:
     return frozen(np.sqrt((values**2).mean(axis=0)))
 
 
-def _samples(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
+def samples_of(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
     """Samples of a recording, and the name of its robot; empty: unknown."""
     if isinstance(run, ArmSamples):
         return run, ""
@@ -207,7 +207,12 @@ def _samples(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
     return ArmSamples.of(instance(recording, RecordedData, name)), recording.facts.get("robot", "")
 
 
-def _model(given: RobotModel | str | None, named: str) -> RobotModel:
+def model_of(given: RobotModel | str | None, named: str) -> RobotModel:
+    """The robot that is given, or that a recording names.
+
+    Raises:
+        CommandRejected: none is known.
+    """
     if given is not None:
         return robot(given) if isinstance(given, str) else instance(given, RobotModel, "robot")
     found = known_robot(named) if named else None

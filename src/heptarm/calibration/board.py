@@ -25,6 +25,10 @@ KINDS = {"charuco": "DICT_5X5_250", "apriltag": "DICT_APRILTAG_36h11"}
 _MOST, _MARKERS = 30, 250
 #: Side of a ChArUco board's markers, and of an AprilTag, as a fraction of the side of a square.
 _FRACTION = {"charuco": 0.74, "apriltag": 0.75}
+#: Where the middle of the first pixel is for the refinement of AprilTags: their corners are counted from its corner.
+_TAG_ORIGIN = 0.5
+#: A square of so many pixels, or of a multiple, has its tag in the middle, and the tag whole modules.
+_TAG_PIXELS = 8
 #: Fewest corners that are a sighting.
 FEWEST_CORNERS = 4
 #: Thickness of the plate in a scene, and height of the print above it [m].
@@ -154,17 +158,25 @@ class Board:
             if self.kind == "apriltag" or (row + column) % 2
         ]
 
-    def picture(self, *, pixels: int = 100) -> npt.NDArray[np.uint8]:
+    def picture(self, *, pixels: int = 96) -> npt.NDArray[np.uint8]:
         """The board as it is printed, shape (height, width).
 
         Args:
-            pixels: side of a square [pixels].
+            pixels: side of a square [pixels]; with AprilTags a multiple of 8.
 
         Raises:
-            LimitError: outside 20 to 2000.
+            LimitError: outside 20 to 2000, or not such a multiple.
             MissingExtra: OpenCV is not installed.
         """
         cv, side = _opencv(), integer(pixels, "pixels", 20, 2000)
+        if self.kind == "apriltag" and side % _TAG_PIXELS:
+            raise LimitError(
+                f"pixels must be a multiple of {_TAG_PIXELS} for AprilTags, got {side}",
+                code=2,
+                parameter="pixels",
+                value=side,
+                hint=f"for example {_TAG_PIXELS * max(round(side / _TAG_PIXELS), 3)}",
+            )
         found = np.full((self.rows * side, self.columns * side), 255, np.uint8)
         if self.kind == "charuco":
             for row in range(self.rows):
@@ -285,7 +297,7 @@ class Board:
             return np.zeros(0, np.int64), np.zeros((0, 2))
         known = [i for i, tag in enumerate(np.ravel(tags)) if tag < len(self._marked)]
         numbers = np.array([4 * int(np.ravel(tags)[i]) + k for i in known for k in range(4)], np.int64)
-        return numbers, np.array([corners[i] for i in known], float).reshape(-1, 2)
+        return numbers, np.array([corners[i] for i in known], float).reshape(-1, 2) - _TAG_ORIGIN
 
 
 def _opencv() -> Any:

@@ -39,6 +39,8 @@ _LOST, _LOST_ANGLE = 0.01, math.radians(1.0)
 _ROBUST = 1.0
 #: The worst view is suspect if its distances are larger by this factor than the median.
 _SUSPECT = 4.0
+#: Standard deviation of an offset that a detector gives all corners of all views, which turns the camera [pixels].
+_DETECTOR = 0.05
 #: Parameters: camera and board, then focal lengths, centre, and two terms of radial distortion.
 _POSES, _LENS = 12, 6
 _NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
@@ -477,6 +479,8 @@ def _judged(
             hint="take more views, from more directions, with the board larger in the pictures",
         )
     fx, fy, cx, cy, k1, k2 = guess.lens
+    turned = guess.camera.rotation[:, :2] * _DETECTOR / np.array([fy, fx])
+    sigma[3:6] = np.sqrt(np.square(sigma[3:6]) + np.square(turned).sum(axis=1))
     return HandEyeEstimate(
         guess.camera,
         frame,

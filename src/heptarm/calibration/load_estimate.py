@@ -60,14 +60,14 @@ def _parameters_of(body: Body) -> Array:
 
 
 #: Bodies of one point each, whose parameters are a basis: the torques of any load are sums of theirs.
-_POINTS = 0.1 * np.array(
+POINTS = 0.1 * np.array(
     [
         *([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0]),
         *([0, -1, 0], [0, 0, -1], [1, 1, 0], [1, 0, 1], [0, 1, 1]),
     ]
 )
-_BASIS = tuple(Body(1.0, point) for point in _POINTS)
-_TO_PARAMETERS = np.linalg.inv(np.array([_parameters_of(body) for body in _BASIS]))
+_BASIS = tuple(Body(1.0, point) for point in POINTS)
+TO_PARAMETERS = np.linalg.inv(np.array([_parameters_of(body) for body in _BASIS]))
 
 
 def load_regressor(
@@ -100,7 +100,7 @@ def load_regressors(
     """`load_regressor` of many moments, unchecked: arrays of shape (n, 7) to shape (n, 7, 10)."""
     bare = inverse_dynamics_rows(model, q, dq, ddq, acceleration=acceleration)
     each = [inverse_dynamics_rows(model, q, dq, ddq, load=body, acceleration=acceleration) for body in _BASIS]
-    return np.asarray(np.einsum("pb,bnj->njp", _TO_PARAMETERS, np.array(each) - bare))
+    return np.asarray(np.einsum("pb,bnj->njp", TO_PARAMETERS, np.array(each) - bare))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

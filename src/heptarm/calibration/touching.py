@@ -2,7 +2,7 @@
 
 In each contact the tip t in the flange frame is at a known distance from the surface, d(R_i t + p_i) = r, with the
 radius r of the tip: least squares in three unknowns, linear for a plane. A flange that is tilted differently in each
-contact shows the tip along another direction. Under the force of a contact the arm and the tip give way, so the place
+contact shows the tip along another direction. Arm and tip are compliant under the force of a contact, so the place
 of a contact is extrapolated to force zero from the states during the push.
 """
 
@@ -38,8 +38,8 @@ from heptarm.values.text import lines
 FEWEST_TOUCHES, TOUCHES = 5, 8
 #: Defaults: force of a contact [N], speed of the approach [m/s], ceiling of the speed of other motions.
 FORCE, APPROACH, SPEED = 6.0, 0.005, 0.2
-#: By how much the flange is tilted [rad].
-_TILT = math.radians(25.0)
+#: By how much the flange is tilted, and room that is left to the limits of the joints, which an approach needs [rad].
+_TILT, _ROOM = math.radians(25.0), math.radians(5.0)
 #: Distance of the tip from the surface at the start [m], and how much farther it is looked for.
 _NEAREST, _FARTHEST, _BEYOND = 0.002, 0.05, 0.01
 #: Part of the force from which on a state belongs to the push.
@@ -333,6 +333,8 @@ def _reached(arm: ArmVerbs, goal: Pose, before: Array, start: Array, speed: floa
     """Joint positions of a flange that the arm can move to; None: there are none."""
     try:
         q = solve(arm.robot, goal, near=start)
+        if (q < arm.robot.q_min + _ROOM).any() or (q > arm.robot.q_max - _ROOM).any():
+            return None
         preview = arm.plan(ptp(q), start=before, speed=speed, mode=Position(), step=0.05)
     except MissingExtra:
         if arm.workspace is not None or arm.collision_check is not None:
@@ -438,7 +440,7 @@ def at_no_force(
     """Extrapolate the pose of the flange to the beginning of a contact.
 
     A force that begins to grow with the square of the way is between what an elastic arm shows on a hard surface, a
-    linear one, and what a soft surface shows; their difference is how little that is known.
+    linear one, and what a compliant surface shows; their difference is how little that is known.
 
     Args:
         robot: the robot.
@@ -463,4 +465,4 @@ def at_no_force(
         float(np.polyfit(push[begin:] ** (1.0 / power), travel[begin:], 1)[1]) for power in (1, 2, 3)
     )
     contact = place + (square - travel[begin]) * direction
-    return Pose.from_matrix(np.column_stack([turn, contact])), 0.5 * abs(linear - cubic)
+    return Pose.from_matrix(np.column_stack([turn, contact])), abs(linear - cubic)

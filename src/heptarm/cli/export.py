@@ -12,6 +12,7 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.export.files import FORMATS, export_model
 from heptarm.io.targets import saved_target
+from heptarm.values.fitted_arm import load_fitted
 from heptarm.values.tool import Tool
 
 _ENDINGS = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "usd": ".usda"}
@@ -34,6 +35,12 @@ def export(
         Parameter(help="A tool of the saved target, with its load data, shapes and frames. Default: none."),
     ] = "",
     target: Annotated[str, Parameter(help="The saved target that has the tool (heptarm targets).")] = "",
+    fitted: Annotated[
+        Path | None,
+        Parameter(
+            help="File of heptarm calibrate arm: friction and rotors of your arm. Default: those of the simulator."
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
@@ -52,7 +59,8 @@ def export(
             f"out must end in {endings} for {form}, got {path.name!r}", parameter="out", value=str(path)
         )
     mounted = _tool(tool, target) if tool else None
-    written = export_model(path, robot=model, tool=mounted, scene=scene, overwrite=overwrite)
+    arm = None if fitted is None else load_fitted(fitted)
+    written = export_model(path, robot=model, tool=mounted, scene=scene, fitted=arm, overwrite=overwrite)
     if as_json:
         emit({"file": str(written), "bytes": written.stat().st_size})
     else:

@@ -23,17 +23,23 @@ from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, require
 from heptarm.rl import deploy as deployment
 from heptarm.rl.deploy import DeploySettings, circle
-from heptarm.rl.policy import Policy, shipped
+from heptarm.rl.peg import PegInHole
+from heptarm.rl.policy import Policy, shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
+from heptarm.rl.task import ReachTask
 from heptarm.values.files import refuse_existing
+from heptarm.values.fitted_arm import load_fitted
 from heptarm.values.mode.impedance import JointImpedance
 
 if TYPE_CHECKING:
+    from heptarm.rl.tasks import Task
+    from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import Row
 
 Seed = Annotated[int, Parameter(help="Seed of all random numbers.")]
 Randomisation = Annotated[
-    Literal["none", "mild", "strong"], Parameter(help="How much simulated robots differ.")
+    Literal["none", "mild", "strong"],
+    Parameter(help="How much simulated robots differ; of peg-in-hole: latency and bandwidth."),
 ]
 Engine = Annotated[
     Literal["mujoco", "warp", "plant"],
@@ -41,15 +47,17 @@ Engine = Annotated[
         help="Simulation: MuJoCo on the CPU, MuJoCo Warp on a GPU, or the virtual cabinet's own plant."
     ),
 ]
-PolicyFile = Annotated[Path, Parameter(help="File of the policy, .npz.")]
 AnyPolicy = Annotated[
-    Path | None, Parameter(help="File of the policy, .npz. Default: the one that comes with heptarm.")
+    Path | None,
+    Parameter(help="File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."),
 ]
 
 
 def train(
+    task: Annotated[Literal["reach", "peg-in-hole"], Parameter(help="What is learned.")] = "reach",
+    /,
     *,
-    out: PolicyFile = Path("reach.npz"),
+    out: Annotated[Path | None, Parameter(help="File of the policy, .npz. Default: TASK.npz.")] = None,
     robot: Model = "iiwa14",
     action: Annotated[Literal["joint", "cartesian"], Parameter(help="What the policy decides.")] = "joint",
     feature: Annotated[
@@ -58,8 +66,16 @@ def train(
     exact: Annotated[
         bool, Parameter(negative="", help="Exactly the paper's reward: no costs for robustness.")
     ] = False,
-    steps: Annotated[int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature.")] = 0,
+    steps: Annotated[
+        int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 for peg-in-hole.")
+    ] = 0,
     seed: Seed = 0,
+    fitted: Annotated[
+        Path | None,
+        Parameter(
+            help="File of heptarm calibrate arm: delay and load vary about those of your arm. Default: assumed ones."
+        ),
+    ] = None,
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
     engine: Engine = "mujoco",
@@ -68,14 +84,29 @@ def train(
 ) -> int:
     """Train a policy; under torchrun, several workers train one."""
     require("torch", extra="rl")
-    from heptarm.rl.task import ReachTask
-    from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import train as work
 
-    task = ReachTask(robot, action=action, feature="kinematic" if feature else "")
-    recipe = Recipe.exact(task, seed=seed) if exact else Recipe(task, seed=seed)
-    recipe = replace(recipe, steps=steps) if steps else recipe
-    budget = recipe.steps
+    if resume and fitted is not None:
+        raise CommandRejected(
+            "a resumed training keeps its ranges, so fitted has no effect",
+            parameter="fitted",
+            hint="leave it out",
+        )
+    if task == "peg-in-hole" and (action, feature, exact, engine) != ("joint", False, False, "mujoco"):
+        raise CommandRejected(
+            "--action, --feature, --exact and --engine are of the reach task, not of peg-in-hole",
+            parameter="task",
+            value=task,
+            hint="leave them out",
+        )
+    chosen: Task = (
+        PegInHole(robot)
+        if task == "peg-in-hole"
+        else ReachTask(robot, action=action, feature="kinematic" if feature else "")
+    )
+    out = out or Path(f"{task}.npz")
+    recipe = recipe_of(chosen, seed=seed, steps=steps, fitted=fitted, is_exact=exact)
+    budget, left = recipe.steps, "missing" if task == "peg-in-hole" else "away"
 
     def show(row: Row) -> None:
         if as_json:
@@ -87,7 +118,7 @@ def train(
         bar = "#" * round(30 * done)
         print(
             f"\r[{bar:<30}] {row.steps / 1e6:5.2f} M steps  {row.seconds:5.0f} s  "
-            f"{1e3 * row.distance:6.1f} mm at the end of noisy episodes",
+            f"{1e3 * row.distance:6.1f} mm {left} at the end of noisy episodes",
             end="",
             file=sys.stderr,
             flush=True,
@@ -112,6 +143,26 @@ def train(
     else:
         print(f"\n{trained.steps} steps in {trained.seconds:.0f} s; policy {out}, learning curve {curve}")
     return 0
+
+
+def recipe_of(task: Task, *, seed: int, steps: int, fitted: Path | None, is_exact: bool = False) -> Recipe:
+    """The recipe of a training; `fitted`: its arms vary about this one.
+
+    Raises:
+        CommandRejected: the file of the fitted arm cannot be read.
+    """
+    from heptarm.rl.sim.randomisation import Randomisation
+    from heptarm.rl.train.recipe import Recipe
+
+    recipe = (
+        Recipe.exact(task, seed=seed)
+        if is_exact and isinstance(task, ReachTask)
+        else Recipe.of(task, seed=seed)
+    )
+    if fitted is not None:
+        ranges = Randomisation.of_arm(load_fitted(fitted), period=1.0 / task.rate, base=recipe.randomisation)
+        recipe = replace(recipe, randomisation=ranges)
+    return replace(recipe, steps=steps) if steps else recipe
 
 
 def _engine(name: str) -> Any:
@@ -146,9 +197,10 @@ def evaluate(
     from heptarm.rl.sim.randomisation import level
 
     _refuse_reports(out, overwrite=overwrite, film=False)
-    report = work(
-        _load(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
-    )
+    network, known = _load(policy), level(randomisation)
+    if isinstance(network.task, PegInHole):
+        known = known.of_servo()
+    report = work(network, episodes, randomisation=known, seed=seed, engine=_engine(engine))
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
 
 
@@ -180,7 +232,7 @@ def deploy(
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
     _refuse_reports(out, overwrite=overwrite, film=film)
-    network = _load(policy)
+    network = _load_reach(policy)
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
@@ -199,12 +251,27 @@ def deploy(
     return _report(report, out, film=film, overwrite=overwrite, as_json=as_json)
 
 
-def _load(file: Path | None) -> Policy:
-    return shipped() if file is None else Policy.load(file)
+def _load(file: Path | None) -> Policy[Any]:
+    """The policy of a file, or the included one of a task by its name."""
+    if file is None or str(file) == ReachTask.name:
+        return shipped()
+    return shipped_peg() if str(file) == PegInHole.name else Policy.load(file)
+
+
+def _load_reach(file: Path | None) -> Policy[ReachTask]:
+    policy = _load(file)
+    if not isinstance(policy.task, ReachTask):
+        raise CommandRejected(
+            f"the policy must be of the reach task, got one of {policy.task.name}",
+            parameter="policy",
+            value=policy.task.name,
+            hint="a peg must be in the gripper: see examples/27_learned_insertion.py",
+        )
+    return policy
 
 
 def _targets(
-    network: Policy, at: tuple[tuple[float, float, float], ...], random: int, follow: bool, seed: int
+    network: Policy[Any], at: tuple[tuple[float, float, float], ...], random: int, follow: bool, seed: int
 ) -> list[Any]:
     if follow:
         moving: deployment.Target = circle(network.task.centre, 0.12, period=6.0)
@@ -218,7 +285,7 @@ def _targets(
     return list(network.task.targets(np.random.default_rng(seed), random))
 
 
-def _ask(arm: Any, network: Policy, settings: DeploySettings) -> int:
+def _ask(arm: Any, network: Policy[Any], settings: DeploySettings) -> int:
     """Move to targets typed by the user, until an empty line."""
     print("target x y z [m], empty line to end; the box is around", network.task.centre, file=sys.stderr)
     while line := sys.stdin.readline().strip():

@@ -12,6 +12,7 @@ from heptarm.export.usd import usd
 from heptarm.export.xml_formats import mjcf, sdf, urdf
 from heptarm.values.checks import flag, instance, shown
 from heptarm.values.files import path_of, refuse_existing, unwritable
+from heptarm.values.fitted_arm import FittedArm
 from heptarm.values.robot import robot as model_of
 from heptarm.values.tool import Tool
 
@@ -26,6 +27,7 @@ def export_model(
     robot: str = "iiwa14",
     tool: Tool | None = None,
     scene: str = "",
+    fitted: FittedArm | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Write the model of an arm with its flange, its tool and its scene for another program.
@@ -40,6 +42,8 @@ def export_model(
         robot: "iiwa7", "iiwa14", "med7" or "med14", with a media flange "iiwa14+touch".
         tool: on the flange, with its load data, shapes and frames; None: none.
         scene: a ready scene or a file (MJCF); empty: none. Height fields are left out.
+        fitted: a measured arm of this robot, whose friction (viscous and Coulomb) and rotors the joints have, as far as
+            the format knows them: URDF has no rotors, USD neither; None: those of the simulator.
         overwrite: replace files that exist.
 
     Returns:
@@ -54,6 +58,13 @@ def export_model(
     if tool is not None:
         instance(tool, Tool, "tool")
     instance(scene, str, "scene")
+    if fitted is not None and not model.name.startswith(instance(fitted, FittedArm, "fitted").robot):
+        raise CommandRejected(
+            f"fitted must be an arm of the {model.name}, got one of the {fitted.robot}",
+            parameter="fitted",
+            value=fitted.robot,
+            hint="export the robot that was measured",
+        )
     flag(overwrite, "overwrite")
     kind = FORMATS.get(where.suffix.lower())
     if kind is None:
@@ -65,7 +76,7 @@ def export_model(
             allowed=endings,
         )
     refuse_existing(where, overwrite=overwrite)
-    bodies = tree_of(model, tool=tool, scene=scene)
+    bodies = tree_of(model, tool=tool, scene=scene, fitted=fitted)
     name = re.sub(r"\W", "_", model.name, flags=re.ASCII)
     folder = where.with_name(f"{where.stem}-meshes")
     try:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
 from heptarm.values.checks import Array, Value
+from heptarm.values.fitted_arm import FittedArm
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, symmetric
 from heptarm.values.shape import ORIGIN
@@ -68,6 +69,7 @@ class TreeJoint(Value):
         effort: largest torque or force [Nm or N]; inf: none.
         damping: viscous [Nms/rad or Ns/m].
         armature: inertia of the drive about the axis [kg m² or kg].
+        friction: Coulomb friction [Nm or N].
     """
 
     name: str
@@ -80,6 +82,7 @@ class TreeJoint(Value):
     effort: float = inf
     damping: float = 0.0
     armature: float = 0.0
+    friction: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,13 +115,16 @@ class TreeBody(Value):
         return bool(self.parent) and self.mass == 0.0 and not self.shapes and self.joint is None
 
 
-def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBody, ...]:
+def tree_of(
+    robot: RobotModel, *, tool: Tool | None, scene: str, fitted: FittedArm | None = None
+) -> tuple[TreeBody, ...]:
     """The bodies of an arm, a tool and a scene, each behind the one that it is fixed to.
 
     Args:
         robot: the robot, with its media flange.
         tool: on the flange; None: none.
         scene: name of a ready scene, or a file (MJCF); empty: none.
+        fitted: whose friction and rotors the joints of the arm have; None: those of the simulator.
 
     Raises:
         CommandRejected: there is no such scene, or it has what no format but MuJoCo's knows; or a scene and the tool
@@ -143,7 +149,8 @@ def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBo
             hint="leave out the tool, or choose a scene without one",
         )
     bodies = [TreeBody(BASE, "", ORIGIN, shapes=tuple(_shapes(model, 0)))]
-    bodies += (_body(model, index, robot) for index in range(1, model.nbody))
+    found = [_body(model, index, robot) for index in range(1, model.nbody)]
+    bodies += found if fitted is None else _measured(found, fitted)
     site = model.site(FLANGE)
     last = _name(model, int(site.bodyid[0]))
     bodies.append(TreeBody(FLANGE, last, Pose.of(site.pos, np.roll(site.quat, -1))))
@@ -158,6 +165,21 @@ def tree_of(robot: RobotModel, *, tool: Tool | None, scene: str) -> tuple[TreeBo
             hint="rename the tool or its frame",
         )
     return tuple(bodies)
+
+
+def _measured(bodies: Sequence[TreeBody], fitted: FittedArm) -> Iterator[TreeBody]:
+    """Bodies whose arm has the friction and the rotors that were identified, as far as they are known."""
+    known = {"damping": "viscous", "friction": "coulomb", "armature": "rotor"}
+    names = [f"A{axis + 1}" for axis in range(7)]
+    for body in bodies:
+        if body.joint is None or body.joint.name not in names:
+            yield body
+            continue
+        axis = names.index(body.joint.name)
+        values: dict[str, Any] = {
+            one: float(fitted[name].value[axis]) for one, name in known.items() if name in fitted
+        }
+        yield replace(body, joint=replace(body.joint, **values))
 
 
 def poses_in_base(bodies: Sequence[TreeBody]) -> dict[str, Pose]:
@@ -221,6 +243,7 @@ def _joint(model: mujoco.MjModel, index: int, robot: RobotModel) -> TreeJoint:
         high,
         damping=float(model.dof_damping[dof]),
         armature=float(model.dof_armature[dof]),
+        friction=float(model.dof_frictionloss[dof]),
     )
     if index >= len(robot.dq_max):  # the arm's joints come first
         return made

@@ -141,7 +141,7 @@ def _urdf_joint(root: ET.Element, body: TreeBody) -> None:
     limits = {"lower": joint.low, "upper": joint.high} if kind != "continuous" else {}
     limits |= {"velocity": joint.speed, "effort": joint.effort}
     _add(made, "limit", **{key: number(np.clip(value, -_MUCH, _MUCH)) for key, value in limits.items()})
-    _add(made, "dynamics", damping=number(joint.damping))
+    _add(made, "dynamics", damping=number(joint.damping), friction=number(joint.friction))
 
 
 def _urdf_link(root: ET.Element, name: str, kind: str, parent: str, child: str, pose: Pose) -> ET.Element:
@@ -233,7 +233,9 @@ def _sdf_joint(model: ET.Element, body: TreeBody) -> None:
     ):  # fmt: skip
         if isfinite(value):
             _add(limit, key, number(value))
-    _add(_add(axis, "dynamics"), "damping", number(joint.damping))
+    dynamics = _add(axis, "dynamics")
+    _add(dynamics, "damping", number(joint.damping))
+    _add(dynamics, "friction", number(joint.friction))
 
 
 # ----------------------------------------------------------------------------------------------------- MJCF
@@ -291,7 +293,8 @@ def _mjcf_joint(body: ET.Element, joint: TreeJoint | None) -> None:
         limits["actuatorfrcrange"] = f"{number(-joint.effort)} {number(joint.effort)}"
     _add(
         body, "joint", name=joint.name, type=joint.kind, axis=numbers(joint.axis), pos=numbers(joint.anchor),
-        damping=number(joint.damping), armature=number(joint.armature), **limits,
+        damping=number(joint.damping), armature=number(joint.armature), frictionloss=number(joint.friction),
+        **limits,
     )  # fmt: skip
 
 

@@ -209,13 +209,14 @@ class Wizard:
         try:
             self._arm.subscribe(rate=_RATE, groups=self._arm.groups)
             found = work()
-            self._arm.subscribe(rate=before, groups=self._arm.groups)
         except HeptarmError as error:
             self._report(error)
         else:
             self._save = self._saver(found)
             self._put(result=str(found))
         finally:
+            with contextlib.suppress(HeptarmError):  # the connection is lost, which was reported
+                self._arm.subscribe(rate=before, groups=self._arm.groups)
             self._put(is_running=False, asks="")
 
     def _saver(self, found: Any) -> Callable[[str, str], object]:

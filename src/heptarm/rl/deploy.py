@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError, StaleState, StreamError
+from heptarm.errors import CommandRejected, LimitError, StaleState, StreamError
 from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
@@ -25,6 +25,7 @@ from heptarm.values.motion.ptp import ptp
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
     from heptarm.arm.motion.servo import JointServo
+    from heptarm.arm.verbs import ArmVerbs
     from heptarm.values.state import State
 
 #: Target in the base frame, shape (3,) [m], at a time since the start of the episode [s].
@@ -93,11 +94,19 @@ def deploy(
         The report; its facts contain the interventions of the guard and the statistics of the streams.
 
     Raises:
+        CommandRejected: a policy of another task.
         LimitError: a target outside the guard's box, or a robot that is not the task's.
         StaleState: no more states arrived; the arm was stopped.
         StreamError: the servo stream ended early.
     """
     task, settings = policy.task, settings or DeploySettings()
+    if not isinstance(task, ReachTask):
+        raise CommandRejected(
+            f"the policy must be of the task {ReachTask.name}, got one of {task.name}",
+            parameter="policy",
+            value=task.name,
+            hint="heptarm.rl.deploy_peg inserts a peg",
+        )
     if arm.robot.name != task.model.name:
         raise LimitError(
             f"the policy was trained for the {task.model.title}; this is a {arm.robot.title}",
@@ -168,7 +177,7 @@ def _run(arm: Arm, pilot: Pilot, goal: Target, settings: DeploySettings) -> tupl
             if sv.tick() is None:
                 break
             if (tick + 1) % fine == 0:
-                state = _fresh(arm, settings.guard)
+                state = fresh(arm, settings.guard.stale)
                 joints[step + 1] = state.q
         else:
             return _Episode(joints, targets), sv.stats.late_ticks
@@ -182,13 +191,18 @@ def _send(sv: JointServo, waiting: deque[tuple[int, Array]], tick: int) -> None:
     sv.set(waiting[0][1] if waiting[0][0] <= tick else sv.start.q)
 
 
-def _fresh(arm: Arm, guard: PolicyGuard) -> State:
+def fresh(arm: ArmVerbs, limit: float) -> State:
+    """The newest state of an arm.
+
+    Raises:
+        StaleState: it is older than the limit [s].
+    """
     state = arm.state
-    if not state.age <= guard.stale:
+    if not state.age <= limit:
         raise StaleState(
-            f"the newest state is {state.age:.2f} s old; the guard allows {guard.stale:g} s",
+            f"the newest state is {state.age:.2f} s old; the guard allows {limit:g} s",
             value=state.age,
-            allowed=f"[0, {guard.stale:g}] s",
+            allowed=f"[0, {limit:g}] s",
             hint="check the connection and the load of this machine",
         )
     return state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,25 +12,26 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.policy import Policy
 from heptarm.rl.report import EpisodeReport
-from heptarm.rl.sim.batch import BatchReach, Engine
+from heptarm.rl.sim.batch import Engine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
-from heptarm.rl.task import ReachTask
+from heptarm.rl.sim.simulate import simulate
+from heptarm.rl.tasks import Task
 from heptarm.values.checks import Array
 
 #: Keeps held-back targets apart from those of training, whatever the seeds.
 _HELD_BACK = 0x4E1D
 
 
-def held_back(task: ReachTask, count: int, *, seed: int = 0) -> Array:
-    """Targets that training never draws, shape (count, 3) [m]."""
+def held_back(task: Task, count: int, *, seed: int = 0) -> Array:
+    """Targets that training never draws, shape (count, n), as the task draws them."""
     return task.targets(np.random.default_rng([_HELD_BACK, seed]), count)
 
 
 def evaluate(
-    policy: Policy | Callable[[Array], npt.ArrayLike],
+    policy: Policy[Any] | Callable[[Array], npt.ArrayLike],
     targets: int | npt.ArrayLike = 1000,
     *,
-    task: ReachTask | None = None,
+    task: Task | None = None,
     randomisation: Randomisation = NONE,
     seed: int = 0,
     threads: int = 2,
@@ -39,7 +41,7 @@ def evaluate(
 
     Args:
         policy: the policy, or any function of observations, shape (n, observations), to actions.
-        targets: how many held-back ones, or the targets themselves, shape (n, 3) [m].
+        targets: how many held-back ones, or the targets themselves, as the task draws them.
         task: None: the policy's.
         randomisation: of the simulated robots; those of training are `heptarm.rl.sim.randomisation.LEVELS`.
         seed: of targets and starts.
@@ -61,8 +63,8 @@ def evaluate(
         goals = held_back(task, targets, seed=seed)
     else:
         goals = np.atleast_2d(np.asarray(targets, dtype=np.float64))
-    arms = BatchReach(
-        task,
+    arms = simulate(
+        replace(task, steps=task.steps + 1),  # so that no arm begins again before its last state is read
         envs=len(goals),
         randomisation=randomisation,
         seed=np.random.SeedSequence([_HELD_BACK, seed, 1]),
@@ -71,13 +73,13 @@ def evaluate(
         engine=engine,
     )
     observation = arms.reset(goals)
-    distances = np.empty((len(goals), task.steps))
+    distances, forces = np.empty((len(goals), task.steps)), np.empty((len(goals), task.steps))
     paths = np.empty((len(goals), task.steps + 1, 3))
     joints = np.empty((len(goals), task.steps + 1, 7))
-    paths[:, 0], joints[:, 0] = task.tip(arms.q), arms.q
+    paths[:, 0], joints[:, 0] = arms.outcome()[0], arms.q
     for t in range(task.steps):
         step = arms.step(policy(observation))
-        observation, distances[:, t] = step.observation, step.distance
+        observation, distances[:, t], forces[:, t] = step.observation, step.distance, step.force
         paths[:, t + 1], joints[:, t + 1] = step.tip, arms.q
     facts = {"engine": engine.__name__, "randomisation": randomisation.as_dict(), "seed": seed}
-    return EpisodeReport(task, goals, distances, paths, joints=joints, facts=facts)
+    return EpisodeReport(task, goals, distances, paths, joints=joints, forces=forces, facts=facts)

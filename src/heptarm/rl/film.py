@@ -10,6 +10,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError, require
 from heptarm.rl.report import EpisodeReport
+from heptarm.rl.task import ReachTask
 from heptarm.sim.picture import ArmPicture, Viewpoint
 from heptarm.values.checks import flag
 from heptarm.values.files import refuse_existing
@@ -34,7 +35,7 @@ def film(
 
     Raises:
         MissingExtra: matplotlib (with Pillow) is not installed.
-        CommandRejected: another kind of file, or the file exists.
+        CommandRejected: another kind of file or task, or the file exists.
         LimitError: no episodes, or no decisions.
     """
     target = Path(path)
@@ -43,6 +44,12 @@ def film(
     for name, value in (("episodes", episodes), ("every", every)):
         if value < 1:
             raise LimitError(f"{name} must be at least 1, got {value}", code=2, parameter=name)
+    if not isinstance(report.task, ReachTask):
+        raise CommandRejected(
+            f"a film is drawn of the reach task alone, got episodes of {report.task.name}",
+            parameter="report",
+            hint="EpisodeReport.plot draws these",
+        )
     refuse_existing(target, overwrite=flag(overwrite, "overwrite"))
     figures = require("matplotlib.figure", extra="rl")
     return (
@@ -95,7 +102,7 @@ def _draw(axes: Any, arm: ArmPicture, report: EpisodeReport, episode: int, step:
     path, goal = report.paths[episode, : step + 1], report.targets[episode]
     axes.plot(*arm.viewpoint.seen(path)[:, :2].T, color="#1a73e8", linewidth=1.2)
     axes.plot(*arm.viewpoint.seen(goal[None])[:, :2].T, color="#d93025", marker="o", markersize=7)
-    distance = report.task.distance(report.paths[episode, step], goal)
-    axes.set_title(f"{step / report.task.rate:.2f} s, {1e3 * float(distance):.0f} mm", fontsize=10)
+    distance = float(np.linalg.norm(path[-1] - goal))
+    axes.set_title(f"{step / report.task.rate:.2f} s, {1e3 * distance:.0f} mm", fontsize=10)
     axes.set(xlim=(-0.5, 0.5), ylim=(-0.5, 0.5))
     axes.set_axis_off()

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
+from heptarm.rl.peg import PegInHole
 from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import OfTask, task_from_dict
 from heptarm.values.checks import flag
 from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
@@ -24,7 +26,7 @@ _FORMAT = 1
 SHIPPED = Path(__file__).parent / "policies"
 
 
-class Policy:
+class Policy(Generic[OfTask]):
     """Computes the actions of a task.
 
     Args:
@@ -40,7 +42,7 @@ class Policy:
 
     def __init__(
         self,
-        task: ReachTask,
+        task: OfTask,
         *,
         layers: list[tuple[npt.ArrayLike, npt.ArrayLike]],
         mean: npt.ArrayLike,
@@ -74,7 +76,7 @@ class Policy:
         """The action, without noise.
 
         Args:
-            observation: shape (..., n), of `ReachTask.observe`.
+            observation: shape (..., n), of the task.
 
         Returns:
             Shape (..., actions), within +-1.
@@ -118,7 +120,7 @@ class Policy:
         return target
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Policy:
+    def load(cls, path: str | os.PathLike[str]) -> Policy[Any]:
         """Read a file written by `save`.
 
         Raises:
@@ -136,8 +138,9 @@ class Policy:
             layers: list[tuple[npt.ArrayLike, npt.ArrayLike]] = [
                 (entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)
             ]
+            task: Any = task_from_dict(about["task"])
             return cls(
-                ReachTask.from_dict(about["task"]),
+                task,
                 layers=layers,
                 mean=entries["mean"],
                 std=entries["std"],
@@ -148,13 +151,18 @@ class Policy:
             raise unreadable(where, why, what=what, hint=hint) from None
 
 
-def shipped(*, feature: bool = False) -> Policy:
+def shipped(*, feature: bool = False) -> Policy[ReachTask]:
     """The policy that is part of heptarm, for an iiwa 14, trained by `heptarm rl train --seed 0` of an earlier version.
 
     Args:
         feature: the one that also sees the way to the target (`--feature`).
     """
     return Policy.load(SHIPPED / f"reach-iiwa14{'-feature' if flag(feature, 'feature') else ''}.npz")
+
+
+def shipped_peg() -> Policy[PegInHole]:
+    """Likewise for the peg-in-hole task, trained by `heptarm rl train peg-in-hole`."""
+    return Policy.load(SHIPPED / "peg-in-hole-iiwa14.npz")
 
 
 def _weights(values: npt.ArrayLike) -> Weights:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, require
-from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import Task, task_from_dict
 from heptarm.values.checks import Array, flag, frozen
 from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
@@ -23,36 +23,42 @@ class EpisodeReport:
 
     Attributes:
         task: the task.
-        targets: base frame, shape (n, 3) [m].
-        distances: from flange to target after each decision, shape (n, t) [m].
-        paths: of the flange, with where it began, shape (n, t + 1, 3) [m].
+        targets: as the task draws them, shape (n, m): points in the base frame [m], or where holes truly are in the
+            frame of the presumed one [m, rad].
+        distances: from the target after each decision, or depth that is missing, shape (n, t) [m].
+        paths: of the flange, or of the tool's tip, with where it began, shape (n, t + 1, 3) [m].
         joints: measured positions, with where it began, shape (n, t + 1, 7) [rad]; for a film.
+        forces: on the tip, the mean of each decision, shape (n, t) [N]; empty: all 0.
         facts: where and how: engine, randomisation, seed.
     """
 
-    task: ReachTask
+    task: Task
     targets: Array
     distances: Array
     paths: Array
     _: KW_ONLY
     joints: Array
+    forces: Array = field(default_factory=lambda: np.zeros(0))
     facts: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("targets", "distances", "paths", "joints"):
+        if not np.size(self.forces):
+            object.__setattr__(self, "forces", np.zeros(np.shape(self.distances)))
+        for name in ("targets", "distances", "paths", "joints", "forces"):
             object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=np.float64)))
         n, t = self.distances.shape if self.distances.ndim == 2 else (0, 0)
         if (
             not n
             or not t
-            or self.targets.shape != (n, 3)
+            or self.targets.ndim != 2
+            or len(self.targets) != n
             or self.paths.shape != (n, t + 1, 3)
             or self.joints.shape != (n, t + 1, 7)
+            or np.shape(self.forces) != (n, t)
         ):
-            raise ShapeError(
-                f"distances {self.distances.shape}, targets {self.targets.shape}, paths {self.paths.shape} and "
-                f"joints {self.joints.shape} do not belong to the same episodes"
-            )
+            names = ("distances", "targets", "paths", "joints", "forces")
+            shapes = ", ".join(f"{name} {np.shape(getattr(self, name))}" for name in names)
+            raise ShapeError(f"{shapes} do not belong to the same episodes")
 
     @property
     def final(self) -> Array:
@@ -91,6 +97,12 @@ class EpisodeReport:
         """95th percentile of the final distances [m]."""
         return float(np.percentile(self.final, 95))
 
+    @property
+    def peak_force(self) -> Array:
+        """Largest force of each episode, shape (n,) [N]."""
+        result: Array = self.forces.max(axis=1)
+        return result
+
     def reached_within(self, seconds: float) -> float:
         """Fraction of the episodes that reached the radius within a time."""
         return float((self.time_to_reach <= seconds + 1e-9).mean())
@@ -108,6 +120,8 @@ class EpisodeReport:
             "worst": float(self.final.max()),
             "time_to_reach": float(np.median(reached)) if len(reached) else None,
             "time_to_reach_p95": float(np.percentile(reached, 95)) if len(reached) else None,
+            "peak_force": float(self.peak_force.max()),
+            "peak_force_median": float(np.median(self.peak_force)),
             "facts": self.facts,
         }
 
@@ -117,15 +131,18 @@ class EpisodeReport:
         reach = "never"
         if entries["time_to_reach"] is not None:
             reach = f"{entries['time_to_reach']:.2f} s (median), {entries['time_to_reach_p95']:.2f} s (95 %)"
-        return "\n".join(
-            [
-                f"episodes         {entries['episodes']}",
-                f"success          {100 * self.success_rate:.1f} % within {1e3 * self.task.radius:.0f} mm at the end",
-                f"final distance   {1e3 * self.mean:.2f} mm mean, {1e3 * self.median:.2f} mm median, "
-                f"{1e3 * self.p95:.2f} mm (95 %), {1e3 * entries['worst']:.2f} mm worst",
-                f"time to reach    {reach}",
-            ]
-        )
+        rows = [
+            f"episodes         {entries['episodes']}",
+            f"success          {100 * self.success_rate:.1f} % within {1e3 * self.task.radius:.3g} mm at the end",
+            f"final distance   {1e3 * self.mean:.2f} mm mean, {1e3 * self.median:.2f} mm median, "
+            f"{1e3 * self.p95:.2f} mm (95 %), {1e3 * entries['worst']:.2f} mm worst",
+            f"time to reach    {reach}",
+        ]
+        if self.peak_force.any():
+            rows.append(
+                f"peak force       {entries['peak_force_median']:.1f} N median, {entries['peak_force']:.1f} N worst"
+            )
+        return "\n".join(rows)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write to a `.json` file (figures and per-target numbers) or a `.npz` file (everything).
@@ -145,6 +162,7 @@ class EpisodeReport:
                 "target": self.targets.tolist(),
                 "final": self.final.tolist(),
                 "time_to_reach": reached,
+                "peak_force": self.peak_force.tolist(),
             }
             entries = {**self.as_dict(), "task": self.task.as_dict(), "per_target": per_target}
             target.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
@@ -157,6 +175,7 @@ class EpisodeReport:
                 distances=self.distances,
                 paths=self.paths,
                 joints=self.joints,
+                forces=self.forces,
             )
         else:
             raise CommandRejected(f"path must end in .json or .npz, got {target.name!r}", parameter="path")
@@ -174,11 +193,12 @@ class EpisodeReport:
         try:
             about = json.loads(str(file["about"]))
             return cls(
-                ReachTask.from_dict(about["task"]),
+                task_from_dict(about["task"]),
                 file["targets"],
                 file["distances"],
                 file["paths"],
                 joints=file["joints"],
+                forces=file.get("forces", np.zeros(0)),
                 facts=about["facts"],
             )
         except Exception as error:  # of any numbers and texts in place of a report's
@@ -207,7 +227,7 @@ class EpisodeReport:
             axes.set_xlabel(f"{names[0]} [m]")
             axes.set_ylabel(f"{names[1]} [m]")
             axes.set_aspect("equal")
-        side.set_title("paths of the flange, from the side")
+        side.set_title("paths, from the side")
         above.set_title("from above; + targets")
         time = np.arange(1, self.distances.shape[1] + 1) / self.task.rate
         mm = 1e3 * self.distances

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, asdict, dataclass, fields
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,6 +56,9 @@ class ReachTask:
         LimitError: a number outside its range.
     """
 
+    #: Name at the command line.
+    name: ClassVar[str] = "reach"
+
     robot: str = "iiwa14"
     _: KW_ONLY
     action: str = "joint"
@@ -93,6 +96,11 @@ class ReachTask:
     def observation_size(self) -> int:
         """Size of an observation."""
         return 23 if self.feature else 17
+
+    @property
+    def hidden_size(self) -> int:
+        """What the value network sees beyond an observation while a policy is trained: nothing."""
+        return 0
 
     @property
     def action_size(self) -> int:

@@ -11,6 +11,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 
+from heptarm.ros.interface.names import PRESETS
 from heptarm.ros.interface.state_messages import StateMessages, TransformMessages
 from heptarm.ros.node.diagnostics import Diagnosis
 from heptarm.ros.node.driver import Driver
@@ -40,7 +41,11 @@ class StatePublisher:
             "state": publisher(RobotState, "~state"),
         }
         self._status = publisher(Status, "~status", latch=True)
-        self._controller = publisher(JointTrajectoryControllerState, "~controller_state")
+        self._controllers = [publisher(JointTrajectoryControllerState, "~controller_state")]
+        self._controllers += [
+            publisher(JointTrajectoryControllerState, name)
+            for name in PRESETS[configuration.values["names"]].controller_states()
+        ]
         self._scaling = publisher(Float64, "~speed_scaling", latch=True)
         self._diagnostics = publisher(DiagnosticArray, "/diagnostics")
 
@@ -57,10 +62,10 @@ class StatePublisher:
 
     def controller_state(self, state: State, driver: Driver) -> None:
         """Publish where the trajectory is at the time of the state that was published last, and what the arm does."""
-        if self._controller.get_num_connections() > 0:
-            sample = driver.at(1e-9 * state.sampled)
-            kind = JointTrajectoryControllerState
-            self._controller.publish(self._messages.controller_state(kind, state, sample))
+        for one in self._controllers:
+            if one.get_num_connections() > 0:
+                sample = driver.at(1e-9 * state.sampled)
+                one.publish(self._messages.controller_state(JointTrajectoryControllerState, state, sample))
 
     def status(self, diagnosis: Diagnosis, state: State | None, *, connected: bool, active: bool) -> None:
         """Publish the status if it has changed."""
@@ -80,7 +85,7 @@ class StatePublisher:
         for one in (
             *self._states.values(),
             self._status,
-            self._controller,
+            *self._controllers,
             self._scaling,
             self._diagnostics,
         ):

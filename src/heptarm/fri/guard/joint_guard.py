@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
+from heptarm.fri.guard.report import GuardReport
 from heptarm.values.checks import array, finite, instance, scalar, within
 from heptarm.values.robot import RobotModel
 
@@ -143,45 +144,13 @@ class Limited(enum.IntEnum):
 _UNITS = ("", "rad", "rad/s", "rad/s²", "rad/s³", "Nm", "N or Nm")
 
 
-class JointReport:
-    """Counts and extremes of what a joint guard has limited.
+class JointReport(GuardReport):
+    """What a joint guard has limited, by `Limited` and axis, shape [7][7]."""
 
-    Attributes:
-        counts: cycles, by `Limited` and axis, shape [7][7].
-        worst: largest requested magnitude, by `Limited` and axis.
-        allowed: largest magnitude allowed at that time.
-    """
-
-    __slots__ = ("allowed", "counts", "worst")
+    __slots__ = ()
 
     def __init__(self) -> None:
-        self.counts = [[0] * AXES for _ in Limited]
-        self.worst = [[0.0] * AXES for _ in Limited]
-        self.allowed = [[0.0] * AXES for _ in Limited]
+        super().__init__(Limited, AXES)
 
-    def add(self, kind: int, axis: int, asked: float, allowed: float) -> None:
-        """Count an axis that was limited in one cycle."""
-        self.counts[kind][axis] += 1
-        if abs(asked) >= self.worst[kind][axis]:
-            self.worst[kind][axis] = abs(asked)
-            self.allowed[kind][axis] = abs(allowed)
-
-    @property
-    def lines(self) -> list[str]:
-        """One line of text for each quantity and axis that was limited."""
-        found = []
-        for kind in Limited:
-            name, unit = kind.name.lower().replace("_", " "), _UNITS[kind]
-            for axis, count in enumerate(self.counts[kind]):
-                if not count:
-                    continue
-                where = f"wrench[{axis}]" if kind is Limited.WRENCH else f"A{axis + 1}"
-                cycles = f"{count} cycle{'s' * (count != 1)}"
-                if kind is Limited.NOT_FINITE:
-                    found.append(f"{where}: target not finite in {cycles}; the last one was kept")
-                    continue
-                asked, allowed = self.worst[kind][axis], self.allowed[kind][axis]
-                found.append(
-                    f"{where}: {name} limited in {cycles}: {asked:.4g} {unit} requested, {allowed:.4g} allowed"
-                )
-        return found
+    def _named(self, kind: int, part: int) -> tuple[str, str]:
+        return f"wrench[{part}]" if kind == Limited.WRENCH else f"A{part + 1}", _UNITS[kind]

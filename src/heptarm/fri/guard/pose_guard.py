@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from heptarm.fri.guard.joint_guard import positive
+from heptarm.fri.guard.report import GuardReport
 
 #: Parts of a pose that are limited separately, as the report names them.
 PARTS = ("flange", "rotation", "elbow")
@@ -69,43 +70,13 @@ class PoseLimits:
             positive(getattr(self, name), name, _LIMIT_UNITS[name])
 
 
-class PoseReport:
-    """Counts and extremes of what a pose guard has limited.
+class PoseReport(GuardReport):
+    """What a pose guard has limited, by `PoseLimited` and part, shape [4][3]."""
 
-    Attributes:
-        counts: cycles, by `PoseLimited` and part, shape [4][3].
-        worst: largest requested magnitude, by `PoseLimited` and part.
-        allowed: largest magnitude allowed at that time.
-    """
-
-    __slots__ = ("allowed", "counts", "worst")
+    __slots__ = ()
 
     def __init__(self) -> None:
-        self.counts = [[0] * len(PARTS) for _ in PoseLimited]
-        self.worst = [[0.0] * len(PARTS) for _ in PoseLimited]
-        self.allowed = [[0.0] * len(PARTS) for _ in PoseLimited]
+        super().__init__(PoseLimited, len(PARTS))
 
-    def add(self, kind: int, part: int, asked: float, allowed: float) -> None:
-        """Count a part that was limited in one cycle."""
-        self.counts[kind][part] += 1
-        if asked >= self.worst[kind][part]:
-            self.worst[kind][part], self.allowed[kind][part] = asked, allowed
-
-    @property
-    def lines(self) -> list[str]:
-        """One line of text for each quantity and part that was limited."""
-        found = []
-        for kind in PoseLimited:
-            for part, count in enumerate(self.counts[kind]):
-                if not count:
-                    continue
-                where, cycles = PARTS[part], f"{count} cycle{'s' * (count != 1)}"
-                if kind is PoseLimited.NOT_FINITE:
-                    found.append(f"{where}: target not finite in {cycles}; the last one was kept")
-                    continue
-                unit = _UNITS[part][kind]
-                found.append(
-                    f"{where}: {kind.name.lower()} limited in {cycles}: "
-                    f"{self.worst[kind][part]:.4g} {unit} requested, {self.allowed[kind][part]:.4g} allowed"
-                )
-        return found
+    def _named(self, kind: int, part: int) -> tuple[str, str]:
+        return PARTS[part], _UNITS[part][kind]

@@ -2,43 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError, MissingExtra, ShapeError
+from heptarm.errors import MissingExtra
 from heptarm.rl.sim import simulation
+from heptarm.rl.sim.episodes import ALL, Index, TaskBatch
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.values.checks import Array
 
-#: Numbers of arms.
-Index: TypeAlias = npt.NDArray[np.integer[Any]]
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """Result of one decision of all arms.
-
-    Attributes:
-        observation: what each sees now, after a new episode began where one ended, shape (envs, n).
-        reward: shape (envs,).
-        tip: where the flange is after the decision, shape (envs, 3) [m].
-        distance: from there to the target, shape (envs,) [m].
-        done: which episodes ended, all of them by their length, shape (envs,).
-        final: what those saw last, shape (done.sum(), n).
-    """
-
-    observation: Array
-    reward: Array
-    tip: Array
-    distance: Array
-    done: npt.NDArray[np.bool_]
-    final: Array
+#: Of the arrays of an engine in those of a simulation.
+_ENGINE = "engine."
 
 
 class Engine:
@@ -120,23 +97,24 @@ class Engine:
             self._filter[:, :, 0] = entries["filter"]
 
 
-class BatchReach:
-    """The task on many simulated arms; episodes that end restart by themselves.
+class BatchReach(TaskBatch):
+    """The reach task on many simulated arms.
 
     Args:
         task: the task.
         envs: number of arms.
         randomisation: what differs between them.
-        seed: of everything drawn; the same seed gives the same run.
+        seed: of everything drawn.
         threads: of the simulation.
-        starts: "staggered": the first episodes begin somewhere in their time, so that not all end together;
-            "together": all begin at 0.
+        starts: "staggered" or "together", see `TaskBatch`.
         engine: class of the simulation, `Engine` or one with its methods.
 
     Raises:
         LimitError: no arms, or no threads.
         MissingExtra: the installed MuJoCo is too old.
     """
+
+    task: ReachTask
 
     def __init__(
         self,
@@ -149,28 +127,21 @@ class BatchReach:
         starts: str = "staggered",
         engine: Any = Engine,
     ) -> None:
-        for name, value in (("envs", envs), ("threads", threads)):
-            if value < 1:
-                raise LimitError(
-                    f"{name} must be at least 1, got {value}", code=2, parameter=name, value=value
-                )
-        if starts not in ("staggered", "together"):
-            raise CommandRejected(f"starts must be 'staggered' or 'together', got {starts!r}", value=starts)
-        self.task, self.envs, self.randomisation = task, envs, randomisation
-        self._random = np.random.default_rng(seed)
+        super().__init__(
+            task,
+            envs=envs,
+            randomisation=randomisation,
+            seed=seed,
+            threads=threads,
+            starts=starts,
+            sizes=(3, 7),
+        )
         self.engine = engine(task, envs=envs, threads=threads)
-        self._all = np.arange(envs)
         if randomisation.payload[1] > 0:
             self.engine.payload(randomisation.draw_payload(self._random, envs))
         if simulation.is_compliant(randomisation.stiffness):
             self.engine.stiffness(randomisation.draw_stiffness(self._random, envs))
-        self._staggered = starts == "staggered"
-        self.target = np.zeros((envs, 3))
-        self.command = np.zeros((envs, 7))
         self.held = np.zeros((envs, 3, 3)) if task.action == "cartesian" else None
-        self.age = np.zeros(envs, dtype=np.int64)
-        self._latency = np.zeros(envs, dtype=np.int64)
-        self._late = np.zeros((randomisation.latency[1] + 1, envs, 7))  # commands, the newest first
         self._noise = np.ones((envs, 7))
         self.reset()
 
@@ -180,106 +151,44 @@ class BatchReach:
         result: Array = np.asarray(self.engine.q)
         return result
 
-    def reset(self, targets: npt.ArrayLike | None = None, *, seed: int | None = None) -> Array:
-        """Start an episode of every arm.
-
-        Args:
-            targets: shape (envs, 3) [m]; None: drawn.
-            seed: draw from here on by this seed; None: go on drawing.
-
-        Returns:
-            The observations, shape (envs, n).
-
-        Raises:
-            ShapeError: targets of another shape, or not finite.
-        """
-        if seed is not None:
-            self._random = np.random.default_rng(seed)
-        self._begin(self._all)
-        if self._staggered:
-            self.age[:] = self._random.integers(0, self.task.steps, self.envs)
-        if targets is not None:
-            given = np.asarray(targets, dtype=np.float64)
-            if given.shape != (self.envs, 3) or not np.isfinite(given).all():
-                raise ShapeError(
-                    f"targets must have shape {(self.envs, 3)} and be finite, got shape {given.shape}",
-                    parameter="targets",
-                )
-            self.target[:] = given
-        return self.observe()
-
-    def _begin(self, which: Index) -> None:
-        count = len(which)
-        draw, task = self.randomisation, self.task
-        q = task.starts(self._random, count)
-        self.target[which] = task.targets(self._random, count)
-        self.command[which] = q
-        self._late[:, which] = q
-        self.age[which] = 0
-        self._latency[which] = draw.draw_latency(self._random, count)
-        self.engine.bandwidth(which, draw.draw_bandwidth(self._random, count))
-        self.engine.place(which, q)
+    def _place(self, which: Index, starts: Array) -> None:
+        self.engine.bandwidth(which, self.randomisation.draw_bandwidth(self._random, len(which)))
+        self.engine.place(which, starts)
         if self.held is not None:
-            self.held[which] = task.hold(q)
+            self.held[which] = self.task.hold(starts)
 
-    def observe(self) -> Array:
-        """The current observations, shape (envs, n)."""
-        return self.task.observe(self.engine.q, self.engine.dq * self._noise, self.target)
+    def observe(self, which: Index | slice = ALL) -> Array:
+        """The current observations of all arms or some, shape (envs, n)."""
+        engine = self.engine
+        return self.task.observe(engine.q[which], engine.dq[which] * self._noise[which], self.target[which])
 
-    def step(self, action: npt.ArrayLike) -> Step:
-        """One decision of every arm.
+    def _advance(self, action: Array) -> Array:
+        return self.task.advance(self.command, self.engine.q, action, self.held)
 
-        Args:
-            action: shape (envs, actions), clipped to +-1.
-
-        Raises:
-            ShapeError: another shape, or not finite.
-        """
-        task, engine = self.task, self.engine
-        given = np.asarray(action, dtype=np.float64)
-        if given.shape != (self.envs, task.action_size) or not np.isfinite(given).all():
-            raise ShapeError(
-                f"action must have shape {(self.envs, task.action_size)} and be finite, got shape {given.shape}",
-                parameter="action",
-            )
-        self.command = task.advance(self.command, engine.q, given, self.held)
-        if len(self._late) > 1:
-            self._late[1:] = self._late[:-1]
-        self._late[0] = self.command
-        engine.step(self._late[self._latency, self._all])
+    def _simulate(self, command: Array) -> float:
+        self.engine.step(command)
         noise = self.randomisation.velocity_noise
         if noise:
             self._noise = self._random.uniform(1.0 - noise, 1.0 + noise, (self.envs, 7))
-        tip = task.tip(engine.q)
-        distance = task.distance(tip, self.target)
-        self.age += 1
-        observation = self.observe()
-        done = self.age >= task.steps
-        final = observation[done]
-        if done.any():
-            which = np.flatnonzero(done)
-            self._begin(which)
-            observation[done] = task.observe(engine.q[which], engine.dq[which], self.target[which])
-        return Step(observation, task.reward(distance), tip, distance, done, final)
+        return 0.0
 
-    # ------------------------------------------------------------------------------ interrupted training
+    def outcome(self) -> tuple[Array, Array]:
+        """Where the flanges are, shape (envs, 3), and their distances from the targets, shape (envs,) [m]."""
+        tip = self.task.tip(self.engine.q)
+        return tip, self.task.distance(tip, self.target)
+
+    def _reward(self, distance: Array) -> Array:
+        return self.task.reward(distance)
+
+    def _changing(self) -> dict[str, Any]:
+        held = {} if self.held is None else {"held": self.held}
+        return {**super()._changing(), "noise": self._noise, **held}
 
     def save(self) -> dict[str, Any]:
         """The complete state, to resume later: arrays and one text."""
-        arrays = {
-            "target": self.target,
-            "command": self.command,
-            "age": self.age,
-            "latency": self._latency,
-            "late": self._late,
-            "noise": self._noise,
-        }
-        if self.held is not None:
-            arrays["held"] = self.held
         return {
-            **{name: np.array(rows) for name, rows in arrays.items()},
-            **{f"engine.{name}": rows for name, rows in self.engine.save().items()},
-            "random": json.dumps(self._random.bit_generator.state),
+            **super().save(),
+            **{_ENGINE + name: rows for name, rows in self.engine.save().items()},
         }
 
     def load(self, entries: dict[str, Any]) -> None:
@@ -288,16 +197,6 @@ class BatchReach:
         Raises:
             ShapeError: it had another number of arms.
         """
-        if np.shape(entries["target"]) != self.target.shape:
-            raise ShapeError(
-                f"the saved simulation must have {self.envs} arms, got {len(entries['target'])} arms"
-            )
-        self.target[:], self.age[:] = entries["target"], entries["age"]
-        self.command = np.array(entries["command"])
-        self._latency[:], self._late[:] = entries["latency"], entries["late"]
-        self._noise = np.array(entries["noise"])
-        if self.held is not None:
-            self.held[:] = entries["held"]
-        prefix = "engine."
-        self.engine.load({k[len(prefix) :]: v for k, v in entries.items() if k.startswith(prefix)})
-        self._random.bit_generator.state = json.loads(entries["random"])
+        super().load(entries)
+        own = {name.removeprefix(_ENGINE): rows for name, rows in entries.items() if name.startswith(_ENGINE)}
+        self.engine.load(own)

@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.planning.motion import TICK
 from heptarm.planning.seam import JointDynamics, ServoSmart, ServoTiming
-from heptarm.rl.sim.batch import Index
+from heptarm.rl.sim.episodes import Index
 from heptarm.rl.sim.simulation import GRAVITY, IMPEDANCE_DAMPING
 from heptarm.rl.task import ReachTask
 from heptarm.sim.controller.command import MotionCommand

@@ -98,6 +98,10 @@ class Randomisation:
             found = replace(found, payload=(max(mass - 2.0 * sigma, 0.0), mass + 2.0 * sigma))
         return found
 
+    def of_servo(self) -> Randomisation:
+        """Only what concerns the servo: latency and bandwidth."""
+        return Randomisation(latency=self.latency, bandwidth=self.bandwidth)
+
     def draw_latency(self, random: np.random.Generator, count: int) -> npt.NDArray[np.int64]:
         """Decisions, shape (count,)."""
         return random.integers(self.latency[0], self.latency[1] + 1, count)

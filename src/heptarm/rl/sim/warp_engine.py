@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm.errors import require
 from heptarm.rl.sim import simulation
-from heptarm.rl.sim.batch import Index
+from heptarm.rl.sim.episodes import Index
 from heptarm.rl.task import ReachTask
 from heptarm.values.checks import Array
 

@@ -184,14 +184,27 @@ def network(inputs: int, hidden: tuple[int, ...], outputs: int, last: float) -> 
 
 
 class Agent(nn.Module):  # type: ignore[misc]
-    """Scaler, policy network, value network."""
+    """Scaler, policy network, value network.
 
-    def __init__(self, observations: int, actions: int, settings: PpoSettings) -> None:
+    Args:
+        observations: size of an observation.
+        actions: size of an action.
+        settings: the numbers.
+        hidden: how many numbers at the end of what is seen only the value network sees.
+    """
+
+    def __init__(self, observations: int, actions: int, settings: PpoSettings, *, hidden: int = 0) -> None:
         super().__init__()
-        self.scaler = Scaler(observations)
+        self.observations = observations
+        self.scaler = Scaler(observations + hidden)
         self.policy = network(observations, settings.hidden, actions, 0.01)
-        self.value = network(observations, settings.hidden, 1, 1.0)
+        self.value = network(observations + hidden, settings.hidden, 1, 1.0)
         self.spread = nn.Parameter(torch.full((actions,), settings.spread))
+
+    def act(self, seen: Tensor) -> Tensor:
+        """Mean actions for what is seen, scaled."""
+        mean: Tensor = self.policy(seen[..., : self.observations])
+        return mean
 
     def likelihood(self, mean: Tensor, action: Tensor) -> Tensor:
         """Log-likelihood of actions, up to a constant."""
@@ -306,6 +319,45 @@ class Learner:
             "spread": float(agent.spread.detach().exp().mean()),
         }
 
+    def imitate(self, samples: Samples, taught: Tensor, shuffle: torch.Generator) -> dict[str, float]:
+        """One update towards a teacher's actions where the policy itself came to (DAgger, Ross et al. 2011).
+
+        The value learns what the policy earned, so that it is ready when rewards take over.
+
+        Args:
+            samples: what was experienced since the last update.
+            taught: what the teacher would have done there, shape (horizon, envs, actions).
+            shuffle: draws the order of the samples.
+
+        Returns:
+            As of `update`; "loss" is the mean square from the teacher's actions.
+        """
+        s, agent = self.settings, self.agent
+        seen, goal = samples.seen.flatten(0, 1), (samples.advantage + samples.value).flatten()
+        aim = taught.flatten(0, 1)
+        losses = []
+        agent.spread.grad = None
+        self.optimiser.param_groups[0]["lr"] = s.learning_rate
+        for _ in range(s.epochs):
+            for rows in torch.randperm(len(goal), generator=shuffle).split(len(goal) // s.minibatches):
+                x = seen[rows.to(seen.device)]
+                self._value_gradients(x, goal[rows])
+                loss = ((agent.act(x) - aim[rows]) ** 2).mean()
+                _differentiate(loss, list(agent.policy.parameters()))
+                losses.append(float(self._shared(loss.detach())))
+                self._average_gradients()
+                nn.utils.clip_grad_norm_(self._trained, s.max_grad_norm)
+                self.optimiser.step()
+        self.rate = (
+            0.1 * s.learning_rate
+        )  # the optimiser's moments are of smaller gradients than those of rewards
+        return {
+            "kl": 0.0,
+            "loss": sum(losses) / len(losses),
+            "rate": s.learning_rate,
+            "spread": float(agent.spread.detach().exp().mean()),
+        }
+
     @contextmanager
     def _beside(self) -> Iterator[Callable[..., Callable[[], float]]]:
         """What begins a function, in a second thread if there is one; the function returned waits for its result."""
@@ -321,7 +373,7 @@ class Learner:
     ) -> Tensor:
         """Set the gradients of policy and spread; return the divergence."""
         s, agent = self.settings, self.agent
-        now = agent.policy(seen)
+        now = agent.act(seen)
         ratio = torch.exp(agent.likelihood(now, action) - before)
         better = torch.minimum(gain * ratio, gain * ratio.clamp(1.0 - s.clip_range, 1.0 + s.clip_range))
         _differentiate(-better.mean() - s.entropy_coef * agent.spread.sum(), self._acts)

@@ -6,12 +6,16 @@ from dataclasses import KW_ONLY, asdict, dataclass, field
 from typing import Any
 
 from heptarm.errors import LimitError
+from heptarm.rl.peg import PegInHole
 from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import Task, task_from_dict
 from heptarm.rl.train import ppo
 
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
+#: Likewise of the peg-in-hole task.
+_PEG_STEPS = 1_200_000
 #: Names of settings in checkpoints that were made before the settings had the names of the literature.
 _OLDER = {
     "rate": "learning_rate",
@@ -23,6 +27,20 @@ _OLDER = {
     "gradient": "max_grad_norm",
     "entropy": "entropy_coef",
 }
+#: Robots, environment steps with the teacher, and algorithm of the peg-in-hole task. The noise is small from the
+#: beginning: the teacher has shown what to try.
+PEG = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
+PEG_TAUGHT = 100_000
+PEG_SETTINGS = ppo.PpoSettings(
+    envs=256,
+    horizon=16,
+    gamma=0.97,
+    hidden=(128, 128),
+    learning_rate=1e-3,
+    reward_scale=0.3,
+    spread=-1.4,
+    spread_end=-2.0,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,23 +52,33 @@ class Recipe:
     Attributes:
         task: the task.
         steps: environment steps, of all workers; rounded up to whole updates; 0: `STEPS`.
+        taught: of these steps so many, at the beginning, imitate the task's teacher; then rewards take over. Only tasks
+            with a teacher, see `PegInHole.teach`.
         seed: of networks, simulation and shuffling.
         randomisation: what differs between the simulated robots.
         settings: numbers of the algorithm.
     """
 
-    task: ReachTask = field(default_factory=ReachTask)
+    task: Task = field(default_factory=ReachTask)
     _: KW_ONLY
     steps: int = 0
+    taught: int = 0
     seed: int = 0
     randomisation: Randomisation = STRONG
     settings: ppo.PpoSettings = field(default_factory=ppo.PpoSettings)
 
     def __post_init__(self) -> None:
         if self.steps == 0:
-            object.__setattr__(self, "steps", STEPS[self.task.feature])
+            enough = _PEG_STEPS if isinstance(self.task, PegInHole) else STEPS[self.task.feature]
+            object.__setattr__(self, "steps", enough)
         if self.steps < 1:
             raise LimitError(f"steps must be at least 1, got {self.steps}", code=2, parameter="steps")
+        if self.taught and not isinstance(self.task, PegInHole):
+            raise LimitError(
+                f"taught must be 0 for a task without a teacher, got {self.taught}",
+                code=2,
+                parameter="taught",
+            )
         if self.seed < 0:
             raise LimitError(f"seed must be 0 or more, got {self.seed}", code=2, parameter="seed")
 
@@ -60,15 +88,22 @@ class Recipe:
         settings = ppo.PpoSettings(action_cost=0.0)
         return cls(task or ReachTask(), seed=seed, randomisation=MILD, settings=settings)
 
+    @classmethod
+    def of(cls, task: Task, *, seed: int = 0) -> Recipe:
+        """The settings that suit a task."""
+        if isinstance(task, PegInHole):
+            return cls(task, taught=PEG_TAUGHT, seed=seed, randomisation=PEG, settings=PEG_SETTINGS)
+        return cls(task, seed=seed)
+
     def as_dict(self) -> dict[str, Any]:
         """For a file."""
-        return asdict(self)
+        return {**asdict(self), "task": self.task.as_dict()}
 
     @classmethod
     def from_dict(cls, entries: dict[str, Any]) -> Recipe:
         """Of `as_dict`, also of an older version."""
         given = dict(entries)
-        given["task"] = ReachTask.from_dict(given["task"])
+        given["task"] = task_from_dict(given["task"])
         given["randomisation"] = Randomisation(**{k: _tuple(v) for k, v in given["randomisation"].items()})
         given["settings"] = ppo.PpoSettings(
             **{_OLDER.get(k, k): _tuple(v) for k, v in given["settings"].items()}

@@ -13,7 +13,8 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
 from heptarm.rl.policy import Policy
-from heptarm.rl.sim.batch import BatchReach, Engine
+from heptarm.rl.sim.batch import Engine
+from heptarm.rl.sim.simulate import simulate
 from heptarm.values.checks import flag
 from heptarm.values.files import refuse_existing
 
@@ -65,7 +66,7 @@ class Trained:
         done: all steps were taken; False where `progress` ended it.
     """
 
-    policy: Policy
+    policy: Policy[Any]
     history: tuple[Row, ...]
     _: KW_ONLY
     done: bool = True
@@ -124,7 +125,9 @@ class Training:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(recipe.seed)  # the same networks everywhere
             task = recipe.task
-            self.agent = ppo.Agent(task.observation_size, task.action_size, settings).to(team.device)
+            self.agent = ppo.Agent(
+                task.observation_size, task.action_size, settings, hidden=task.hidden_size
+            ).to(team.device)
         team.align(self.agent)
         self.learner = ppo.Learner(
             self.agent,
@@ -132,13 +135,14 @@ class Training:
             team.mean if team.size > 1 else None,
             threads=threads if team.device.type == "cpu" else 1,
         )
-        self.arms = BatchReach(
+        self.arms = simulate(
             task,
             envs=settings.envs,
             randomisation=recipe.randomisation,
             seed=seeds,
             threads=threads,
             engine=engine,
+            reveal=True,
         )
         self.history: list[Row] = []
         self.steps = 0
@@ -152,31 +156,38 @@ class Training:
     def update(self) -> Row:
         """Simulate a horizon and learn from it."""
         begun = time.perf_counter()
-        samples, facts = self._experience()
-        settings = self.recipe.settings
+        recipe, settings = self.recipe, self.recipe.settings
+        is_taught = self.steps < recipe.taught
+        samples, facts, taught = self._experience(is_taught=is_taught)
         self.steps += settings.horizon * settings.envs * self.team.size
-        facts |= self.learner.update(samples, self.random, self.steps / self.recipe.steps)
+        if is_taught:
+            facts |= self.learner.imitate(samples, taught, self.random)
+        else:
+            progress = (self.steps - recipe.taught) / max(1, recipe.steps - recipe.taught)
+            facts |= self.learner.update(samples, self.random, progress)
         self.seconds += time.perf_counter() - begun
         row = Row(steps=self.steps, seconds=self.seconds, **facts)
         self.history.append(row)
         return row
 
-    def _experience(self) -> tuple[ppo.Samples, dict[str, float]]:
+    def _experience(self, *, is_taught: bool) -> tuple[ppo.Samples, dict[str, float], Any]:
         arms, agent, s, device = self.arms, self.agent, self.recipe.settings, self.team.device
         task = self.recipe.task
         shape = (s.horizon, s.envs)
         noise = torch.randn((*shape, task.action_size), generator=self.random).to(device)
-        action, mean = torch.empty_like(noise), torch.empty_like(noise)
-        raw = np.empty((s.horizon + 1, s.envs, task.observation_size), dtype=np.float32)
+        action, mean, taught = torch.empty_like(noise), torch.empty_like(noise), torch.zeros_like(noise)
+        raw = np.empty((s.horizon + 1, s.envs, task.observation_size + task.hidden_size), dtype=np.float32)
         reward, done = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.bool_)
         finals, ended = [], []
         with torch.no_grad():
             noise *= agent.spread.exp()
             raw[0] = arms.observe()
             for t in range(s.horizon):
-                mean[t] = agent.policy(agent.scaler(torch.from_numpy(raw[t]).to(device)))
+                mean[t] = agent.act(agent.scaler(torch.from_numpy(raw[t]).to(device)))
                 torch.add(mean[t], noise[t], out=action[t])
                 decided = action[t].cpu().numpy()
+                if is_taught:
+                    taught[t] = torch.from_numpy(arms.teach())
                 step = arms.step(decided)
                 reward[t], done[t], raw[t + 1] = step.reward, step.done, step.observation
                 if s.action_cost:
@@ -197,7 +208,7 @@ class Training:
             likelihood = agent.likelihood(mean, action)
             self._look(raw[:-1])
         samples = ppo.Samples(seen[:-1], action, mean, likelihood, value, advantage)
-        return samples, self._facts(float(reward.mean()), ended)
+        return samples, self._facts(float(reward.mean()), ended), taught
 
     def _look(self, raw: Any) -> None:
         """Let the scaler see the observations of all workers."""
@@ -222,7 +233,7 @@ class Training:
             "success": close / count if count else missing,
         }
 
-    def policy(self) -> Policy:
+    def policy(self) -> Policy[Any]:
         """The current policy."""
         agent, recipe = self.agent, self.recipe
         layers = [
@@ -238,12 +249,12 @@ class Training:
             "randomisation": recipe.randomisation.as_dict(),
             "settings": recipe.settings.as_dict(),
         }
-        scaler = agent.scaler
+        scaler, seen = agent.scaler, agent.observations
         return Policy(
             recipe.task,
             layers=layers,
-            mean=scaler.mean.cpu().numpy(),
-            std=scaler.std.cpu().numpy(),
+            mean=scaler.mean[:seen].cpu().numpy(),
+            std=scaler.std[:seen].cpu().numpy(),
             facts=facts,
         )
 

@@ -44,6 +44,7 @@ class NameRole(Enum):
     ACTION = auto()
     ARRIVED = auto()
     KEY = auto()
+    CONTROLLER_STATE = auto()
 
 
 _TYPES = {
@@ -63,6 +64,7 @@ _TYPES = {
     NameRole.FORWARD: "std_msgs/Float64MultiArray",
     NameRole.ARRIVED: "std_msgs/Time",
     NameRole.KEY: "std_msgs/String",
+    NameRole.CONTROLLER_STATE: "control_msgs/JointTrajectoryControllerState",
 }
 #: Roles that the node publishes with each state.
 _PUBLISHED = (
@@ -151,6 +153,10 @@ class Preset:
     def events(self) -> tuple[PresetName, ...]:
         """Its topics that the node publishes when something happens, of those whose types are installed."""
         return tuple(entry for entry in self.entries if entry.is_event and entry.is_available)
+
+    def controller_states(self) -> tuple[str, ...]:
+        """Names of its topics of the trajectory controller's state."""
+        return tuple(entry.name for entry in self.entries if entry.role is NameRole.CONTROLLER_STATE)
 
     def missing(self) -> tuple[str, ...]:
         """Packages of types that are not installed."""
@@ -288,6 +294,24 @@ _IIWA_STACK = (
     *_iiwa_stack(NameRole.ACTION, "~/move_spline", "MoveAlongSpline", "action/move_along_spline"),
 )
 
+#: Services by which graphical tools find controllers, and their types.
+_CONTROLLER_MANAGER = tuple(
+    PresetName(
+        f"lbr/controller_manager/{name}",
+        NameRole.SERVICE,
+        "~/capabilities",
+        own_type=f"controller_manager_msgs/{kind}",
+    )
+    for name, kind in (
+        ("list_controllers", "ListControllers"),
+        ("list_controller_types", "ListControllerTypes"),
+        ("load_controller", "LoadController"),
+        ("unload_controller", "UnloadController"),
+        ("switch_controller", "SwitchController"),
+        ("reload_controller_libraries", "ReloadControllerLibraries"),
+    )
+)
+
 #: By the parameter `names`.
 PRESETS: Mapping[str, Preset] = MappingProxyType(
     {
@@ -337,6 +361,12 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
                     NameRole.FOLLOW,
                     "~/follow_joint_trajectory",
                 ),
+                PresetName(
+                    "lbr/joint_trajectory_controller/controller_state",
+                    NameRole.CONTROLLER_STATE,
+                    "~/controller_state",
+                ),
+                *_CONTROLLER_MANAGER,
             ),
         ),
         "iiwa_stack": Preset(

@@ -20,7 +20,7 @@ from heptarm.ros.interface.actions import ACTIONS
 from heptarm.ros.interface.messages import is_installed
 from heptarm.ros.interface.names import PRESETS, NameRole, PresetName
 from heptarm.ros.interface.planning import moveit
-from heptarm.ros.interface.presets import iiwa_stack
+from heptarm.ros.interface.presets import controller_manager, iiwa_stack
 from heptarm.ros.interface.presets.libiiwa import LibiiwaServer
 from heptarm.ros.interface.service import Service
 from heptarm.ros.interface.services import SERVICES
@@ -75,7 +75,9 @@ def offered(values: Mapping[str, Any]) -> OfferedInterface:
 
 
 def _service(libiiwa: LibiiwaServer, entry: PresetName) -> Service:
-    """The row of a service of another driver: of iiwa_stack, or of libiiwa."""
+    """The row of a service of another driver: of iiwa_stack, of lbr_stack's controller manager, or of libiiwa."""
+    if entry.package == controller_manager.PACKAGE:
+        return Service(entry.name, entry.type, controller_manager.SERVICES[entry.last])
     if entry.package == "iiwa_msgs":
         return Service(entry.name, entry.type, iiwa_stack.SERVICES[entry.last])
     return libiiwa.service(entry.last, entry.type)

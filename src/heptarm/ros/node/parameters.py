@@ -279,17 +279,21 @@ PARAMETERS = (
 )
 
 
-def joint_parameters(joints: Sequence[str]) -> Iterator[Parameter]:
-    """Make the parameters of single joints, by their names without prefix.
+def check_joint_names(names: Sequence[str]) -> None:
+    """Check the parameter `joint_names`.
 
     Raises:
         ShapeError: not seven different names.
     """
-    if len(joints) != 7 or len(set(joints)) != 7:
+    if len(names) != 7 or len(set(names)) != 7:
         raise ShapeError(
-            f"joint_names must have seven different names, got {', '.join(joints) or 'none'}",
+            f"joint_names must have seven different names, got {', '.join(names) or 'none'}",
             parameter="joint_names",
         )
+
+
+def joint_parameters(joints: Sequence[str]) -> Iterator[Parameter]:
+    """Make the parameters of single joints, by their names without prefix."""
     for joint in joints:
         yield _live(
             f"constraints.{joint}.trajectory", 0.0, "path tolerance [rad]; 0: not enforced", 0.0, 10.0
@@ -328,6 +332,7 @@ class NodeConfiguration:
         table = {parameter.name: parameter for parameter in PARAMETERS}
         names = table["joint_names"].check(values.get("joint_names", table["joint_names"].default))
         assert isinstance(names, list)
+        check_joint_names(names)
         table.update({parameter.name: parameter for parameter in joint_parameters(names)})
         for name in values:
             if name not in table:

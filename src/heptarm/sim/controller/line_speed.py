@@ -155,6 +155,8 @@ class AxisLimits:
         if (np.abs(step - before) <= most).all():
             return 1.0
         moves = np.abs(step) > _TINY
+        if not moves.any():  # at the end of the profile: no fraction of it is another step
+            return 1.0
         size, sign = np.abs(step[moves]), np.sign(step[moves])
         middle, reach = before[moves] * sign / size, most[moves] / size
         low, high = float((middle - reach).max()), float((middle + reach).min())

@@ -1,0 +1,109 @@
+"""FRI in C++ over the native loop: an application of the shape of KUKA's SDK, and sessions of an arm."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.cli.running import HEPTARM, sim
+from tests.interrupts import ctrl_c_interrupts
+from tests.retry import retry
+
+ROOT = Path(__file__).resolve().parents[2]
+INCLUDES = [f"-I{ROOT / one}" for one in ("cpp/include", "native", "src/heptarm/fri/loop/include")]
+FLAGS = ("-std=c++17", "-O0", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-pthread")
+PATIENCE = 240.0
+#: Messages that a client answers with a command.
+CYCLES = 300
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """The native loop, compiled as cpp/CMakeLists.txt does."""
+    compiler = shutil.which("gcc")
+    if compiler is None or shutil.which("g++") is None:
+        pytest.skip("no gcc and g++ here: FRI in C++ is not tested")
+    listed = (ROOT / "cpp/CMakeLists.txt").read_text(encoding="utf-8")
+    parts = re.findall(r"foreach\(part (.*)\)", listed)[0].split()
+    sources = [ROOT / "native" / f"fri_{part}.c" for part in parts] + [ROOT / "native/kinematics.c"]
+    folder = tmp_path_factory.mktemp("fri")
+    command = [compiler, "-std=c11", "-O1", "-D_GNU_SOURCE", *INCLUDES, "-c", *map(str, sources)]
+    subprocess.run(command, cwd=folder, check=True, timeout=PATIENCE)
+    return [str(one) for one in folder.glob("*.o")]
+
+
+def compiled(source: Path, loop: list[str], folder: Path) -> Path:
+    program = folder / source.stem
+    command = ["g++", *FLAGS, *INCLUDES, "-o", str(program), str(source), *loop, "-lm"]
+    subprocess.run(command, check=True, timeout=800)
+    return program
+
+
+@pytest.mark.parametrize(
+    ("version", "command"),
+    [
+        ("1.15", "position"),
+        *(pytest.param(*one, marks=pytest.mark.long) for one in (("1.11", "torque"), ("2.7", "torque"))),
+    ],
+)
+def test_an_application_of_the_shape_of_the_sdk(
+    loop: list[str], tmp_path: Path, version: str, command: str
+) -> None:
+    program = compiled(ROOT / "examples/fri_cpp/sdk_sine.cpp", loop, tmp_path)
+
+    def drive() -> str:
+        with subprocess.Popen([str(program), "0", str(CYCLES)], stdout=subprocess.PIPE, text=True) as client:
+            try:
+                assert client.stdout is not None
+                port = client.stdout.readline().split()[-1]
+                words = ["sim", "fri", version, "--fri-command", command, "--fri-client", f"127.0.0.1:{port}"]
+                with ctrl_c_interrupts():
+                    controller = subprocess.Popen(
+                        [*HEPTARM, *words, "--fri-port", "0", "--speed", "0.5"],
+                        stdin=subprocess.DEVNULL,
+                        stdout=subprocess.DEVNULL,
+                    )
+                try:
+                    return client.communicate(timeout=PATIENCE)[0]
+                finally:
+                    controller.send_signal(signal.SIGINT)
+                    controller.wait(timeout=PATIENCE)
+            finally:
+                client.kill()
+
+    def late(said: str | Exception) -> str:
+        # a machine that answers too late ends the session: the client has counted fewer cycles
+        return "answers came late" if isinstance(said, str) and f"in {CYCLES} cycles" not in said else ""
+
+    said = retry(drive, late)
+    for before in range(4):
+        assert f"changed from {before} to {before + 1}" in said, said
+    found = re.search(r"moved (\S+) rad in (\d+) cycles, monitored (\d+), waited (\d+)", said)
+    assert found is not None, said
+    moved, cycles, monitored, waited = map(float, found.groups())
+    assert cycles == CYCLES and monitored > 0 and waited > 0
+    assert moved > 0.035 if command == "torque" else abs(moved - 0.04) < 2e-3
+    assert "0 malformed" in said
+
+
+@pytest.mark.long
+def test_sessions_of_an_arm(loop: list[str], tmp_path: Path) -> None:
+    program = compiled(ROOT / "cpp/examples/fri.cpp", loop, tmp_path)
+    with sim() as ready:
+        done = subprocess.run(
+            [str(program), f"127.0.0.1:{ready['port']}", "127.0.0.1"],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+    assert done.returncode == 0, done.stderr
+    assert "A4 is at -1.570" in done.stdout
+    moved = [float(one) for one in re.findall(r"moved (\S+) rad", done.stdout)]
+    assert abs(moved[0] - 0.1) < 1e-3, "the positions are followed"
+    assert 0.04 < moved[1] < 0.07, "10 Nm by 200 Nm/rad"
