@@ -223,7 +223,7 @@ def drawing(screen: Screen) -> str:
     return "\n".join([*out, "</svg>", ""])
 
 
-def _pane(pane: Pane, x: float, y: float, width: float, height: float) -> list[str]:
+def _pane(pane: Pane, x: float, y: int, width: float, height: int) -> list[str]:
     out = [
         f'<rect x="{x:.0f}" y="{y}" width="{width:.0f}" height="{height}" rx="4" fill="#ffffff" stroke="{EDGE}"/>',
         f'<rect x="{x:.0f}" y="{y}" width="{width:.0f}" height="24" rx="4" fill="{BAR}" stroke="{EDGE}"/>',
