@@ -23,7 +23,7 @@ from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark
 from bench.measure.store import Store
 from bench.motion import endpoints, follow, inverse_kinematics, paths  # noqa: F401
-from bench.planning import search  # noqa: F401
+from bench.planning import rivals, search  # noqa: F401
 from bench.protocol import garbage, round_trip  # noqa: F401
 from bench.rl import deploy, training  # noqa: F401
 from bench.ros import nodes  # noqa: F401

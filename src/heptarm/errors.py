@@ -211,8 +211,8 @@ class NoPath(CommandRejected):
     """No path was found around the bodies of a world; nothing moves.
 
     Attributes:
-        reason: "start", "goal", "inverse kinematics", "constraint", "not connected" or "time"; of a pick or a place
-            also "approach": bodies are in the way on the straight lines there.
+        reason: "start", "goal", "inverse kinematics", "constraint", "not connected", "time" or "torque"; of a pick
+            or a place also "approach": bodies are in the way on the straight lines there.
         clearance: the two bodies that are in the way at the start or at the goal; None: not for this reason.
         states: joint positions that the search has reached.
         nearest: distance between what is reached from the start and from the goals [rad]; infinite: nothing was.

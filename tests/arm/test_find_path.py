@@ -9,6 +9,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import model, planning, shapes
+from heptarm.values.condition.signals import path as along
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
 from tests.long import longer
@@ -91,6 +92,19 @@ def test_a_path_is_checked_again_when_the_world_has_changed(arm: ha.Arm, wall: h
     assert wall.first_on(around.curve) is None
     wall.remove("crate")
     arm.move(path)
+
+
+def test_a_path_ends_by_a_condition_and_reacts_as_other_motions(arm: ha.Arm, wall: ha.CollisionModel) -> None:
+    path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    end = along.after(0.2)
+    result = arm.move(path, speed=0.2, until=end, then=ha.Retreat(0.05))
+    assert result.cause is ha.Cause.CONDITION and result.stopped_by == end
+    rest = model.forward(IIWA, arm.state.q_cmd)[:3, 3]
+    assert (
+        0.05 < np.linalg.norm(rest - model.forward(IIWA, LEFT)[:3, 3]) < 0.25
+    )  # back from where it had braked
+    arm.move(ha.ptp(LEFT))
+    assert arm.follow(path, speed=0.2, until=end).result.stopped_by == end
 
 
 def test_a_path_begins_where_the_arm_is(arm: ha.Arm, wall: ha.CollisionModel) -> None:

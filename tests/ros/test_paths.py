@@ -63,7 +63,7 @@ def context(cabinet: RunningCabinet) -> Iterator[NodeContext]:
 def goal(**fields: Any) -> Any:
     """A goal to the other side."""
     there = SimpleNamespace(position=THERE.tolist(), joint_names=[], box=[], cone=0.0, turn=0.0)
-    given: dict[str, Any] = {"goals": [there], "keep": [], "speed": 0.0, "timeout": 60.0}
+    given: dict[str, Any] = {"goals": [there], "keep": [], "speed": 0.0, "tcp_speed": 0.0, "timeout": 60.0}
     given |= {"states": 0, "improve": 0, "seed": 0, "until": "", "then": ""}
     return SimpleNamespace(**given | fields)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from heptarm.planning.geometry import Arc
-from heptarm.planning.lookahead import _Samples
+from heptarm.planning.lookahead import PlanSamples
 from heptarm.planning.planner import plan
 from heptarm.planning.time_scaling import ProfileSequence, TabulatedProfile
 from heptarm.values.robot import robot
@@ -49,7 +49,7 @@ def test_profiles_follow_each_other() -> None:
 
 def test_a_hold_is_sampled_at_both_its_ends() -> None:
     start = np.radians([0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0])
-    samples = _Samples.of(plan(robot("iiwa14"), motions.hold(1.5), start), 0.01)
+    samples = PlanSamples.of(plan(robot("iiwa14"), motions.hold(1.5), start), 0.01)
     assert samples.t.tolist() == [0.0, 1.5]
     assert samples.q.shape == samples.dq.shape == samples.ddq.shape == (2, 7)
     assert (samples.q == start).all() and not samples.dq.any()

@@ -616,6 +616,7 @@ class ArmVerbs(Sealed):
         avoid: PlanningWorld | None = None,
         keep: Keep | None = None,
         speed: float | None = None,
+        tcp_speed: float | None = None,
         timeout: float = TIMEOUT,
         states: int = STATES,
         improve: int = 0,
@@ -626,7 +627,8 @@ class ArmVerbs(Sealed):
         """Find a path around bodies, from where the arm rests, with what is attached to it. Nothing moves.
 
         The path is a motion: `move(path)` lets the cabinet follow it as a joint spline, also in a program with others.
-        It is checked again before it is sent, against `avoid` as it is then. Needs `pip install 'heptarm[sim]'`.
+        It is checked again before it is sent, against `avoid` as it is then, and so slow that the torques of the joints
+        can move the load of the attached tool. Needs `pip install 'heptarm[sim]'`.
 
         It is an aid for programs, no safety function: it knows only the bodies of the model.
 
@@ -637,6 +639,7 @@ class ArmVerbs(Sealed):
                 `arm.collision_check`.
             keep: constraint along the path, such as `Upright("z", within=0.1)`, or several of them; None: none.
             speed: ceiling for which its duration is computed, (0, 1]; the lower one of this and `arm.speed`.
+            tcp_speed: the origin of the tool frame is not to be faster on the path [m/s], up to 10; None: any speed.
             timeout: longest search [s].
             states: most joint positions that the search reaches.
             improve: joint positions that it reaches after that in search of faster paths.
@@ -658,6 +661,7 @@ class ArmVerbs(Sealed):
             avoid=avoid,
             keep=keep,
             speed=terms.speed,
+            tcp_speed=tcp_speed,
             timeout=timeout,
             states=states,
             improve=improve,
@@ -727,6 +731,7 @@ class ArmVerbs(Sealed):
             avoid=world,
             keep=path.keep or None,
             speed=terms.speed,
+            tcp_speed=path.tcp_speed,
             timeout=TIMEOUT,
             states=STATES,
             improve=0,

@@ -134,6 +134,9 @@ def plan_to(
     *,
     seed: Annotated[int, Parameter(help="Of the search: the same seed finds the same path.")] = 0,
     timeout: Annotated[float, Parameter(help="Longest search [s].")] = TIMEOUT,
+    tcp_speed: Annotated[
+        float | None, Parameter(help="Largest speed of the tool frame on the path [m/s].")
+    ] = None,
     improve: Annotated[
         int,
         Parameter(help="Joint positions that the search reaches after a path was found, for faster paths."),
@@ -167,7 +170,14 @@ def plan_to(
     with options.target.connect(control=False) as arm:
         world = CollisionModel(arm.robot.name, scene=options.scene, boxes=options.box)
         path = arm.find_path(
-            to, avoid=world, keep=kept, speed=options.speed, timeout=timeout, improve=improve, seed=seed
+            to,
+            avoid=world,
+            keep=kept,
+            speed=options.speed,
+            tcp_speed=tcp_speed,
+            timeout=timeout,
+            improve=improve,
+            seed=seed,
         )
         preview = arm.plan(path, speed=options.speed)
     found = {

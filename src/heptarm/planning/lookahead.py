@@ -108,7 +108,7 @@ def look_ahead(
         plans.append(_planned(robot, here, items, range(first, last + 1), frames))
         here, first = plans[-1].end, last + 1
     coarse = max(step, sum(plan.duration for plan in plans) / _MOST_SAMPLES)
-    samples = [_Samples.of(plan, coarse) for plan in plans]
+    samples = [PlanSamples.of(plan, coarse) for plan in plans]
     starts = np.concatenate([[0.0], np.cumsum([sample.t[-1] for sample in samples])]).tolist()
     # one ends where the next one begins: that sample counts once
     kept = [slice(0, None), *[slice(1, None)] * (len(samples) - 1)]
@@ -128,8 +128,17 @@ def look_ahead(
 
 
 @dataclass(frozen=True, slots=True)
-class _Samples:
-    """A plan over time; begins and is_blended have an entry for each of its motions."""
+class PlanSamples:
+    """A plan over time; n samples.
+
+    Attributes:
+        t: times [s], from 0 on, shape (n,).
+        q: joint positions, shape (n, 7) [rad].
+        dq: joint velocities, shape (n, 7) [rad/s].
+        ddq: joint accelerations, shape (n, 7) [rad/s²].
+        begins: time at which each of its motions begins [s].
+        is_blended: whether each of its motions is blended into the next one.
+    """
 
     t: Array
     q: Array
@@ -139,7 +148,7 @@ class _Samples:
     is_blended: tuple[bool, ...]
 
     @classmethod
-    def of(cls, planned: Plan, step: float) -> _Samples:
+    def of(cls, planned: Plan, step: float) -> PlanSamples:
         """Sample a plan at even times, its ends included."""
         motion = planned.motion
         count = len(motion.motions) if isinstance(motion, seam.Batch) else 1

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +25,14 @@ from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
 from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
 from heptarm.values.clearance import Clearance, PlanningWorld
+from heptarm.values.motion.dynamics import Dynamics
 from heptarm.values.motion.planned_path import Path, PathConstraint, Region, SearchStats
 from heptarm.values.motion.ptp import Ptp
 from heptarm.values.pose import Pose, check_pose
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import Body, RobotModel
+
+if TYPE_CHECKING:
+    from heptarm.planning.spline_speed import SpeedLimits
 
 #: Defaults of a search: longest time [s], and most joint positions that it reaches.
 TIMEOUT, STATES = 5.0, 20_000
@@ -68,6 +73,8 @@ def find_path(
     tcp: Pose = _ORIGIN,
     keep: Keep | None = None,
     speed: float = 1.0,
+    tcp_speed: float | None = None,
+    load: Body | None = None,
     timeout: float = TIMEOUT,
     states: int = STATES,
     improve: int = 0,
@@ -89,6 +96,9 @@ def find_path(
         keep: constraint along the whole path, or several of them: `Upright`, `OnPlane`, `OnLine`, a `Workspace` in the
             base; None: none.
         speed: fraction of each joint's maximum for which the path is timed, (0, 1].
+        tcp_speed: the origin of the tool frame is not to be faster on the path [m/s], up to 10; None: any speed.
+        load: on the flange: the path is as slow as the torques of the joints need it to be with it. None: they are not
+            looked at.
         timeout: longest time [s], up to 3600.
         states: most joint positions that it reaches, 10 to 1,000,000.
         improve: joint positions that it reaches after that in search of shorter paths, 0 to 1,000,000: of all that it
@@ -117,6 +127,9 @@ def find_path(
     world.robot.check(begin, "start")
     check_pose(tcp, "tcp")
     fraction = within(speed, "speed", 0.0, 1.0, above=True)
+    fastest = inf if tcp_speed is None else within(tcp_speed, "tcp_speed", 0.0, 10.0, above=True, unit="m/s")
+    if load is not None:
+        instance(load, Body, "load")
     limits = _Budget(
         within(timeout, "timeout", 0.0, 3600.0, above=True, unit="s"),
         integer(states, "states", 10, 10**6),
@@ -126,25 +139,30 @@ def find_path(
     more = integer(improve, "improve", 0, 10**6)
     random = np.random.default_rng(integer(seed, "seed", 0, 2**32 - 1))
     require("ruckig", extra="sim")
+    from heptarm.planning.spline_speed import SpeedLimits
+
+    speeds = SpeedLimits(fraction, fastest, tcp, load)
     checks = world.checks
     search = _Search(world, begin, tcp, constraints_of(keep), limits, random)
     search.check_start()
     goals = search.goals(goal)
     joined = None if known is None else search.joined(known, _each(goal))
     points, planner = search.connected(goals) if joined is None else joined
-    spline = search.smoothed(search.shortened(points), fraction)
+    spline = search.smoothed(search.shortened(points), speeds)
     if planner != _STRAIGHT and more:
         limits.states = limits.reached + more
-        spline = search.improved(goals, spline, fraction)
+        spline = search.improved(goals, spline, speeds)
     stats = SearchStats(planner, seed, limits.reached, world.checks - checks, limits.elapsed)
     return Path(
         tuple(Ptp(frozen(point)) for point in spline.points[1:]),
+        dynamics=spline.dynamics,
         start=frozen(begin),
         curve=frozen(spline.curve),
         duration=spline.duration,
         clearance=search.nearest_on(spline.curve),
         stats=stats,
         goal=tuple(_each(goal)),
+        tcp_speed=None if tcp_speed is None else fastest,
         keep=search.kept,
         world=world,
     )
@@ -296,11 +314,13 @@ class _Spline:
         points: that it passes through, its start among them, shape (n, 7) [rad].
         curve: joint positions along it, shape (m, 7) [rad].
         duration: [s].
+        dynamics: with which it takes so long.
     """
 
     points: Array
     curve: Array
     duration: float
+    dynamics: Dynamics
 
 
 class _Search:
@@ -588,27 +608,19 @@ class _Search:
             return points
         return [*points[: first + 1], ends[0], *line, *points[min(last, len(steps) - 1) + 1 :]]
 
-    def smoothed(self, points: list[Array], speed: float) -> _Spline:
+    def smoothed(self, points: list[Array], speeds: SpeedLimits) -> _Spline:
         """A joint spline along lines that is as free as they are: points are added where it is not.
 
         Raises:
             NoPath: it cannot be timed.
         """
         from heptarm.planning.motion import PlanError
-        from heptarm.planning.planner import plan
-        from heptarm.planning.seam import JointDynamics, JointSpline
-        from heptarm.planning.seam import Ptp as PlantPtp
 
         for curve, through in self._curves(_apart(points)):
-            motion = JointSpline(
-                points=tuple(PlantPtp(q=tuple(point.tolist())) for point in through[1:]),
-                dynamics=JointDynamics(velocity=(speed,) * 7),
-            )
             try:
-                planned = plan(self._robot, motion, through[0])
+                return _Spline(through, curve, *speeds.time(self._robot, through))
             except PlanError:
                 continue  # it leaves the limits of the joints between two points
-            return _Spline(through, curve, 0.0 if planned.path is None else planned.duration)
         raise NoPath(
             "a path was found, but no smooth curve beside it is free and within the limits of the joints",
             reason="not connected",
@@ -646,7 +658,7 @@ class _Search:
         place = int(np.searchsorted(moves, touch.at * moves[-1])) - 1
         return np.array([max(place, 0) // _SAMPLES])
 
-    def improved(self, goals: Array, best: _Spline, speed: float) -> _Spline:
+    def improved(self, goals: Array, best: _Spline, speeds: SpeedLimits) -> _Spline:
         """The fastest of a spline and those of further searches, until the budget is used up.
 
         Constraints make paths longer, so that only without them the length of a path bounds where a shorter one is.
@@ -655,7 +667,7 @@ class _Search:
             longest = float(np.linalg.norm(np.diff(best.curve, axis=0), axis=1).sum())
             try:
                 points, _ = self._grown(goals, longest if self._keep is None else inf)
-                found = self.smoothed(self.shortened(points), speed)
+                found = self.smoothed(self.shortened(points), speeds)
             except NoPath:
                 if self._budget.is_over:
                     return best

@@ -49,6 +49,7 @@ class Path(JointSpline):
         clearance: the nearest two bodies on it; None: none are nearer than 0.2 m.
         stats: what the search took.
         goal: what it was searched for: joint positions, poses or regions, of which it reaches one.
+        tcp_speed: ceiling of the speed of the tool frame for which it was searched [m/s]; None: any.
         keep: constraints along it; an `Upright` has its direction, so that a path which goes on keeps the same one.
         world: the model of bodies that it keeps clear of, and against which it is checked again before it is sent.
     """
@@ -59,6 +60,7 @@ class Path(JointSpline):
     clearance: Clearance | None = field(kw_only=True)
     stats: SearchStats = field(kw_only=True)
     goal: tuple[Array | Pose | Region, ...] = field(kw_only=True, repr=False)
+    tcp_speed: float | None = field(kw_only=True)
     keep: tuple[PathConstraint, ...] = field(kw_only=True)
     world: Any = field(kw_only=True, compare=False, repr=False)
 

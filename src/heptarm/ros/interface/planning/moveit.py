@@ -47,7 +47,6 @@ from heptarm.ros.interface.service import Service, ServiceResponse
 from heptarm.ros.interface.topics import Topic
 from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm.values.checks import Array
-from heptarm.values.motion.dynamics import Dynamics
 from heptarm.values.motion.planned_path import Path
 from heptarm.values.motion.spline import spline_joints
 from heptarm.values.pose import Pose
@@ -158,11 +157,14 @@ class _Request:
         if self.is_here:
             path = self._context.arm.find_path(self._goals, avoid=self._world, **how)
         else:
-            tip = tool_on_flange(self._context)
-            path = planning.find_path(self._world, start=self.start, goal=self._goals, tcp=tip, **how)
+            tip, load = tool_on_flange(self._context), self._context.arm.load
+            path = planning.find_path(
+                self._world, start=self.start, goal=self._goals, tcp=tip, load=load, **how
+            )
         if self._acceleration == 1.0:
             return path
-        return replace(path, dynamics=Dynamics(joint_acceleration=self._acceleration))
+        slower = np.fmin(path.dynamics.joint_acceleration, self._acceleration)
+        return replace(path, dynamics=replace(path.dynamics, joint_acceleration=slower))
 
     def fields(self, path: Path) -> dict[str, Any]:
         """Fields of a moveit_msgs/RobotTrajectory along a path."""

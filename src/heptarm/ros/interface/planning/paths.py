@@ -132,6 +132,7 @@ def _search(context: NodeContext, request: Any) -> Callable[[Callable[[], bool] 
             avoid=world,
             keep=keep,
             speed=speed,
+            tcp_speed=request.tcp_speed or None,
             timeout=request.timeout or TIMEOUT,
             states=request.states or STATES,
             improve=request.improve,
