@@ -25,6 +25,8 @@ from heptarm.rl.policy import SHIPPED, Policy
 from heptarm.sim.plant.scene import FOLDER, Scene
 from heptarm.sim.runtime.project import read_process_data, read_project
 from heptarm.sim.runtime.station import read_station
+from heptarm.values.fitted_arm import load_fitted
+from heptarm.values.mesh import mesh
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.robot import robot
 from tests.long import longer
@@ -79,6 +81,10 @@ def _table(_: Path) -> bytes:
     return ("\n".join(rows) + "\n").encode()
 
 
+OBJ = b"v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+FITTED = b'robot = "iiwa14"\n[coulomb]\nvalue = [0.4, 0.4, 0.3, 0.3, 0.2, 0.1, 0.1]\nsource = "a run"\n'
+
+
 def _load(path: Path) -> object:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # numpy's, of numbers in a damaged file
@@ -98,6 +104,8 @@ KINDS: dict[str, tuple[str, Callable[[Path], bytes], Callable[[Path], object]]] 
     "scene": (".xml", lambda _: (FOLDER / "table.xml").read_bytes(), lambda path: Scene(path).read()),
     "process data": (".xml", lambda _: PROJECT.read_bytes(), read_process_data),
     "project": (".xml", lambda _: FRAMES.encode(), read_project),
+    "mesh": (".obj", lambda _: OBJ, mesh),
+    "fitted arm": (".toml", lambda _: FITTED, load_fitted),
     "station": (".cat", lambda _: setup().encode(), read_station),
 }
 
@@ -164,6 +172,13 @@ def test_what_is_no_such_file_at_all_is_refused(
         path.chmod(0o600)
         with pytest.raises(HeptarmError):
             read(path)
+
+
+def test_a_mesh_with_a_vertex_of_many_digits_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "far.obj"
+    path.write_bytes(OBJ.replace(b"f 1 3 2", b"f 1 3 999999999999999999999999"))
+    with pytest.raises(CommandRejected, match="line 5 has no numbers, or no such vertices"):
+        mesh(path)
 
 
 # ------------------------------------------------------------------------- place, and what can still be read
