@@ -83,9 +83,20 @@ def _describe() -> None:
     SCENES["cage"] = 0.0, [(inside, other), (other, inside), (before, inside), (other, before)]
     through = Place((0.66, 0.0, 0.55), (0.16, 0.30, 0.30), FORWARD, 0.8)
     SCENES["narrow-slot"] = 0.0, [(before, through), (through, before)]
+    near = Place((0.52, 0.32, 0.40), (0.24, 0.30, 0.20), DOWN, 0.5)
+    far = replace(near, middle=(0.52, -0.32, 0.40))
+    SCENES["two-arms"] = 0.0, [(near, far), (far, near)]
 
 
 _describe()
+#: Where the other arm of the scene two-arms rests: over the table.
+OTHER = ha.deg(0, 55, 0, -60, 0, 65, 0)
+
+
+def world_of(scene: str) -> ha.CollisionModel:
+    """The bodies of a scene, and the other arm if there is one."""
+    world = ha.CollisionModel(ROBOT, scene=scene)
+    return world.with_arm("right", q=OTHER) if scene == "two-arms" else world
 
 
 @dataclass(frozen=True)
@@ -155,7 +166,7 @@ def _free(world: ha.CollisionModel, place: Place, tool: float, random: np.random
 
 def made(scene: str, searches: int) -> Iterator[Problem]:
     """Make the problems of a scene: the straight joint path is not free, and a long search finds another one."""
-    world = ha.CollisionModel(ROBOT, scene=scene)
+    world = world_of(scene)
     tool, pairs = SCENES[scene]
     random = np.random.default_rng(20261128)
     count = 0
@@ -172,7 +183,7 @@ def made(scene: str, searches: int) -> Iterator[Problem]:
 
 def shorter(scene: str, searches: int) -> Iterator[Problem]:
     """The stored problems of a scene, with shorter paths where the searches find them."""
-    world = ha.CollisionModel(ROBOT, scene=scene)
+    world = world_of(scene)
     for one in problems(scene):
         best = _best(world, one.start, one.goal, searches)
         yield one if best is None else replace(one, length=min(one.length, best))

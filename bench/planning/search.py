@@ -17,7 +17,7 @@ from bench.measure.blocks import BLOCKS
 from bench.measure.compiler import library
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
-from bench.planning.problems import ROBOT, SCENES, Problem, length, problems
+from bench.planning.problems import ROBOT, SCENES, Problem, length, problems, world_of
 from heptarm import planning
 from heptarm.sim.plant.native import mujoco_library
 from heptarm.sim.plant.scene import Scene
@@ -48,7 +48,7 @@ def _searched(world: ha.CollisionModel, one: Problem) -> tuple[float, float, flo
 def searches() -> Iterator[Figure]:
     """Problems of each scene that are solved within a second, how fast, and how long the paths are."""
     for scene in SCENES:
-        world, posed = ha.CollisionModel(ROBOT, scene=scene), problems(scene)
+        world, posed = world_of(scene), problems(scene)
         _searched(world, posed[0])  # the first one loads modules
         gc.collect()
         with Noise() as noise:

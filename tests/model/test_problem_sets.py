@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import heptarm as ha
-from bench.planning.problems import CLEAR, COUNT, ROBOT, SCENES, problems
+from bench.planning.problems import CLEAR, COUNT, SCENES, problems, world_of
 from heptarm import planning
 from tests.long import longer
 
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_each_problem_is_free_at_its_ends_and_not_between(scene: str) -> None:
-    world, posed = ha.CollisionModel(ROBOT, scene=scene), problems(scene)
+    world, posed = world_of(scene), problems(scene)
     ends = np.array([(one.start, one.goal) for one in posed])
     assert ends.shape == (COUNT, 2, 7)
     assert len(np.unique(ends.reshape(-1, 7), axis=0)) == 2 * COUNT
@@ -28,7 +27,7 @@ def test_each_problem_is_free_at_its_ends_and_not_between(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_searches_solve_some_problems_again(scene: str) -> None:
-    world = ha.CollisionModel(ROBOT, scene=scene)
+    world = world_of(scene)
     for one in problems(scene)[: longer(2, 100)]:
         path = planning.find_path(world, start=one.start, goal=one.goal, timeout=120.0, states=200_000)
         assert (path.start == one.start).all() and (path.end == one.goal).all()
