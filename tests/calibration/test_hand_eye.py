@@ -236,7 +236,7 @@ def photographed(board: Board, seen: ha.Pose, rng: np.random.Generator) -> np.nd
         cv.resize(fine, (640, 480), interpolation=cv.INTER_AREA).astype(float), (0, 0), 0.8
     )
     noisy = 30 + 0.75 * drawn + rng.normal(0, 3, drawn.shape)
-    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
 
 
 def seen_tags(seed: int) -> list[HandEyeView]:

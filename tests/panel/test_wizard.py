@@ -40,6 +40,10 @@ class Person:
             time.sleep(0.01)
         return self.wizard.step
 
+    def asked(self, words: str) -> None:
+        """Wait until the wizard asks for something."""
+        self.sees(lambda step: words in step.asks)
+
 
 @pytest.fixture(scope="module")
 def arm() -> Iterator[ha.Arm]:
@@ -88,7 +92,7 @@ def test_a_tip_from_poses_that_a_person_confirms(arm: ha.Arm) -> None:
     person, home = Person(arm), ha.Pose.from_matrix(kinematics.forward(arm.robot, HOME))
     person.wizard.begin("poses", WizardSettings(count=4))
     for number, abc in enumerate(TURNS, 1):
-        person.sees(lambda step, number=number: f"pose {number} of 4" in step.asks)
+        person.asked(f"pose {number} of 4")
         turn = home.rotated(*ha.deg(*abc))
         flange = ha.Pose.of(POINT - turn.rotation @ TIP, turn.quat)
         arm.move(ha.ptp(kinematics.solve(arm.robot, flange, near=HOME)))

@@ -130,6 +130,7 @@ def tcp(
             hint="give --surface, or leave them out",
         )
     target, place = access.target, saved_as(save, access.target)
+    old: Tool | KnownTool | str
     if surface:
         known = calibration.KnownSurface.parse(surface)
         with target.connect(control=not dry_run, state_rate=_RATE) as arm:
@@ -138,13 +139,13 @@ def tcp(
                 print(plan)
                 return 0
             found = calibration.touch_tcp(arm, plan=plan, confirm=access.consent(arm), tolerance=tolerance)
-            old: Tool | KnownTool | str = arm.tools.get(save, save)
+            old = arm.tools.get(save, save)
     elif points is not None:
         taught = _taught(points, robot(model))
         found = calibration.tcp(taught, tolerance=tolerance)
         saved = saved_target(place) if place else None
         named = {tool.name: tool for tool in saved.tools} if saved is not None else {}
-        old: Tool | KnownTool | str = named.get(save, save)
+        old = named.get(save, save)
     else:
         with target.connect(control=guide != "none") as arm, _guiding(arm, guide) as confirm:
             about = calibration.record_poses(arm, count=poses, confirm=confirm)

@@ -265,7 +265,7 @@ class Wizard:
         how: dict[str, Any] = {"views": settings.count} if settings.count else {}
         is_simulated = settings.camera.strip() == "sim"
         source: Any = _SIMULATED if is_simulated else opened_camera(settings.camera.strip())
-        own = {} if is_simulated else {"frame": settings.frame}
+        own: dict[str, Any] = {} if is_simulated else {"frame": settings.frame}
 
         def work() -> calibration.HandEyeEstimate:
             with closing(self._arm.camera(source, **own)) as camera:

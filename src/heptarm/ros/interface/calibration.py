@@ -77,11 +77,11 @@ def _carry_out(context: NodeContext, goal: Any, work: _Work, place: str, client:
         task = context.driver.run_task("the calibration", partial(work, confirm, progress))
     except HeptarmError as error:
         return ActionResult(GoalOutcome.ABORTED, str(error))
-    error = wait_for_task(task, client, lambda: None)
-    if error is not None:
+    failure = wait_for_task(task, client, lambda: None)
+    if failure is not None:
         if goal.dry_run and shown and not task.end_reason:
             return ActionResult(GoalOutcome.SUCCEEDED, shown[-1])
-        return result_of_failed_task(task, client, error)
+        return result_of_failed_task(task, client, failure)
     found: _Measured = task.result()
     result = ActionResult(GoalOutcome.SUCCEEDED, found.text, {**found.fields, "saved": bool(goal.save)})
     if goal.save:
