@@ -230,7 +230,7 @@ def _pane(pane: Pane, x: float, y: int, width: float, height: int) -> list[str]:
         text(round(x) + 8, y + 16, pane.title, size=12, weight=600, anchor="start"),
     ]
     for number, row in enumerate(pane.rows):
-        out += _row(row, round(x) + 10, round(y) + HEAD + ROW * number, round(width) - 20)
+        out += _row(row, round(x) + 10, y + HEAD + ROW * number, round(width) - 20)
     return out
 
 
