@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.planning.motion import TICK
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.controller.line_speed import AxisLimits
@@ -344,6 +345,24 @@ def test_axes_that_moved_and_rest_in_the_next_step_end_nothing() -> None:
     """At the end of a profile, next to a singularity: the plant's tick ended with ValueError."""
     robot = Plant("iiwa14", q=tuple(np.radians(HOME).tolist())).robot
     assert AxisLimits(robot).fraction(np.array([-2.4e-5, 0, 0, 0, 5e-6, 1.4e-5, -1.8e-5]), np.zeros(7)) == 1.0
+
+
+@pytest.mark.parametrize("surplus", [0.9, 0.99, 1.005, 1.015, 1.019])
+def test_where_a_profile_rests_next_to_a_singularity_each_axis_can_stop_within_a_tick(surplus: float) -> None:
+    """An axis that turns 30 rad per second of the line stopped with 2.4 times its acceleration."""
+    robot = Plant("iiwa14", q=tuple(np.radians(HOME).tolist())).robot
+    here, steep, length = np.radians(HOME), 30.0, 1e-4
+    braking = 0.9 * robot.ddq_max[0] / steep  # with which a profile is found
+
+    def joints(time: float, _: Array) -> Array:
+        return here + np.array([steep * time, *[0.0] * 6])
+
+    rate = float(np.sqrt(surplus * 2.0 * braking * length))
+    profile = AxisLimits(robot).profile(joints, here, start=0.0, end=1.0, rate=rate, horizon=length)
+    if profile is not None:
+        assert steep * profile.at(profile.duration)[1] <= robot.ddq_max[0] * TICK
+    else:
+        assert surplus > 1.0
 
 
 @pytest.mark.parametrize("tick", [60, 250, 420, 560])

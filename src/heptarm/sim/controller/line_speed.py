@@ -35,7 +35,8 @@ _BENT, _SLANT, _STILL = 1e-3**2, 0.05**2, 3e-6**2
 _LEAST = 1e-6
 #: Fractions of an axis' speed and acceleration that are planned with; the rest is for what is between two samples.
 _SPEED, _GRIP = 0.985, 0.9
-#: The square of the rate at the start may exceed what the samples allow by this factor, and be so large at rest.
+#: The square of the rate at the start may exceed what the samples allow by this factor, and be so large at rest, where
+#: each axis can stop within a tick.
 _ROUNDING, _AT_REST = 1.02, 1e-6
 #: Ticks of a slowed trajectory that are checked before it is followed: until the next target, usually.
 _CHECKED = 12
@@ -245,7 +246,8 @@ class AxisLimits:
                     most[k] = min(most[k], a / (b - inverse))
         if begin > most[0] * _ROUNDING:
             return None
-        # forwards: as fast as can be
+        # forwards: as fast as can be; next to a singularity an axis is fast at a rate of nearly 0
+        at_rest = np.minimum(_AT_REST, (self._hardest * TICK / along).min(axis=1) ** 2).tolist()
         squares = [begin]
         for k, step in enumerate(steps):
             z = squares[-1]
@@ -255,7 +257,7 @@ class AxisLimits:
                 if (scale := 1.0 + b * step) > 0.0:
                     gain, loss = min(gain, (a - b * z) / scale), max(loss, (-a - b * z) / scale)
             then = max(0.0, z + step * loss, min(most[k + 1], z + step * gain))
-            if then > most[k + 1] * _ROUNDING + _AT_REST:
+            if then > most[k + 1] * _ROUNDING + at_rest[k + 1]:
                 return None
             squares.append(then)
         return squares
