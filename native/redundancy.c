@@ -41,6 +41,8 @@ static const double LONG_WAY = M_PI / 2, FAR_AWAY = 1.0;
 static const double STEP = M_PI / 18;
 static const double NARROW = 1e-9;
 enum { EVENTS = 28, ALL = 8 };
+/* Whether A1, or A1 and A5, keep the values of `near` where the pose hardly determines them. */
+enum { EXACT, KEEPS_A1, KEEPS_A1_A5 };
 
 struct target {
     double turn[9], place[3], wrist[3], radius, square, bend; /* wrist from the shoulder; its distance from A1; |A4| */
@@ -111,23 +113,23 @@ static void zyz_near(const double *r, double near, double *v) {
 }
 
 /* A5 to A7 for the first four joints; returns how well they are determined, 0 to 1. */
-static double turn_hand(const struct target *t, int is_negative, const double *near, int is_loose, double *q) {
+static double turn_hand(const struct target *t, int is_negative, const double *near, int keeps, double *q) {
     double upper[9], back[9], hand[9], c = cos(q[2]), s = sin(q[2]), spin[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
     zy(q[0], q[1], upper);
     times(upper, spin, back);
     zy(0.0, -q[3], upper);
     times(back, upper, spin);
     transposed_times(spin, t->turn, hand);
-    if (is_loose && hand[8] > 0.0) {
+    if (keeps == KEEPS_A1_A5 && hand[8] > 0.0) {
         zyz_near(hand, near[4], q + 4);
         return 1.0;
     }
     return zyz(hand, is_negative, near[4], q + 4);
 }
 
-/* The posture with this A3 in a Status; loose: A1 and A5 keep their values where they are hardly determined. Returns how well the
-   pose determines it: its smallest lever arm [m] or sine; negative: there is none. */
-static double with_a3(const struct arm *arm, const struct target *t, double a3, int status, const double *near, int is_loose, double *q) {
+/* The posture with this A3 in a Status. Returns how well the pose determines it: its smallest lever arm [m] or sine; negative: there
+   is none. */
+static double with_a3(const struct arm *arm, const struct target *t, double a3, int status, const double *near, int keeps, double *q) {
     double x, z, s = sin(a3), c = cos(a3);
     q[2] = a3;
     q[3] = status & 2 ? -t->bend : t->bend;
@@ -136,11 +138,11 @@ static double with_a3(const struct arm *arm, const struct target *t, double a3, 
     if (square < -1e-4) return -1.0;
     if (square > 0.0) ahead = status & 1 ? -sqrt(square) : sqrt(square);
     q[1] = wrap(atan2(ahead, t->wrist[2]) - atan2(x * c, z));
-    if (t->radius < (is_loose ? VAGUE : 1e-13))
+    if (t->radius < (keeps ? VAGUE : 1e-13))
         q[0] = near[0];
     else
         q[0] = wrap(atan2(t->wrist[1], t->wrist[0]) - atan2(side, ahead));
-    return fmin(fabs(ahead), turn_hand(t, status & 4, near, is_loose, q));
+    return fmin(fabs(ahead), turn_hand(t, status & 4, near, keeps, q));
 }
 
 /* Of the arm with A3 = 0 whose wrist is at the target: R03. */
@@ -174,7 +176,7 @@ static void with_arm_angle(const struct arm *arm, const struct target *t, double
     double ahead = t->wrist[0] * cos(q[0]) + t->wrist[1] * sin(q[0]);
     if (fabs(ahead) < IN_PLANE ? cos(q[0]) * start[4] - sin(q[0]) * start[1] < 0.0 : (ahead < 0.0) != (status & 1))
         zyz(r03, 1, near[0], q);
-    turn_hand(t, status & 4, near, 0, q);
+    turn_hand(t, status & 4, near, EXACT, q);
 }
 
 /* Wrist from the shoulder, in the axes of A1: its x. */
@@ -527,16 +529,31 @@ static void offer_all(struct search *s) {
         offer_settled(s, first, 1);
     }
     for (int status = 0; status < ALL; status++) {
-        double error[6], j[6][N], clear = with_a3(s->arm, s->target, s->a3, status, near, 0, first);
+        double error[6], j[6][N], clear = with_a3(s->arm, s->target, s->a3, status, near, EXACT, first);
         if (clear < 0.0) continue;
         if (clear > VAGUE || miss(s->arm, s->target, first, error, j) <= TOLERANCE) offer(s, first);
         if (clear > VAGUE) continue;
-        with_a3(s->arm, s->target, s->a3, status, near, 1, loose);
+        with_a3(s->arm, s->target, s->a3, status, near, KEEPS_A1_A5, loose);
         if (distance(loose, near) >= s->least) continue;
         offer_settled(s, loose, 1);
         if (!is_exact) offer_settled(s, loose, 0);
     }
     if (!request->is_fixed && (!(s->least < INFINITY) || largest_move(s->q[choose(s)], near) > LONG_WAY)) offer_sweep(s);
+}
+
+/* The wrist above the shoulder leaves A1 free: offers postures with others than that of `near`, from which the hand cannot turn so
+   far (A2 = A4 = 0: A1 + A5 is given, and may be half a turn). */
+static void offer_turned(struct search *s) {
+    double from[N], q[N], error[6], j[6][N];
+    memcpy(from, s->near, sizeof from);
+    for (from[0] = s->arm->q_min[0]; from[0] <= s->arm->q_max[0]; from[0] += STEP)
+        for (int status = 0; status < ALL; status++) {
+            if (with_a3(s->arm, s->target, s->a3, status, from, KEEPS_A1, q) < 0.0) continue;
+            if (miss(s->arm, s->target, q, error, j) <= TOLERANCE)
+                offer(s, q);
+            else
+                offer_settled(s, q, 1);
+        }
 }
 
 /* Joint positions for a pose of the flange, rotation by rows and place [m]. Returns FOUND, TOO_FAR or NO_POSTURE. */
@@ -553,7 +570,7 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
     int is_given = request->is_fixed && request->status >= 0, is_exact = request->is_fixed && request->is_unlimited;
     double first[N];
     /* the usual case: the posture with A3 and Status is clear, and moves no joint farther than it must */
-    double clear = with_a3(arm, &target, s.a3, s.status, near, 0, first), most = largest_move(first, near);
+    double clear = with_a3(arm, &target, s.a3, s.status, near, EXACT, first), most = largest_move(first, near);
     if (is_exact && clear > ALONE && most <= NEAREST * clear) return take(&s, first, q);
     if (clear > (is_given && !request->near ? NO_SIGN : VAGUE) && (request->is_unlimited || excess(arm, first) <= ON_LIMIT)) {
         if (is_given || most <= SAME || (most <= LONG_WAY && distance(first, near) <= PREFERENCE * estimate(arm, &target, near))) return take(&s, first, q);
@@ -563,6 +580,7 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
         s.border = BOTH_SIGNS;
         offer_all(&s);
     }
+    if (!is_found(&s) && target.radius < BOTH_SIGNS) offer_turned(&s);
     if (!is_found(&s)) return NO_POSTURE;
     return take(&s, s.least <= PREFERENCE * s.beyond_distance + SAME ? s.q[choose(&s)] : s.beyond, q);
 }

@@ -273,6 +273,27 @@ def test_a_straight_arm_with_a6_at_0_is_found_by_its_e1_and_status(
 
 
 @each_robot
+@pytest.mark.parametrize("near", [None, deg(0, 30, 0, -90, 0, 60, 0)], ids=["alone", "from elsewhere"])
+@pytest.mark.parametrize("noise", [0.0, 1e-6])
+def test_stretched_upwards_with_a1_and_a5_half_a_turn_apart_is_found_by_its_e1_and_status(
+    robot: RobotModel, near: np.ndarray | None, noise: float
+) -> None:
+    """90,0,0,0,90,90,0: A1 is free there, and with that of `near` A5 would be half a turn: all were refused."""
+    rng = np.random.default_rng(5)
+    q = np.radians(15 * rng.integers(-6, 7, (longer(100, 5_000), 7)))
+    q[:, [1, 3]] = 0.0
+    q[:, 0] = np.radians(15 * rng.integers(1, 11, len(q)))
+    q[:, 4] = np.pi - q[:, 0]
+    q[::2, [0, 4]] *= -1.0
+    own = model.redundancy_batch(robot, q)
+    poses = model.forward_batch(robot, q + noise * rng.uniform(-1.0, 1.0, q.shape))
+    found = model.solve_batch(robot, poses, e1=own.e1, status=own.status, near=near)
+    assert np.isfinite(found).all()
+    assert np.abs(model.forward_batch(robot, found) - poses).max() < 1e-7
+    assert np.abs(found[:, 2] - q[:, 2]).max() < max(1e-6, 100.0 * noise)
+
+
+@each_robot
 def test_kukas_sample_moves_in_the_null_space(robot: RobotModel) -> None:
     """Sunrise's sample application: from 0,20,0,-110,0,-40,90 to the same frame with E1 at -80 degrees and back."""
     start = deg(0, 20, 0, -110, 0, -40, 90)
