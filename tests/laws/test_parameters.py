@@ -87,6 +87,8 @@ def test_what_making_a_law_refuses_is_refused_on_the_way(law: str, name: str, va
         params.set(**{name: value})
     assert one.value.parameter.startswith(name)
     assert not sent and np.array_equal(params.words, before, equal_nan=True), "nothing is half applied"
+    with pytest.raises(ValueError, match="read-only"):
+        params.words[:] = -1000.0
     with pytest.raises(CommandRejected):  # by params= of the session, too
         merged(READY[law]().parameters(ARM), {name: value}) if name != "gravity" else params.set(
             gravity=value

@@ -380,8 +380,9 @@ class Cycle:
         self.fallback = CommandFallback(settings.policy or Policy())
         self.is_ending = False
         self.law = settings.law
-        self._params = Params(values.copy(), schema)
-        self._follower = RateLimiter(self._params.words, settings.law_rates)
+        given = values.copy()
+        self._params = Params(given, schema)
+        self._follower = RateLimiter(given, settings.law_rates)
         self._param_tick = -1
         self.q_before: m.Joints | None = None
         self.exchange = SignalExchange(layout)

@@ -125,8 +125,9 @@ class Cycle:
             seam.params_size, seam.memory_size = values.size, memory.size
             self.library.fri_protect()
             return
-        self._params = Params(np.zeros(values.size), schema)
-        self._follower = RateLimiter(self._params.words, settings.law_rates)
+        given = np.zeros(values.size)
+        self._params = Params(given, schema)
+        self._follower = RateLimiter(given, settings.law_rates)
         self._memory = Memory(memory, kept) if law is not None and arity(law) >= WITH_MEMORY else None
         self._param_tick, self._memory_tick, self._offer_tick = -1, 0, -1
         self._memory_written = np.zeros(memory.size)

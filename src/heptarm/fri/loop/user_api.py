@@ -306,8 +306,10 @@ class Params(Fields):
 
     @property
     def words(self) -> Floats:
-        """All values, as the law sees them."""
-        return self._values
+        """All values, as the law sees them, read-only: `set` checks what is assigned."""
+        shown = self._values.view()
+        shown.flags.writeable = False
+        return shown
 
     @staticmethod
     def flat(values: Mapping[str, Initial]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
