@@ -12,11 +12,12 @@ states of all arms have times on the same clock: that of this computer (`State.s
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -305,6 +306,15 @@ class MotionOfArms(Sealed):
             raise self._first
         return results
 
+    def __await__(self) -> Generator[Any, None, dict[Arm, Result]]:
+        """Wait in asyncio, as `wait` does without a timeout; if that is cancelled or times out, all arms brake."""
+        return self._all_ended().__await__()
+
+    async def _all_ended(self) -> dict[Arm, Result]:
+        # exceptions are results here: otherwise the first arm's ends the wait for the others, which brake as well
+        await asyncio.gather(*map(_awaited, self.handles.values()), return_exceptions=True)
+        return self.wait()
+
     def _watch(self) -> None:
         """Stop the other arms when one has failed; in a thread of its own, since a callback must not wait."""
         waiting = set(self.handles)
@@ -319,6 +329,10 @@ class MotionOfArms(Sealed):
                 _log.warning("one of %d arms failed, the others are stopped: %s", len(self.handles), error)
                 for failure in _of_each(sorted(waiting, key=list(self.handles).index), Arm.stop)[1]:
                     _log.error("an arm could not be stopped: %s", failure)
+
+
+async def _awaited(handle: MotionHandle) -> Result:
+    return await handle
 
 
 def start_together(
