@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import os
 import runpy
 import signal
@@ -70,6 +71,8 @@ def refused(*arguments: str) -> subprocess.CompletedProcess[str]:
     if LONG:
         return run(*arguments)
     variables = {name: value for name, value in os.environ.items() if name not in _OURS}
+    log, on_end = logging.getLogger("heptarm"), signal.getsignal(signal.SIGTERM)
+    level = log.level
     with (
         patch.dict(os.environ, variables, clear=True),
         patch.object(sys, "argv", ["heptarm", *arguments]),
@@ -81,6 +84,9 @@ def refused(*arguments: str) -> subprocess.CompletedProcess[str]:
             code = 0
         except SystemExit as end:
             code = int(end.code or 0)
+        finally:  # commands own their process
+            log.setLevel(level)
+            signal.signal(signal.SIGTERM, on_end)
     command = [*HEPTARM, *arguments]
     return subprocess.CompletedProcess(command, code, said.getvalue(), complained.getvalue())
 

@@ -63,7 +63,7 @@ def test_the_reason_of_a_failure_is_logged_where_the_result_has_no_text(
 
 
 def test_names_of_actions_are_unique() -> None:
-    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 12
+    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 13
 
 
 def test_a_goal_of_the_gripper_reports_until_its_switches_confirm() -> None:

@@ -224,12 +224,11 @@ def _obj(data: bytes, file: Path) -> tuple[Array, Triangles]:
                 corners = [int(word.partition(b"/")[0]) for word in words[1:]]
                 corners = [k - 1 if k > 0 else len(vertices) + k for k in corners]
                 faces += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
-                if any(abs(k) >= len(data) for k in corners):  # a vertex has more than one byte
-                    raise ValueError
         except ValueError:
-            raise unreadable(
-                file, f"line {number} has no numbers, or no such vertices", what="an OBJ file"
-            ) from None
+            raise unreadable(file, f"line {number} has no numbers", what="an OBJ file") from None
     if not vertices or not faces:
         raise unreadable(file, "it has no vertices, or no faces", what="an OBJ file")
-    return np.array(vertices), np.array(faces, dtype=np.int64)
+    try:
+        return np.array(vertices), np.array(faces, dtype=np.int64)
+    except OverflowError:
+        raise unreadable(file, "the number of a vertex has more than 18 digits", what="an OBJ file") from None
