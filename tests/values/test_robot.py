@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -57,3 +57,10 @@ def test_a_copy_of_a_model_equals_it_and_another_robot_does_not() -> None:
     for copied in (copy.copy(model), copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
         assert copied == model and hash(copied) == hash(model) and copied != other
     assert replace(model, d_wf=model.d_wf + 0.01) != model
+
+
+@pytest.mark.parametrize(("name", "words"), [("q_max", "q_max of a RobotModel"), ("qmax", "has no 'qmax'")])
+def test_nothing_of_a_value_can_be_set(name: str, words: str) -> None:
+    """A name that it has not ended in "TypeError: super(type, obj)": frozen dataclasses with slots do that."""
+    with pytest.raises(FrozenInstanceError, match=words):
+        setattr(robot("iiwa14"), name, 1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import MISSING, Field
+from dataclasses import MISSING, Field, FrozenInstanceError
 from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
@@ -35,6 +35,10 @@ class Value:
         super().__init_subclass__(**options)
         if "__repr__" not in vars(cls):
             cls.__repr__ = cls.__repr__  # type: ignore[method-assign]
+        if "__setattr__" in vars(
+            cls
+        ):  # what a frozen dataclass with slots makes fails at names that it has not
+            cls.__setattr__ = _refuse  # type: ignore[method-assign, assignment]
 
     def __repr__(self) -> str:
         """The call that makes it, without what is at its default or left open (NaN)."""
@@ -59,6 +63,15 @@ class Value:
 
     def _key(self) -> tuple[object, ...]:
         return tuple(_key(getattr(self, name)) for name, f in self.__dataclass_fields__.items() if f.compare)
+
+
+def _refuse(value: Value, name: str, _: object) -> None:
+    kind = type(value).__name__
+    if name in value.__dataclass_fields__:
+        raise FrozenInstanceError(
+            f"{name} of a {kind} cannot be set: dataclasses.replace makes another {kind}"
+        )
+    raise FrozenInstanceError(f"a {kind} has no {name!r}, and nothing of it can be set")
 
 
 def _key(value: object) -> object:

@@ -121,8 +121,8 @@ class Circ(PathMotion):
     Attributes:
         via: a point on the arc; its orientation does not count.
         end: target, in `frame`, as `via` is.
-        near: joint positions whose arm angle the target takes, shape (7,) [rad]; None: the current arm angle.
-        redundancy: arm angle and Status of the target; given instead of `near`.
+        near: joint positions whose E1 (the angle of A3) the target takes, shape (7,) [rad]; None: the current one.
+        redundancy: E1 (the angle of A3) and Status of the target; given instead of `near`.
         moving: the motion frame.
         orientation: how the orientation changes along the path.
         frame: the frame of via and end: "base", or a taught frame.

@@ -25,8 +25,8 @@ class Lin(PathMotion):
 
     Attributes:
         target: pose in `frame`.
-        near: joint positions whose arm angle the target takes, shape (7,) [rad]; None: the current arm angle.
-        redundancy: arm angle and Status of the target; given instead of `near`.
+        near: joint positions whose E1 (the angle of A3) the target takes, shape (7,) [rad]; None: the current one.
+        redundancy: E1 (the angle of A3) and Status of the target; given instead of `near`.
         moving: the motion frame.
         orientation: how the orientation changes along the path.
         frame: the frame of the target: "base", or a taught frame.
@@ -87,8 +87,8 @@ def lin(
 
     Args:
         pose: target of the motion frame, in `frame`.
-        near: joint positions whose arm angle the target takes, shape (7,) [rad].
-        redundancy: arm angle E1 and Status of the target, instead of `near`.
+        near: joint positions whose E1 (the angle of A3) the target takes, shape (7,) [rad].
+        redundancy: E1 (the angle of A3) and Status of the target, instead of `near`.
         moving: the motion frame: "tool" (the tool frame, without a tool the flange), "flange" or the name of a frame.
         orientation: "variable": from the start's to the target's; "constant": the start's; "joint": as the joints turn
             it in a PTP.

@@ -56,8 +56,9 @@ class PtpPose(Blended):
 
     Attributes:
         target: pose in `frame`.
-        near: joint positions whose arm angle and Status the target keeps, shape (7,) [rad]; None: the current ones.
-        redundancy: arm angle, Status and Turn of the target; given instead of `near`.
+        near: joint positions whose E1 (the angle of A3) and Status the target keeps, shape (7,) [rad]; None: the
+            current ones.
+        redundancy: E1 (the angle of A3), Status and Turn of the target; given instead of `near`.
         moving: the motion frame.
         frame: the frame of the target: "base", or a taught frame.
     """
@@ -91,8 +92,8 @@ def ptp(
         target: joint positions, shape (7,) [rad], or a pose of the motion frame in `frame`. A NaN keeps this joint's
             set-point, as in `ptp([nan, nan, nan, nan, nan, nan, 0.3])`; `arm.move` refuses it where the
             set-point at the start is not known yet: behind a running motion, or one to a pose.
-        near: for a pose: joint positions whose arm angle and Status it keeps, shape (7,) [rad].
-        redundancy: for a pose: arm angle E1, Status and Turn, instead of `near`.
+        near: for a pose: joint positions whose E1 (the angle of A3) and Status it keeps, shape (7,) [rad].
+        redundancy: for a pose: E1 (the angle of A3), Status and Turn, instead of `near`.
         moving: for a pose: the motion frame: "tool", "flange" or the name of a frame.
         frame: of a pose: "base", the name of a taught frame, or the pose of any frame in the base.
         **limits: as follows.
