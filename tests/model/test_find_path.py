@@ -77,6 +77,17 @@ def test_a_path_to_where_the_arm_is_takes_no_time(wall: ha.CollisionModel) -> No
     assert path.duration == 0.0 and (path.end == LEFT).all()
 
 
+@pytest.mark.parametrize(
+    "degrees", [(90, 0, 90, -90, 90, 0, 0), (75, 0, -75, 0, 0, 0, -75), (20, 0, 40, -90, 0, 60, 0)]
+)
+def test_a_path_to_the_pose_of_the_arm_moves_no_joint(degrees: tuple[float, ...]) -> None:
+    """The nearest of the sampled postures was up to 115 degrees away."""
+    start = deg(*degrees)
+    goal = Pose.from_matrix(model.forward(robot("iiwa14"), start))
+    path = planning.find_path(ha.CollisionModel("iiwa14"), start=start, goal=goal)
+    assert np.abs(path.curve - start).max() < 1e-6
+
+
 def test_a_slower_path_takes_longer(wall: ha.CollisionModel) -> None:
     fast, slow = (planning.find_path(wall, start=LEFT, goal=RIGHT, speed=speed) for speed in (1.0, 0.2))
     assert slow.duration > 2.0 * fast.duration

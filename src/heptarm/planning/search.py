@@ -422,12 +422,14 @@ class _Search:
             np.tile(np.arange(8), elbows + 1),
         )
         matrices = np.array([(pose @ back).matrix for pose in poses])
-        solved = solve_batch(
+        sampled = solve_batch(
             self._robot,
             np.repeat(matrices, len(e1), axis=0),
             e1=np.tile(e1, len(poses)),
             status=np.tile(status, len(poses)),
         )
+        # and the nearest posture, so that joints stay that need not move, as in a PTP
+        solved: Array = np.concatenate([sampled, solve_batch(self._robot, matrices, near=self._start)])
         found = solved[np.isfinite(solved).all(axis=1)]
         return found[((found >= self._robot.q_min) & (found <= self._robot.q_max)).all(axis=1)]
 
