@@ -110,6 +110,21 @@ def test_programs_that_would_meet_are_refused_before_anything_moves(arms: ha.Arm
         ha.start_together(meet, collision_check=3)  # type: ignore[arg-type]
 
 
+def test_a_cancelled_await_of_several_arms_brakes_all_of_them(arms: ha.Arms) -> None:
+    far = {arm: ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.1) for arm in arms}
+
+    async def program() -> None:
+        together = ha.start_together({arm: ha.ptp(HOME) for arm in arms})
+        assert {arm: result.arrived for arm, result in (await together).items()} == dict.fromkeys(arms, True)
+        together = ha.start_together(far)
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(together, 0.2)
+        assert together.done  # what follows finds all arms braked
+
+    asyncio.run(program())
+    assert all(arm.wait_for_rest().q[0] < ha.deg(80.0)[0] for arm in arms)
+
+
 def test_one_that_moves_already_is_not_joined(arms: ha.Arms) -> None:
     left, right = arms
     running = left.start(ha.hold(30.0))
@@ -243,18 +258,3 @@ def test_a_lost_arm_stops_the_other_and_the_group_still_closes(arms: ha.Arms) ->
         ha.stop_all(left, right)
     assert "press the emergency stop" in caught.value.hint
     assert isinstance(left, Arm) and left.in_control
-
-
-def test_a_cancelled_await_of_several_arms_brakes_all_of_them(arms: ha.Arms) -> None:
-    far = {arm: ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.1) for arm in arms}
-
-    async def program() -> None:
-        together = ha.start_together({arm: ha.ptp(HOME) for arm in arms})
-        assert {arm: result.arrived for arm, result in (await together).items()} == dict.fromkeys(arms, True)
-        together = ha.start_together(far)
-        with pytest.raises(asyncio.TimeoutError):
-            await asyncio.wait_for(together, 0.2)
-        assert together.done  # what follows finds all arms braked
-
-    asyncio.run(program())
-    assert all(arm.wait_for_rest().q[0] < ha.deg(80.0)[0] for arm in arms)
