@@ -355,7 +355,7 @@ def test_where_a_profile_rests_next_to_a_singularity_each_axis_can_stop_within_a
     braking = 0.9 * robot.ddq_max[0] / steep  # with which a profile is found
 
     def joints(time: float, _: Array) -> Array:
-        return here + np.array([steep * time, *[0.0] * 6])
+        return np.add(here, [steep * time, *[0.0] * 6])
 
     rate = float(np.sqrt(surplus * 2.0 * braking * length))
     profile = AxisLimits(robot).profile(joints, here, start=0.0, end=1.0, rate=rate, horizon=length)
