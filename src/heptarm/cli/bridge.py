@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from heptarm.arm.arm import Arm
 from heptarm.bridge.kst import PORT as KST_PORT
 from heptarm.bridge.kst import serve_kst
 from heptarm.bridge.libiiwa import PORT as LIBIIWA_PORT
@@ -44,14 +47,7 @@ def libiiwa(
         heptarm bridge libiiwa --target lab1 --tool gripper --speed 0.5
     """
     within(port, "port", 1, 65535)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with target.connect() as arm:
-        if speed is not None:
-            arm.speed = speed
-        print(
-            f"waits for LibIiwa() at {host}:{port}, for {arm.robot.title}; Ctrl-C ends it and stops the arm",
-            flush=True,
-        )
+    with _bridged(target, speed, f"waits for LibIiwa() at {host}:{port}") as arm:
         serve_libiiwa(arm, host=host, port=port, tools=tool, on_change=lambda text: print(text, flush=True))
     return 0
 
@@ -75,13 +71,17 @@ def kst(
         heptarm bridge kst --target lab1 --speed 0.5
     """
     within(port, "port", 0, 65535)
+    with _bridged(target, speed, f"KST and iiwaPy3 may connect to {host}:{port}") as arm:
+        serve_kst(arm, host=host, port=port, on_change=lambda text: print(text, flush=True))
+    return 0
+
+
+@contextmanager
+def _bridged(target: CommandTarget, speed: float | None, waits: str) -> Iterator[Arm]:
+    """The arm that others' programs drive, until Ctrl-C or SIGTERM."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with target.connect() as arm:
         if speed is not None:
             arm.speed = speed
-        print(
-            f"KST and iiwaPy3 may connect to {host}:{port}, for {arm.robot.title}; Ctrl-C ends it and stops the arm",
-            flush=True,
-        )
-        serve_kst(arm, host=host, port=port, on_change=lambda text: print(text, flush=True))
-    return 0
+        print(f"{waits}, for {arm.robot.title}; Ctrl-C ends it and stops the arm", flush=True)
+        yield arm
