@@ -16,6 +16,7 @@ from heptarm import testing
 from heptarm.arm.translate.state import _READERS
 from heptarm.cli.install_cabinet import install_cabinet
 from heptarm.errors import CommandRejected, NeedsOperator, StaleState
+from heptarm.modes import CartesianImpedance, JointImpedance
 from heptarm.testing import Verdict
 from heptarm.wire import messages as wire
 from tests.cli.running import refused, run
@@ -48,9 +49,11 @@ KNOWN = {
 }
 #: Scenarios that need nothing that is unknown of 2.x.
 SCENARIOS = (
-    *("model.forward", "model.inverse", "state.velocity", "state.stream", "state.every", "state.mode", "link.clock"),
+    *("model.forward", "model.inverse", "model.in_bulk", "model.limits"),
+    *("state.velocity", "state.stream", "state.every", "state.mode", "link.clock"),
     *("motions.ptp_joints", "motions.named", "motions.position_hold", "motions.reach"),
     *("programs.queue", "programs.replace", "programs.cancel", "programs.stop", "programs.error"),
+    *("servo.joints", "servo.jump", "servo.exclusive", "laws.minimum_jerk", "signals.message", "safety.kinds"),
 )
 SIGNALS = "MediaFlange.OutputX3Pin1>bool MediaFlange.InputX3Pin3<bool MediaFlange.Nothing.x<bool"
 
@@ -101,7 +104,7 @@ def address(request: pytest.FixtureRequest) -> Iterator[str]:
     """A virtual cabinet of 2.x with each of the two generations of FRI."""
     subprocess.run([sys.executable, str(ROOT / "cabinet" / "build.py"), "--sunrise2"], check=True)
     program = [sys.executable, "-m", "tests.sunrise2.virtual", request.param, "--model", "med7", "--port", "0"]
-    program += ["--speed", "1" if request.param == "3.0" else "5", "--data", f"heptarm.io={SIGNALS}", "--parent-pipe"]
+    program += ["--data", f"heptarm.io={SIGNALS}", "--parent-pipe"]
     program += ["--data", "heptarm.heartbeat=2.0", "--fri-version", "2.7" if request.param == "3.0" else "2.5"]
     with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdin is not None and process.stdout is not None
@@ -119,10 +122,9 @@ def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
         assert shown == set(SCENARIOS), [(o.scenario.name, o.text) for o in report.outcomes]
 
         arm.move(ha.ptp([0.1, 0.5, 0.0, -1.4, 0.0, 1.2, 0.3]))
-        arm.move(ha.lin_rel(z=-0.05, frame="tool"), speed=0.3)
-        arm.move(ha.hold(0.2, mode=ha.JointImpedance(stiffness=500.0)))
-        with arm.servo("joints") as servo:
-            servo.set(arm.state.q)
+        arm.move(ha.lin_rel(z=-0.05))
+        arm.move(ha.hold(0.2), mode=JointImpedance(stiffness=500.0))
+        arm.move(ha.hold(0.2), mode=CartesianImpedance(stiffness={"xyz": 500.0, "abc": 50.0}))
         arm.io["MediaFlange.OutputX3Pin1"] = True
         assert arm.io["MediaFlange.OutputX3Pin1"] is True and arm.io["Med.BrakeTest"] == 1
         assert set(arm.io) == {"MediaFlange.OutputX3Pin1", "MediaFlange.InputX3Pin3", "Med.BrakeTest"}
@@ -133,7 +135,7 @@ def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
             lambda: arm.pause(),
             lambda: arm.pad.process_data("x"),
             lambda: arm.pad.ask("?"),
-            lambda: arm.move(ha.ptp(arm.state.q), mode=ha.JointImpedance(stiffness=500.0)),
+            lambda: arm.move(ha.ptp(arm.state.q), mode=JointImpedance(stiffness=500.0)),
         ):
             with pytest.raises(CommandRejected, match=r"does not support"):
                 attempt()
