@@ -4,10 +4,11 @@
     python cabinet/build.py --force    compile everything
     python cabinet/build.py --sunrise2 compile the preview for Sunrise 2.x and its doubles as well
 
-core knows nothing of KUKA; the doubles stand in for KUKA's classes and use core; app uses both. app2 is the preview
-for Sunrise 2.x, with doubles of its own that stand on those of 1.x under another package; it is compiled for tests
-only, and no jar of it is packed into the wheel. After the Eclipse compiler has run, every class of core and app is looked at: class version 50, no member that Java 6
-lacks, no forbidden package. Python's standard library is enough, so that the wheel's build hook can call it.
+core knows nothing of KUKA; the doubles stand in for KUKA's classes and use core; app uses both. app2 is the
+preview for Sunrise 2.x, with doubles of its own that stand on those of 1.x under another package; it is compiled
+for tests only, and no jar of it is packed into the wheel. After the Eclipse compiler has run, every class of core
+and app is looked at: class version 50, no member that Java 6 lacks, no forbidden package. Python's standard
+library is enough, so that the wheel's build hook can call it.
 """
 
 from __future__ import annotations

@@ -116,7 +116,9 @@ def test_sessions_of_an_arm(loop: list[str], tmp_path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("version", ["2.5", "2.7"])
-def test_poses_of_an_application_of_the_shape_of_the_sdk(loop: list[str], tmp_path: Path, version: str) -> None:
+def test_poses_of_an_application_of_the_shape_of_the_sdk(
+    loop: list[str], tmp_path: Path, version: str
+) -> None:
     program = compiled(ROOT / "examples/fri_cpp/sdk_pose.cpp", loop, tmp_path)
     said = retry(
         lambda: driven(program, version, "pose"),

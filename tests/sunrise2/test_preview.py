@@ -1,4 +1,4 @@
-"""The preview for Sunrise 2.x: what it names, what it writes, what it reports, and what of it runs on doubles of those names."""
+"""The preview for Sunrise 2.x: what it names, writes and reports, and what of it runs on doubles of those names."""
 
 from __future__ import annotations
 
@@ -27,10 +27,22 @@ APP, DOUBLES = ROOT / "cabinet" / "app2", ROOT / "cabinet" / "doubles2" / "src"
 KNOWN = {
     "com.kuka.device": {"ForceData"},
     "com.kuka.device.common": {"JointPosition"},
-    "com.kuka.fri": {"FRIChannelInformation", "FRIConfiguration", "FRIJointOverlay", "FRISession", "IFRISessionListener"},
+    "com.kuka.fri": {
+        "FRIChannelInformation",
+        "FRIConfiguration",
+        "FRIJointOverlay",
+        "FRISession",
+        "IFRISessionListener",
+    },
     "com.kuka.fri.api.commanding": {"EClientCommandMode", "IFriCommanding"},
     "com.kuka.fri.api.monitoring": {
-        *("IFriChannelInformation", "IFriConfiguration", "IFriMonitoring", "IFriSession", "IFriSessionListener"),
+        *(
+            "IFriChannelInformation",
+            "IFriConfiguration",
+            "IFriMonitoring",
+            "IFriSession",
+            "IFriSessionListener",
+        ),
     },
     "com.kuka.fri.common": {"ClientCommandMode"},
     "com.kuka.geometry": {"Frame", "LocalFrame"},
@@ -40,7 +52,11 @@ KNOWN = {
     "com.kuka.roboticsAPI.applicationModel": {"IApplicationControl", "RoboticsAPIApplication"},
     "com.kuka.roboticsAPI.motionModel": {"ErrorHandlingAction", "IMotionErrorHandler"},
     "com.kuka.roboticsAPI.motionModel.BasicMotions": {"linRel", "positionHold", "ptp"},
-    "com.kuka.roboticsAPI.motionModel.controlModeModel": {"AbstractMotionControlMode", "CartDOF", "PositionControlMode"},
+    "com.kuka.roboticsAPI.motionModel.controlModeModel": {
+        "AbstractMotionControlMode",
+        "CartDOF",
+        "PositionControlMode",
+    },
     "com.kuka.sensitivity": {"LBR"},
     "com.kuka.sensitivity.controlmode": {"CartesianImpedanceControlMode", "JointImpedanceControlMode"},
     "com.kuka.servoing.api.common": {"IServoingCapability"},
@@ -53,7 +69,14 @@ SCENARIOS = (
     *("state.velocity", "state.stream", "state.every", "state.mode", "link.clock"),
     *("motions.ptp_joints", "motions.named", "motions.position_hold", "motions.reach"),
     *("programs.queue", "programs.replace", "programs.cancel", "programs.stop", "programs.error"),
-    *("servo.joints", "servo.jump", "servo.exclusive", "laws.minimum_jerk", "signals.message", "safety.kinds"),
+    *(
+        "servo.joints",
+        "servo.jump",
+        "servo.exclusive",
+        "laws.minimum_jerk",
+        "signals.message",
+        "safety.kinds",
+    ),
 )
 SIGNALS = "MediaFlange.OutputX3Pin1>bool MediaFlange.InputX3Pin3<bool MediaFlange.Nothing.x<bool"
 
@@ -86,7 +109,9 @@ def test_install_cabinet_writes_it_with_a_key_and_one_release_of_fri(tmp_path: P
         (("--sunrise", "2", "--without", "fri"), "--without is for --sunrise 1"),
     ],
 )
-def test_install_cabinet_refuses_what_it_cannot_write(tmp_path: Path, words: tuple[str, ...], text: str) -> None:
+def test_install_cabinet_refuses_what_it_cannot_write(
+    tmp_path: Path, words: tuple[str, ...], text: str
+) -> None:
     done = refused("install-cabinet", "--out", str(tmp_path / "new"), *words)
     assert done.returncode != 0 and text in done.stderr and not (tmp_path / "new").exists()
 
@@ -103,10 +128,26 @@ def test_an_unknown_safety_state_is_never_fine() -> None:
 def address(request: pytest.FixtureRequest) -> Iterator[str]:
     """A virtual cabinet of 2.x with each of the two generations of FRI."""
     subprocess.run([sys.executable, str(ROOT / "cabinet" / "build.py"), "--sunrise2"], check=True)
-    program = [sys.executable, "-m", "tests.sunrise2.virtual", request.param, "--model", "med7", "--port", "0"]
+    program = [
+        sys.executable,
+        "-m",
+        "tests.sunrise2.virtual",
+        request.param,
+        "--model",
+        "med7",
+        "--port",
+        "0",
+    ]
     program += ["--data", f"heptarm.io={SIGNALS}", "--parent-pipe"]
-    program += ["--data", "heptarm.heartbeat=2.0", "--fri-version", "2.7" if request.param == "3.0" else "2.5"]
-    with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+    program += [
+        "--data",
+        "heptarm.heartbeat=2.0",
+        "--fri-version",
+        "2.7" if request.param == "3.0" else "2.5",
+    ]
+    with subprocess.Popen(
+        program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
         assert process.stdin is not None and process.stdout is not None
         ready = json.loads(process.stdout.readline())
         yield f"127.0.0.1:{ready['port']}"
@@ -132,7 +173,7 @@ def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
         for attempt in (
             lambda: arm.move(ha.lin(arm.state.pose)),
             lambda: arm.set_override(0.5),
-            lambda: arm.pause(),
+            arm.pause,
             lambda: arm.pad.process_data("x"),
             lambda: arm.pad.ask("?"),
             lambda: arm.move(ha.ptp(arm.state.q), mode=JointImpedance(stiffness=500.0)),

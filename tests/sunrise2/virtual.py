@@ -1,6 +1,6 @@
 """A virtual cabinet with heptarm's application for Sunrise 2.x on its own doubles; run as a program.
 
-    python -m tests.sunrise2.virtual FRI OPTIONS_OF_THE_CABINET...
+python -m tests.sunrise2.virtual FRI OPTIONS_OF_THE_CABINET...
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ BUILT = Path(__file__).parents[2] / "build" / "cabinet" / "sunrise2"
 def main(fri: str, options: list[str]) -> None:
     """Replace doubles and application by those for 2.x, then run the cabinet as ever."""
     core = _resources.jars()[0]
-    _resources.jars = lambda: [  # type: ignore[assignment]
+    _resources.jars = lambda: [
         core,
         BUILT / "heptarm-doubles2-not-for-robots.jar",
         BUILT / f"heptarm-app2-fri-{fri}.jar",

@@ -101,7 +101,7 @@ def install_cabinet(
     key = "" if no_key else new_key() if stored is None or not stored.exists() else read_key_file(stored)
     sources = _resources.cabinet_sources()
     if sunrise == 2:
-        folders = ("core/src", "app2/src", f"app2/fri/{fri or 'none'}")
+        folders: tuple[str, ...] = ("core/src", "app2/src", f"app2/fri/{fri or 'none'}")
         project, settings, pattern, quoted = "project2", out / _PROJECT_2, _KEY_2, json.dumps(key)
     else:
         folders = ("core/src", "app/src", *(f"without/{option}/src" for option in left_out))
@@ -189,9 +189,7 @@ def _check_generation(sunrise: int, fri: str, without: str) -> None:
         CommandRejected: the combination cannot be written.
     """
     if sunrise not in (1, 2):
-        raise CommandRejected(
-            f"--sunrise must be 1 or 2, got {sunrise}", parameter="sunrise", allowed="1, 2"
-        )
+        raise CommandRejected(f"--sunrise must be 1 or 2, got {sunrise}", parameter="sunrise", allowed="1, 2")
     if sunrise == 2 and without:
         raise CommandRejected(
             "--without is for --sunrise 1: the sources for 2.x need only FRI chosen, with --fri",

@@ -244,7 +244,13 @@ class PanelArm:
         if safety is None:
             return ()
         if not safety.is_known:
-            return (Advice("The safety state is unknown", "Look at the smartPAD: this cabinet reports none.", "warning"),)
+            return (
+                Advice(
+                    "The safety state is unknown",
+                    "Look at the smartPAD: this cabinet reports none.",
+                    "warning",
+                ),
+            )
         found = []
         for reason in safety.stops:
             remedy, button = _REMEDIES.get(reason, ("", ""))

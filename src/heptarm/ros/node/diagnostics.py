@@ -86,7 +86,9 @@ def diagnose(
     ):
         values[name.replace("_", " ")] = _yes_no(getattr(safety, name))
     if not safety.is_known:
-        return Diagnosis(DiagnosticLevel.WARN, "the safety state is unknown: this cabinet reports none", values)
+        return Diagnosis(
+            DiagnosticLevel.WARN, "the safety state is unknown: this cabinet reports none", values
+        )
     for active_fault, text in (
         (safety.emergency_stop, "emergency stop: release it and acknowledge it on the smartPAD"),
         (safety.protective_stop, "safety stop: remove its cause and acknowledge it on the smartPAD"),
