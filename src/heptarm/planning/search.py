@@ -24,7 +24,7 @@ from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
 from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
-from heptarm.values.clearance import Clearance, PlanningWorld
+from heptarm.values.clearance import Clearance, CollisionWorld
 from heptarm.values.motion.dynamics import Dynamics
 from heptarm.values.motion.planned_path import Path, PathConstraint, Region, SearchStats
 from heptarm.values.motion.ptp import Ptp
@@ -66,7 +66,7 @@ Keep = PathConstraint | Sequence[PathConstraint]
 
 
 def find_path(
-    world: PlanningWorld,
+    world: CollisionWorld,
     *,
     start: npt.ArrayLike,
     goal: Goal,
@@ -116,7 +116,7 @@ def find_path(
         LimitError: a value outside its range.
         MissingExtra: the planner is not installed.
     """
-    if not isinstance(world, PlanningWorld):
+    if not isinstance(world, CollisionWorld):
         raise ShapeError(
             f"world must be a model of bodies, got {shown(world)}",
             parameter="world",
@@ -328,7 +328,7 @@ class _Search:
 
     def __init__(
         self,
-        world: PlanningWorld,
+        world: CollisionWorld,
         start: Array,
         tcp: Pose,
         keep: Sequence[PathConstraint],

@@ -18,7 +18,7 @@ from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, GraspFailed, NoPath, ShapeError
 from heptarm.skills.gripper import Gripper
 from heptarm.values.checks import Array, Value, instance, shown, within
-from heptarm.values.clearance import GraspWorld, TouchOnPath
+from heptarm.values.clearance import CollisionWorld, TouchOnPath
 from heptarm.values.frames import BASE, FLANGE, TOOL
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.planned_path import Path
@@ -136,7 +136,7 @@ def pick(
     gripper: Gripper,
     body: str,
     *,
-    world: GraspWorld,
+    world: CollisionWorld,
     candidates: Sequence[Grasp] | None = None,
     opening: float = OPENING,
     approach: float = APPROACH,
@@ -206,7 +206,7 @@ def place(
     body: str,
     at: Pose | Sequence[Pose],
     *,
-    world: GraspWorld,
+    world: CollisionWorld,
     approach: float = APPROACH,
     speed_mps: float = LINE_SPEED,
     timeout: float = PATIENCE,
@@ -280,7 +280,7 @@ class _Task:
     """
 
     arm: ArmVerbs
-    world: GraspWorld
+    world: CollisionWorld
     body: str
     approach: float
     speed_mps: float
@@ -288,7 +288,7 @@ class _Task:
     seed: int
 
     def __post_init__(self) -> None:
-        if not isinstance(self.world, GraspWorld):
+        if not isinstance(self.world, CollisionWorld):
             raise ShapeError(
                 f"world must be a model of bodies, got {shown(self.world)}",
                 parameter="world",
@@ -379,8 +379,8 @@ class _LineCheck:
     """
 
     body: str
-    world: GraspWorld
-    contact: GraspWorld
+    world: CollisionWorld
+    contact: CollisionWorld
 
     def carrying(
         self,

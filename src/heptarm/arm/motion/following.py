@@ -21,7 +21,7 @@ from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.motion.rest import settle
 from heptarm.errors import CollisionForeseen, NoPath, Timeout
 from heptarm.values.checks import Array, Value
-from heptarm.values.clearance import ChangingWorld, Clearance, TouchOnPath
+from heptarm.values.clearance import Clearance, CollisionWorld, TouchOnPath
 from heptarm.values.motion.motion import Motion, hold
 from heptarm.values.motion.planned_path import Path
 from heptarm.values.result import Cause, Result
@@ -109,7 +109,7 @@ class FollowTerms:
         on_progress: called with the completed fraction of the present path.
     """
 
-    world: ChangingWorld
+    world: CollisionWorld
     search: PathSearch
     send: Sender
     timeout: float
