@@ -73,7 +73,15 @@ def verify(robot: RobotModel, states: list[State], *, refuse: float) -> LoadChec
         NotReady: more torque is left than a fraction of the highest torque of an axis.
     """
     q, tau_ext = (np.mean([getattr(state, name) for state in states], axis=0) for name in ("q", "tau_ext"))
-    found = LoadCheck.of(robot, q, tau_ext)
+    return _judged(LoadCheck.of(robot, q, tau_ext), refuse)
+
+
+def _judged(found: LoadCheck, refuse: float) -> LoadCheck:
+    """Log a warning where the load data do not fit.
+
+    Raises:
+        NotReady: they are wrong by more than a fraction of the highest torque of an axis.
+    """
     if found.fraction > refuse:
         raise NotReady(
             f"{found}; at most {refuse:.1%} are allowed before impedance control",
@@ -83,20 +91,24 @@ def verify(robot: RobotModel, states: list[State], *, refuse: float) -> LoadChec
             hint=_ADVICE,
         )
     if not found.is_fine:
-        _log.warning("%s: %s", found, _ADVICE)
+        _log.warning("a compliant arm sinks under a load that it does not know: %s: %s", found, _ADVICE)
     return found
 
 
 _ADVICE = "measure the load (heptarm calibrate load), attach its tool, and check that nothing touches the arm"
 
 
-def warn_before(robot: RobotModel, mode: Mode | None, state: State | None) -> None:
-    """Log a warning if an arm in position control is to become compliant while its load data do not fit.
+def check_before(robot: RobotModel, mode: Mode | None, state: State | None, *, refuse: float) -> None:
+    """Check the load data before an arm in position control becomes compliant.
 
     Args:
         robot: the robot.
         mode: of the motion that is to begin; None: position control.
         state: the newest one; None: there is none.
+        refuse: fraction of the highest torque of an axis above which it is an error.
+
+    Raises:
+        NotReady: more torque is left than that.
     """
     if mode is None or isinstance(mode, Position) or state is None:
         return
@@ -105,6 +117,4 @@ def warn_before(robot: RobotModel, mode: Mode | None, state: State | None) -> No
         return
     if not isinstance(groups.mode.mode, Position):
         return  # it is compliant already, and may lean on something
-    found = LoadCheck.of(robot, groups.joints.q, groups.torques.tau_ext)
-    if not found.is_fine:
-        _log.warning("a compliant arm sinks under a load that it does not know: %s: %s", found, _ADVICE)
+    _judged(LoadCheck.of(robot, groups.joints.q, groups.torques.tau_ext), refuse)
