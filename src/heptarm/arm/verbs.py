@@ -966,7 +966,7 @@ class ArmVerbs(Sealed):
     def _send(self, motions: tuple[Motion, ...], terms: ProgramTerms) -> MotionHandle:
         made = program_request.checked(self._connection, self._tooling, motions, terms)
         self._foresight.examine(made)
-        load_check.warn_before(self.robot, terms.mode, self._connection.newest())
+        load_check.check_before(self.robot, terms.mode, self._connection.newest())
         return program_request.send(self._connection, made)
 
     @overload
@@ -999,6 +999,7 @@ class ArmVerbs(Sealed):
         breaks = self._breaks
         settings["mode"] = self._mode if settings.get("mode") is None else settings["mode"]
         check_mode(settings["mode"])
+        load_check.check_before(self.robot, settings["mode"], self._connection.newest())
         request = ServoRequest(kind, **settings)
         message = request.message(self._speed)
         self._tooling.check_motion_frame(request.moving, "moving")
@@ -1078,6 +1079,7 @@ class ArmVerbs(Sealed):
         if settings.get("mode") is None:
             settings["mode"] = None if word(kind, "kind", fri_settings.KINDS) == "monitor" else self._mode
         check_mode(settings["mode"])
+        load_check.check_before(self.robot, settings["mode"], self._connection.newest())
         self._tooling.check_mode(settings["mode"])
         rule = guards_in_force.get(self) if settings.get("collision") is None else None
         if rule is not None:
@@ -1238,9 +1240,9 @@ class ArmVerbs(Sealed):
         """Check the load data of a resting arm that nothing touches: call it before impedance control.
 
         A compliant arm sinks under a weight that its load data lack. What the sensors' accuracy does not explain, 3 %
-        of the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion in an
-        impedance mode that begins in position control logs the same warning; none is refused, for it may begin in
-        contact.
+        of the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion, program,
+        stream and FRI session in an impedance mode that begins in position control is checked like this by itself. It
+        may begin in contact, so it is refused only where a missing weight explains the torques, from 8 % on.
 
         Args:
             refuse: fraction of the highest torque of an axis above which it is an error, (0, 1].
