@@ -56,6 +56,8 @@ _SETTLING = 0.1
 _SWING = math.radians(8.0)
 #: Least acceleration of an axis at which a moment of a motion counts [rad/s²], and the most moments that are used.
 _EXCITING, _MOMENTS = 0.5, 2000
+#: Torque of a moment of a motion that the filtered model does not explain, as a fraction of the highest torque.
+_MODEL = 1e-4
 #: Standard deviations that are larger than this are refused before anything moves: mass [kg], moments [kg m].
 _MASS, _MOMENT = 0.15, 0.015
 
@@ -341,6 +343,6 @@ def moving_samples(samples: ArmSamples, model: RobotModel, *, declared: Body | N
     half, weights = len(chosen.centre) // 2, chosen.centre
     shared = float(weights[half:] @ weights[: len(weights) - half])
     noise = chosen.tau_noise * math.sqrt(float(weights @ weights) + 2.0 * shared)
-    rows = np.tile(noise, (len(chosen.t), 1))
+    rows = np.tile(np.hypot(noise, _MODEL * model.tau_max), (len(chosen.t), 1))
     spread = np.full(len(chosen.t), math.sqrt(float(weights @ chosen.offsets**2)))
     return LoadSamples(chosen.q, chosen.tau, chosen.tau_ext, rows, chosen.dq, chosen.ddq, spread)
