@@ -63,7 +63,7 @@ from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.planning.search import STATES, TIMEOUT, Goal, Keep
 from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
-from heptarm.values.camera import Camera
+from heptarm.values.camera import NO_DISTORTION, Camera
 from heptarm.values.checks import array, callback, flag, instance, integer, shown, within, word
 from heptarm.values.clearance import CarriesTools, ChangingWorld, CollisionCheck, PlanningWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
@@ -449,6 +449,7 @@ class ArmVerbs(Sealed):
         pose: Pose | None = None,
         frame: str = "flange",
         matrix: npt.ArrayLike | None = None,
+        distortion: npt.ArrayLike = NO_DISTORTION,
     ) -> CameraStream:
         """Live pictures, each with the arm at the moment when it was taken.
 
@@ -465,6 +466,7 @@ class ArmVerbs(Sealed):
             pose: pose of your own camera in `frame`, as `heptarm.calibration.hand_eye` measures it; None: not known.
             frame: frame of your own camera: "flange", which moves it with the arm, or "base".
             matrix: intrinsic matrix of your own camera, shape (3, 3) [pixels]; None: not known.
+            distortion: of your own camera's lens, k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
 
         Returns:
             The pictures: `read()` waits for the next one; close it, or use it as a `with` block.
@@ -481,14 +483,14 @@ class ArmVerbs(Sealed):
         layers = ["pixels"]
         layers += ["depth"] if flag(depth, "depth") else []
         layers += ["labels"] if flag(labels, "labels") else []
-        own = Mounting.of(self.robot, frame=frame, pose=pose, matrix=matrix)
+        own = Mounting.of(self.robot, frame=frame, pose=pose, matrix=matrix, distortion=distortion)
         link = self._connection
         link.check_open()
         if isinstance(source, Camera):
             own.refuse_for_simulated()
             feed = camera_feed(self, source, layers=layers)
             drawn = DrawnSource(feed, layers, late, link.real_time_factor)
-            place = Mounting(self.robot, source.frame, source.pose, source.matrix)
+            place = Mounting(self.robot, source.frame, source.pose, source.matrix, source.distortion)
             return CameraStream(link, drawn, place)
         called = CalledSource(source, layers, link.clock, late)
         return CameraStream(link, called, own)
