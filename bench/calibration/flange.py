@@ -68,7 +68,7 @@ def tip() -> Iterator[Figure]:
 
 @benchmark("load")
 def load() -> Iterator[Figure]:
-    """Error of mass, centre and inertia of a part of 3 kg and a long tool, which nobody declared, with noisy sensors."""
+    """Error of mass, centre and inertia of a part and a long tool that nobody declared, with noisy sensors."""
     rests, swings = _measured(EDGES, MIDDLE, WEIGHT, ("rests", "full"))
     detail = {"sigma_kg": rests.sigma_mass, "sigma_mm": (1e3 * rests.sigma_com).tolist()}
     yield Figure("load_mass", abs(rests.mass / WEIGHT - 1.0), "fraction", limit=MASS, detail=detail)

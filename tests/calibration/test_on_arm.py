@@ -95,7 +95,10 @@ def test_verify_load_warns_and_refuses(arm: ha.Arm, caplog: pytest.LogCaptureFix
 
 
 def test_a_motion_that_would_sink_far_is_refused_and_a_contact_is_not(arm: ha.Arm) -> None:
-    compliant, refused = modes.JointImpedance(500.0), r"the load data leave .* at most 8\.0% are allowed before"
+    compliant, refused = (
+        modes.JointImpedance(500.0),
+        r"the load data leave .* at most 8\.0% are allowed before",
+    )
     arm.operator.start_push((0.0, 0.0, -50.0), duration=60.0)  # as five more kilograms
     arm.wait_until(lambda state: LoadCheck.of(arm.robot, state.q, state.tau_ext).weight > 0.1)
     for begin in (

@@ -30,7 +30,9 @@ def read_usd(path: str) -> dict[str, Any]:
                 joint.GetUpperLimitAttr().Get(),
             ]
             drive = UsdPhysics.DriveAPI(one, "angular").GetDampingAttr()
-            of_physx = [one.GetAttribute(f"physxJoint:{name}").Get() for name in ("jointFriction", "armature")]
+            of_physx = [
+                one.GetAttribute(f"physxJoint:{name}").Get() for name in ("jointFriction", "armature")
+            ]
             found["resistance"][one.GetName()] = [drive.Get(), *of_physx]
     return found
 

@@ -227,7 +227,9 @@ class IdentifiedLoad(Value):
             pairs = zip(self.inertia, self.sigma_inertia, strict=True)
             inertia = "  ".join(f"{value:.4f} ± {sigma:.4f}" for value, sigma in pairs)
             inertia += " kg m² (xx yy zz xy xz yz)"
-            small = [axis for axis, is_felt in zip(("xx", "yy", "zz"), self.matters, strict=True) if not is_felt]
+            small = [
+                axis for axis, is_felt in zip(("xx", "yy", "zz"), self.matters, strict=True) if not is_felt
+            ]
             if small:
                 inertia += (
                     f"; {', '.join(small)} does not matter: no motion of the arm shows less than "
@@ -352,7 +354,11 @@ def _load_design(model: RobotModel, samples: LoadSamples, acceleration: npt.Arra
     after = samples.spread[:, None]
     found = [
         load_regressors(
-            model, samples.q + off * samples.dq, samples.dq + off * samples.ddq, samples.ddq, acceleration=acceleration
+            model,
+            samples.q + off * samples.dq,
+            samples.dq + off * samples.ddq,
+            samples.ddq,
+            acceleration=acceleration,
         )
         for off in ((-after, after) if after.any() else (0.0,))
     ]

@@ -174,7 +174,9 @@ def _swings(model: RobotModel, middle: Array) -> list[Array]:
     for axis in range(3, 7):
         for angle in (_SWING, -_SWING, 0.0):
             there = middle.copy()
-            there[axis] = np.clip(middle[axis] + angle, min(low[axis], middle[axis]), max(high[axis], middle[axis]))
+            there[axis] = np.clip(
+                middle[axis] + angle, min(low[axis], middle[axis]), max(high[axis], middle[axis])
+            )
             found.append(there)
     return found
 
@@ -316,7 +318,8 @@ def _samples_of(states: list[State]) -> ArmSamples:
     names = ("q", "q_cmd", "tau", "tau_ext")
     columns = [np.array([getattr(rows[stamp], name) for stamp in sorted(rows)]) for name in names]
     times = 1e-9 * (np.array(sorted(rows)) - min(rows))
-    return ArmSamples(times, *columns, columns[2])  # what the motors are commanded does not count here
+    q, q_cmd, tau, tau_ext = columns
+    return ArmSamples(times, q, q_cmd, tau, tau_ext, tau)  # what the motors are commanded does not count here
 
 
 def moving_samples(samples: ArmSamples, model: RobotModel, *, declared: Body | None) -> LoadSamples:

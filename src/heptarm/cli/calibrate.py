@@ -172,9 +172,7 @@ def load(
     *,
     inertia: Annotated[
         bool,
-        Parameter(
-            negative="", help="Measure the inertia, too: A4 to A7 swing by 8 degrees at each rest."
-        ),
+        Parameter(negative="", help="Measure the inertia, too: A4 to A7 swing by 8 degrees at each rest."),
     ] = False,
     speed: Annotated[float, Parameter(help="Fraction of the full speed, (0, 1].")] = SPEED,
     seconds: Annotated[float, Parameter(help="Time of each rest [s].")] = SECONDS,

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm import calibration
-from heptarm.calibration.proposal import measuring
 from heptarm.arm.devices.camera import opened_camera
+from heptarm.calibration.proposal import measuring
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict
 from heptarm.io.plan_box import PlanOutline
 from heptarm.io.targets import saved_target

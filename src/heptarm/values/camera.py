@@ -392,7 +392,7 @@ class Picture(Value):
                 allowed=f"at least {NEAREST:g} m",
             )
         at = distorted(seen[0] / seen[2], seen[1] / seen[2], self.distortion)
-        return np.asarray((matrix @ (at.x, at.y, 1.0))[:2])
+        return np.asarray((matrix @ np.array([at.x, at.y, 1.0]))[:2])
 
     def _placed(self) -> tuple[Pose, Array]:
         if self.pose is None or self.matrix is None:
