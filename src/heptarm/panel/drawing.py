@@ -1,4 +1,4 @@
-"""What is drawn in three dimensions: arm, scene, a program's world, a plan, the path driven, a contact, frames, points."""
+"""What is drawn in three dimensions: arm, scene, a program's world, a plan, the path driven, forces, frames, points."""
 
 from __future__ import annotations
 

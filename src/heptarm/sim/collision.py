@@ -903,10 +903,13 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: not seven numbers.
         """
-        line = np.array([_joints(first, "first"), _joints(last, "last")])
-        free = self._distances.is_free(line, **self._steps)
+        if _are_joints(first, last):
+            ends = cast(Array, first), cast(Array, last)
+        else:
+            ends = array(first, 7, "first"), array(last, 7, "last")
+        free = self._distances.is_free(ends[0], ends[1], **self._steps)
         # a pair that touches at the beginning may be left
-        return self.first_on(line) is None if free is None else free
+        return self.first_on(np.array(ends)) is None if free is None else free
 
     def _leave(
         self, first: Array, last: Array, known: dict[tuple[str, str], float]
@@ -1069,20 +1072,19 @@ def _unknown(name: str, known: tuple[str, ...], what: str, parameter: str = "bod
     )
 
 
+_DOUBLE = np.dtype(float)
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].
 _NEARER = 1e-4
 
 
-def _joints(values: npt.ArrayLike, name: str) -> Array:
-    """Joint positions of shape (7,); those of a search, which asks often, need no more than a look."""
-    if (
-        type(values) is np.ndarray
-        and values.dtype == float
-        and values.shape == (7,)
-        and isfinite(values.sum())
-    ):
-        return values
-    return array(values, 7, name)
+def _are_joints(first: npt.ArrayLike, last: npt.ArrayLike) -> bool:
+    """Whether both are joint positions as a search has them, which asks often and needs no more than a look."""
+    return (
+        type(first) is type(last) is np.ndarray
+        and first.dtype is last.dtype is _DOUBLE
+        and first.shape == last.shape == (7,)
+        and isfinite(first @ last)  # which it is not with an entry that is not, or with huge ones
+    )
 
 
 def _place(points: Array, piece: int, at: float) -> float:
