@@ -247,7 +247,7 @@ def _safety(message: wire.SafetyState) -> values.Safety:
 
 
 @lru_cache(maxsize=256)
-def _safety_bits(bits: int) -> tuple[bool | None, ...]:
+def _safety_bits(bits: int) -> tuple[Any, ...]:
     is_known = not bits & wire.SafetyBits.UNKNOWN
     return tuple(bool(bits & bit) if is_known or bit == wire.SafetyBits.MOVING else None for bit in _SAFETY)
 
