@@ -184,7 +184,7 @@ def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
             arm.recover()
         with pytest.raises(StaleState, match="does not report the commanded pose"):
             _ = arm.state.pose_cmd
-    told = run("doctor", "--target", address)
-    assert "a preview for Sunrise 2.x, never run on such a cabinet" in told.stdout
-    assert "reports neither safety state nor readiness" in told.stdout
+    shown = run("doctor", "--target", address)
+    assert "a preview for Sunrise 2.x, never run on such a cabinet" in shown.stdout
+    assert "reports neither safety state nor readiness" in shown.stdout
     assert "readiness and stops unknown" in run("state", "--target", address).stdout
