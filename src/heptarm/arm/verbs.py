@@ -65,7 +65,7 @@ from heptarm.record.camera import CameraFeed, CameraSubject
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import NO_DISTORTION, Camera
 from heptarm.values.checks import array, callback, flag, instance, integer, shown, within, word
-from heptarm.values.clearance import CarriesTools, ChangingWorld, CollisionCheck, PlanningWorld
+from heptarm.values.clearance import CollisionCheck, CollisionWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -615,7 +615,7 @@ class ArmVerbs(Sealed):
         self,
         goal: Goal,
         *,
-        avoid: PlanningWorld | None = None,
+        avoid: CollisionWorld | None = None,
         keep: Keep | None = None,
         speed: float | None = None,
         tcp_speed: float | None = None,
@@ -676,7 +676,7 @@ class ArmVerbs(Sealed):
         self,
         path: FoundPath,
         *,
-        watch: ChangingWorld | None = None,
+        watch: CollisionWorld | None = None,
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
@@ -715,7 +715,7 @@ class ArmVerbs(Sealed):
         """
         instance(path, FoundPath, "path", hint="find one: arm.find_path(goal, avoid=world)")
         world = path.world if watch is None else watch
-        if not isinstance(world, ChangingWorld):
+        if not isinstance(world, CollisionWorld):
             raise ShapeError(
                 f"watch must be a model of bodies, got {shown(world)}",
                 parameter="watch",
@@ -760,7 +760,7 @@ class ArmVerbs(Sealed):
         Raises:
             ShapeError: not a model that carries tools.
         """
-        if not isinstance(model, CarriesTools):
+        if not isinstance(model, CollisionWorld):
             raise ShapeError(
                 f"model must be a model of bodies that carries tools, got {shown(model)}",
                 parameter="model",

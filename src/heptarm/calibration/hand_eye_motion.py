@@ -33,7 +33,7 @@ from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
 from heptarm.values.camera import intrinsic
 from heptarm.values.checks import Array, Value, frozen, instance, integer, within
-from heptarm.values.clearance import PlanningWorld
+from heptarm.values.clearance import CollisionWorld
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
@@ -105,7 +105,7 @@ def hand_eye(
     *,
     views: int = VIEWS,
     speed: float = SPEED,
-    avoid: PlanningWorld | None = None,
+    avoid: CollisionWorld | None = None,
     matrix: npt.ArrayLike | None = None,
     distortion: npt.ArrayLike | None = None,
     refine: bool | None = None,
@@ -216,7 +216,7 @@ class _Mover:
         self,
         arm: ArmVerbs,
         speed: float,
-        avoid: PlanningWorld | None,
+        avoid: CollisionWorld | None,
         confirm: Callable[[HandEyePlan], bool] | None,
     ) -> None:
         self._arm, self._speed, self._avoid = arm, speed, avoid

@@ -20,7 +20,7 @@ from heptarm import calibration
 from heptarm.arm.devices.camera import opened_camera
 from heptarm.calibration.proposal import measuring
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.io.targets import saved_target
 from heptarm.values.camera import Camera
 from heptarm.values.checks import Value, word
