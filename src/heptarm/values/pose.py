@@ -464,7 +464,7 @@ def check_pose(pose: Pose, parameter: str = "pose") -> None:
         )
 
 
-_Target = TypeVar("_Target", Pose, PartialPose)
+_Target = TypeVar("_Target", Pose, PartialPose, Pose | PartialPose)
 
 
 def placed_target(frame: Pose, target: _Target) -> _Target:
