@@ -330,6 +330,9 @@ from .values.motion.trajectory import (
     Trajectory as Trajectory,
 )
 from .values.pose import (
+    PartialPose as PartialPose,
+)
+from .values.pose import (
     Pose as Pose,
 )
 from .values.pose import (
