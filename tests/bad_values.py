@@ -285,6 +285,7 @@ REPORTS = (
         "Recording",
         "RepeatedMotion",
         "StatesOfArms",
+        "TakenChunk",
         "TouchOnPath",
         "Twin",
         "TwistServo",

@@ -20,6 +20,9 @@ from .arm.link.state_stream import (
 from .arm.link.target import (
     target_from_env as target_from_env,
 )
+from .arm.motion.chunks import (
+    TakenChunk as TakenChunk,
+)
 from .arm.motion.following import (
     Detour as Detour,
 )

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.record.journal import NOTE
+from heptarm.record.journal import CORRECTION, NOTE
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import to_frame
 from heptarm.values.checks import Array, choice, finite, flag, shown
@@ -31,7 +31,7 @@ class RecordedEvent:
 
     Attributes:
         t: when, on the time line of the recording [s].
-        kind: "request", "refusal", "event", "error", "note", "fri" or "signals".
+        kind: "request", "refusal", "event", "error", "note", "fri", "signals" or "correction".
         name: of the message, such as "MotionFinished".
         text: one line for people.
         content: everything, as plain data.
@@ -144,6 +144,21 @@ class RecordedData:
     def notes(self) -> tuple[RecordedEvent, ...]:
         """The marks that `Recorder.note` has put."""
         return tuple(event for event in self.events if event.kind == NOTE)
+
+    @property
+    def corrections(self) -> Array:
+        """Times in which a person corrected a policy, from begin to end, shape (n, 2) [s]; see `JointServo.correct`."""
+        found: list[tuple[float, float]] = []
+        begin: float | None = None
+        for event in self.events:
+            if event.kind == CORRECTION and event.text == "begins":
+                begin = event.t
+            elif event.kind == CORRECTION and begin is not None:
+                found.append((begin, event.t))
+                begin = None
+        if begin is not None:
+            found.append((begin, float(self.t[-1]) if len(self) else begin))
+        return np.array(found, dtype=np.float64).reshape(-1, 2)
 
     def between(self: _Data, begin: float | str, end: float | str) -> _Data:
         """A part of the recording; its times stay those of the whole.

@@ -6,12 +6,14 @@ They use only the public methods of `Arm`, so each is an example of how to build
 from heptarm.skills.grasping import Grasp, grasps, pick, place
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
 from heptarm.skills.insertion import Insertion, insert
+from heptarm.skills.takeover import Takeover
 from heptarm.skills.teleoperation import teleoperate
 
 __all__ = [
     "Grasp",
     "Gripper",
     "Insertion",
+    "Takeover",
     "TwoSignalGripper",
     "grasps",
     "insert",
