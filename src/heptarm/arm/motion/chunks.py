@@ -72,12 +72,11 @@ def action_times(at: npt.ArrayLike, count: int, *, rate: float) -> Array:
         ShapeError: another number of times.
         LimitError: a time that is not finite, or they do not ascend by at least a millisecond.
     """
-    given = np.asarray(at)
-    if not given.ndim:
-        return finite(at, "at", unit="s") + np.arange(count) / within(
-            rate, "rate", 0.0, 1.0 / _NEAREST, above=True, unit="Hz"
-        )
-    times = finite_entries(numbers(at, "at"), "at")
+    times = numbers(at, "at", "a time or times")
+    if not times.ndim:
+        step = 1.0 / within(rate, "rate", 0.0, 1.0 / _NEAREST, above=True, unit="Hz")
+        return finite(float(times), "at", unit="s") + step * np.arange(count)
+    finite_entries(times, "at")
     if times.shape != (count,):
         raise ShapeError(
             f"at must be one time or one for each of the {count} actions, got shape {times.shape}",

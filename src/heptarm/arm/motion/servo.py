@@ -1095,6 +1095,8 @@ class PoseServo(TargetServo):
                 parameter="chunk",
                 value=chunk,
             )
+        for index, pose in enumerate(chunk):
+            check_pose(pose, f"chunk[{index}]")
         times = action_times(at, len(chunk), rate=1.0 / self.period if rate is None else rate)
         self._refuse_lines()
         if self._newest is None:
@@ -1105,7 +1107,6 @@ class PoseServo(TargetServo):
         try:
             for index, pose in enumerate(chunk):
                 with inside(f"chunk[{index}]"):
-                    check_pose(pose)
                     self._q = self._joints(pose)
                 rows.append(self._q)
         finally:
