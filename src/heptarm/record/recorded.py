@@ -20,6 +20,29 @@ from heptarm.values.notebook import as_html
 from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.text import lines
 
+
+@dataclass(frozen=True, eq=False)
+class RecordedNumbers:
+    """Numbers that a program has recorded beside the states; `heptarm.load(...).streams`.
+
+    Attributes:
+        t: times of the recording, shape (n,) [s].
+        values: shape (n, m).
+    """
+
+    t: Array
+    values: Array
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.t)
+
+    def between(self, begin: float, end: float) -> RecordedNumbers:
+        """Those of a time of the recording [s]."""
+        inside = _within(self.t, begin, end)
+        return RecordedNumbers(self.t[inside], self.values[inside])
+
+
 _Data = TypeVar("_Data", bound="RecordedData")
 #: Before the names of signals of FRI cycles, which have their own times: "fri.t".
 FRI = "fri."
@@ -91,6 +114,9 @@ class RecordedData:
         lost: states and FRI cycles that could not be recorded; only known of a complete file.
         damage: where and how the file is damaged; what is here is all before that. Empty: it is not.
         pictures: of a simulated camera, if there was one.
+        views: pictures of the cameras of an episode, by their names.
+        streams: numbers of the streams of an episode, by their names.
+        outcome: texts of the end of a complete file.
     """
 
     path: Path
@@ -102,6 +128,9 @@ class RecordedData:
     lost: int = 0
     pictures: Pictures = field(default_factory=Pictures)
     damage: str = ""
+    views: Mapping[str, Pictures] = field(default_factory=dict)
+    streams: Mapping[str, RecordedNumbers] = field(default_factory=dict)
+    outcome: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """Array of a signal, such as "q", "fri.tau" or "t".
@@ -191,6 +220,8 @@ class RecordedData:
             ),
             events=tuple(event for event in self.events if first <= event.t <= last),
             pictures=self.pictures.between(first, last),
+            views={name: view.between(first, last) for name, view in self.views.items()},
+            streams={name: stream.between(first, last) for name, stream in self.streams.items()},
         )
 
     def _moment(self, when: float | str, name: str) -> float:

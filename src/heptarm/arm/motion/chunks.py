@@ -75,7 +75,7 @@ def action_times(at: npt.ArrayLike, count: int, *, rate: float) -> Array:
     times = numbers(at, "at", "a time or times")
     if not times.ndim:
         step = 1.0 / within(rate, "rate", 0.0, 1.0 / _NEAREST, above=True, unit="Hz")
-        return finite(float(times), "at", unit="s") + step * np.arange(count)
+        return np.asarray(finite(float(times), "at", unit="s") + step * np.arange(count, dtype=np.float64))
     finite_entries(times, "at")
     if times.shape != (count,):
         raise ShapeError(

@@ -839,7 +839,11 @@ class TargetServo(Servo):
     @property
     def target(self) -> tuple[Array, Array]:
         """The newest target: joint positions and their velocity, shape (7,) each [rad, rad/s]."""
-        return (self.start.q if self._newest is None else self._newest), np.array(self._newest_speed)
+        return (self._here() if self._newest is None else self._newest), np.array(self._newest_speed)
+
+    def _here(self) -> Array:
+        """Joint positions from which the first target goes on, shape (7,) [rad]."""
+        return self.start.q  # raises unless it has begun
 
     def _joint_target(self, q: npt.ArrayLike, dq: npt.ArrayLike | None) -> Array:
         """Send joint positions and their velocity; see `JointServo.set`."""
@@ -889,7 +893,7 @@ class TargetServo(Servo):
         Raises:
             OutsideWorkspace: it is outside, and such targets are refused.
         """
-        last = self.start.q if self._newest is None else self._newest
+        last = self._here() if self._newest is None else self._newest
         if boundary.refuses and boundary.excess(q) > max(boundary.excess(last), TOLERANCE):
             raise boundary.refusal(q, "the target", parameter="q")
         return boundary.clamped(q, last)
@@ -1099,11 +1103,8 @@ class PoseServo(TargetServo):
             check_pose(pose, f"chunk[{index}]")
         times = action_times(at, len(chunk), rate=1.0 / self.period if rate is None else rate)
         self._refuse_lines()
-        if self._newest is None:
-            _ = self.start  # raises unless it has begun
-            self._newest = self._q
         rows, kept = [], self._q
-        self._q = self._newest
+        self._q = self.target[0]
         try:
             for index, pose in enumerate(chunk):
                 with inside(f"chunk[{index}]"):
@@ -1112,6 +1113,10 @@ class PoseServo(TargetServo):
         finally:
             self._q = kept
         return self._follow_actions(np.array(rows), times)
+
+    def _here(self) -> Array:
+        _ = self.start  # raises unless it has begun
+        return self._q
 
     def _follow(self, began: int) -> None:
         """Send the last good target."""
