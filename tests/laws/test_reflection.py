@@ -9,6 +9,7 @@ import pytest
 
 from heptarm import laws
 from tests.laws.plant import DT, Plant
+from tests.long import few
 
 #: Stiffness of the wall that the leader feels [N/m], of the hand [N/m], and its damping [N s/m].
 WALL, HAND, HAND_DAMPING = 4000.0, 400.0, 4.0
@@ -24,13 +25,13 @@ class Hand:
     def __call__(self, t: float) -> np.ndarray:
         here = self.plant.place
         self.energy += float(self.force @ (here - self.last))
-        goal = self.start - [0.0, 0.0, 0.1 * min(t, 1.0)]
+        goal = self.start - [0.0, 0.0, 0.1 * min(2.0 * t, 1.0)]
         self.last = here
         self.force = HAND * (goal - here) - HAND_DAMPING * self.plant.velocity[:3]
         return self.force
 
 
-def press(*, passive: bool, delay: float, seconds: float = 2.5) -> tuple[np.ndarray, np.ndarray]:
+def press(*, passive: bool, delay: float, seconds: float = 1.2) -> tuple[np.ndarray, np.ndarray]:
     """Kinetic energy of the leader less what the hand gave [J], and the height of the flange [m], each millisecond."""
     plant = Plant(laws.reflected_force(passive=passive, force_max=80.0, damping=[0.5] * 7))
     hand = Hand(plant)
@@ -48,14 +49,14 @@ def press(*, passive: bool, delay: float, seconds: float = 2.5) -> tuple[np.ndar
     return np.array(surplus), np.array(heights) - wall
 
 
-@pytest.mark.parametrize("delay", [0.02, 0.06])
+@pytest.mark.parametrize("delay", few([0.06, 0.02]))
 def test_the_energy_never_exceeds_what_the_hand_has_put_in_and_the_wall_is_felt(delay: float) -> None:
     surplus, heights = press(passive=True, delay=delay)
     assert surplus.max() < 1e-4, "kinetic energy is at most what the hand gave"
-    assert np.ptp(heights[-500:]) < 0.015, "it rests at the wall"
-    assert heights.min() > -0.02, "where the hand alone would be 50 mm inside"
+    assert np.ptp(heights[-300:]) < 0.025, "it rests at the wall"
+    assert heights.min() > -0.035, "where the hand alone would be 50 mm inside"
 
 
 def test_without_the_observer_the_same_wall_throws_the_hand_back() -> None:
     surplus, heights = press(passive=False, delay=0.06)
-    assert surplus.max() > 1.0 and np.ptp(heights[-500:]) > 0.05
+    assert surplus.max() > 1.0 and np.ptp(heights[-300:]) > 0.05

@@ -47,6 +47,9 @@ class Clock:
     def nanos(self) -> int:
         return self.now
 
+    def sleep(self, seconds: float) -> None:
+        raise AssertionError
+
     def sleep_until(self, due: int) -> None:
         raise AssertionError
 
@@ -148,8 +151,8 @@ def test_an_arm_follows_while_the_clutch_is_held_scaled_turned_and_inside_its_wa
     arm.workspace = None
     with pytest.raises(ShapeError, match="must be a device that knows its pose"):
         skills.follow_poses(arm, 3)  # type: ignore[arg-type]
-    with pytest.raises(LimitError, match="scale must be"):
-        skills.follow_poses(arm, devices.pose_stream(0), scale=0.0)
+    with devices.pose_stream(0) as other, pytest.raises(LimitError, match="scale must be"):
+        skills.follow_poses(arm, other, scale=0.0)
     with pytest.raises(CommandRejected, match="NoSuchSignal"):
         skills.LeaderArm(arm, clutch="NoSuchSignal")
 

@@ -539,11 +539,15 @@ def label_filter(labels: Iterable[str]) -> tuple[str, ...]:
     """Labels that are chosen.
 
     Raises:
+        ShapeError: no words.
         CommandRejected: there is no such label.
     """
+    given: object = labels
+    if not isinstance(given, Iterable):
+        raise ShapeError(f"labels must be words, got {shown(given)}", parameter="labels", value=given)
     chosen = (labels,) if isinstance(labels, str) else tuple(labels)
     for label in chosen:
-        if label not in LABELS:
+        if not isinstance(label, str) or label not in LABELS:
             allowed = ", ".join(LABELS)
             raise CommandRejected(
                 f"labels must be among {allowed}, got {shown(label)}",

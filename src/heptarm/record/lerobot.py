@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
 from heptarm.record.demonstration import Demonstration, Demonstrations
-from heptarm.values.checks import Array, flag
+from heptarm.values.checks import Array, flag, instance
 from heptarm.values.files import path_of, unwritable
 
 #: Version of the format, LeRobot's sizes of files, and the size from which on the next one begins here [bytes].
@@ -56,11 +56,13 @@ def save_lerobot(episodes: Demonstrations, folder: str | Path, *, overwrite: boo
         MissingExtra: pyarrow or Pillow is not installed.
     """
     arrow, parquet = require("pyarrow", extra="record"), require("pyarrow.parquet", extra="record")
+    instance(episodes, Demonstrations, "episodes")
     where = path_of(folder, "folder")
+    replaces = flag(overwrite, "overwrite")
     used = [episode for episode in episodes if len(episode)]
     features = _features(used)
     if where.exists() and any(where.iterdir()):
-        if not (flag(overwrite, "overwrite") and (where / "meta" / "info.json").is_file()):
+        if not (replaces and (where / "meta" / "info.json").is_file()):
             raise CommandRejected(
                 f"folder must be empty or new, {where} has files",
                 parameter="folder",
