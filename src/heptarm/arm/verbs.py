@@ -460,7 +460,7 @@ class ArmVerbs(Sealed):
             rate: steps per second of the robot's clock, up to 500 [Hz].
             cameras: simulated ones or functions, as `camera` takes them, by their names.
             streams: functions that return numbers of a sensor, or None where there is nothing new, by their names; each
-                is called `rate` times a second in a thread of its own. None instead of a function: the program pushes
+                is called twice a step in a thread of its own. None instead of a function: the program pushes
                 the numbers, `EpisodeSet.push`.
             task: what is done, in words.
             reset: called before each episode, to bring arm and scene to the start. After an error of it there is no

@@ -269,7 +269,7 @@ class EpisodeSet(Sealed):
             for name, source in (*self._terms.streams.items(), (ACTION, None)):
                 feed = self._feeds[name] = _Feed(name, clock, _number_writer(name))
                 if source is not None:
-                    pause = 1.0 / (self._terms.rate * self._terms.factor)
+                    pause = 0.5 / (self._terms.rate * self._terms.factor)  # one that is late misses no step
                     stack.callback(_Watcher(feed, _number_reader(feed, source, clock), pause=pause).close)
             self._stack = stack.pop_all()
         self._is_open = True
