@@ -16,6 +16,7 @@ import pyarrow.parquet as parquet
 import pytest
 
 import heptarm as ha
+from heptarm.cli import record as command
 from heptarm.errors import CommandRejected, LimitError, LocalProtocolError, ShapeError, StaleState
 from heptarm.record import episodes as recording
 from heptarm.record.demonstration import newest
@@ -143,6 +144,33 @@ def test_episodes_have_labels_and_equal_steps_in_which_everything_is_new_or_coun
     assert not (tmp_path / "other").exists()
     said = refused("convert", str(folder), str(tmp_path / "x"), "--label", "success").stderr
     assert "label and rate are of data sets" in said
+
+
+def test_the_commands_list_episodes_and_make_a_data_set(
+    peer: Peer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "insert"
+    with peer.arm() as arm, arm.episodes(folder, rate=20.0, task="Look") as episodes:
+        for label in ("success", "failure"):
+            with episodes.episode() as episode:
+                passes(arm, 0.2)
+                episode.succeed() if label == "success" else episode.fail("too slow")
+    assert command.episodes(folder) == 0
+    first, second, *rest = capsys.readouterr().out.splitlines()
+    assert first.startswith("episode-00000.mcap  success  0.") and first.endswith("  Look")
+    assert "failure (too slow)" in second and "1 success, 1 failure" in " ".join(rest)
+    assert command.episodes(folder, as_json=True) == 0
+    assert [json.loads(line)["label"] for line in capsys.readouterr().out.splitlines()] == [
+        "success",
+        "failure",
+    ]
+    assert command.convert(folder, tmp_path / "data", to="lerobot", rate=40.0) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("1 episodes, ") and told.rstrip().endswith(f"in {tmp_path / 'data'}")
+    assert json.loads((tmp_path / "data/meta/info.json").read_text())["fps"] == 40
+    assert command.convert(folder, tmp_path / "data", to="lerobot", label=("failure",), overwrite=True) == 0
+    with pytest.raises(CommandRejected, match="there must be episodes with steps, got none"):
+        command.convert(folder, tmp_path / "other", to="lerobot", label=("unfinished",))
 
 
 def check_data_set(data: Path, episodes: ha.Demonstrations) -> None:
