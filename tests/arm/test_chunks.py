@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,8 +11,9 @@ import pytest
 
 import heptarm as ha
 from heptarm import devices, skills
-from heptarm.arm.motion.chunks import ActionPath, action_times
-from heptarm.errors import LimitError, ShapeError
+from heptarm.arm.motion.chunks import ActionPath, ActionStream, action_times
+from heptarm.errors import CollisionForeseen, LimitError, ShapeError
+from heptarm.io.clock import RealClock
 from heptarm.values.robot import robot
 from tests.conftest import RunningCabinet
 
@@ -122,6 +124,39 @@ def test_times_of_actions_are_checked() -> None:
         action_times(np.nan, 2, rate=10.0)
 
 
+def test_a_target_that_is_refused_ends_the_chunk_at_the_last_good_one_and_the_next_call_tells_why() -> None:
+    sent: list[np.ndarray] = []
+
+    def send(q: np.ndarray, _: np.ndarray) -> None:
+        if q[6] > HOME[6] + 0.05:
+            raise CollisionForeseen("too near", parameter="q")
+        sent.append(q)
+
+    clock = RealClock()
+    began = clock.nanos()
+    stream = ActionStream(
+        path(), send, time=lambda: (clock.nanos() - began) * 1e-9, clock=clock, period=0.005, lead=0.02
+    )
+    try:
+        times = 0.1 + np.arange(20) / 20.0
+        chunk = HOME + 0.3 * (times - 0.1)[:, None] * np.eye(7)[6]
+        stream.take(times, chunk, last=(HOME, np.zeros(7)))
+        deadline = time.monotonic() + 30.0
+        while len(sent) < 3 or (sent[-1] != sent[-3]).any() or sent[-1][6] < HOME[6] + 0.02:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        count = len(sent)
+        with pytest.raises(CollisionForeseen, match="too near"):
+            stream.take(times + 60.0, chunk, last=(sent[-1], np.zeros(7)))
+        while len(sent) < count + 5:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        assert (sent[-1] == sent[count - 1]).all(), "it goes on sending, so that no watchdog stops the arm"
+        assert stream.take(times + 60.0, HOME + 0.0 * chunk, last=(sent[-1], np.zeros(7))).late == 0
+    finally:
+        stream.close()
+
+
 @pytest.fixture(scope="module")
 def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
     with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
@@ -144,7 +179,8 @@ def test_a_person_takes_over_from_a_policy_and_hands_back_and_the_recording_show
         arm.servo("joint", rate=50, speed=0.5, acceleration=0.5, watchdog=2.0) as sv,
     ):
         takeover = skills.Takeover(arm, sv, person, scale=0.1)
-        late, turn = [], "the policy's"
+        late: list[tuple[float, int]] = []
+        turn = "the policy's"
         while sv.tick() is not None and sv.t < 60.0 and np.abs(arm.state.q - goal).max() > 2e-3:
             if turn == "the policy's" and arm.state.q[6] > 0.05:
                 turn, is_held[0] = "the person's", True

@@ -359,6 +359,7 @@ class ActionStream:
         self.path, self._send, self._time, self._clock = path, send, time, clock
         self._period, self.lead = period, lead
         self._is_on = True
+        self._good: Array | None = None  # the last target that was sent
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._failure: Exception | None = None
@@ -428,9 +429,13 @@ class ActionStream:
         q, dq = self.path.at(now)
         try:
             self._send(q, dq)
-        except HeptarmError as error:  # bodies or a wall are in the way: the last good target stays
+            self._good = q
+        except HeptarmError as error:  # bodies or a wall are in the way: it rests at the last good target
             self._failure = error
-            self._is_on = False
+            if self._good is None:
+                self._is_on = False
+            else:
+                self.path.restart(now, self._good, np.zeros(7))
         except Exception as error:  # a defect must not pass unnoticed: no more targets, so the arm stops
             self._failure = error
             self._ending.set()

@@ -1065,9 +1065,10 @@ class PoseServo(TargetServo):
         """
         began = self._clock.nanos()
         check_pose(pose)
-        if self._newest is not None:  # chunks or corrections were followed until now
+        if self._actions is not None or self._is_corrected:
             self._leave_chunks()
-            self._q, self._newest, self._newest_speed = self._newest, None, _STILL
+            if self._newest is not None:  # chunks or corrections were followed until now
+                self._q, self._newest, self._newest_speed = self._newest, None, _STILL
         if not self._active:
             _ = self.start  # raises unless it has begun
             return pose
