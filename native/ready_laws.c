@@ -226,7 +226,7 @@ struct reflection_memory {
 };
 
 /* A leader feels the wrench of its follower, which comes late; the torques give back no more energy than was put in. What they
-   took is known exactly, since a torque is constant for a cycle: the torque times the way of the joints (Ryu, Preusche, Hannaford
+   took is known exactly, since a torque is constant for a cycle: the torque times the joints' movement (Ryu, Preusche, Hannaford
    and Hirzinger, "Time domain passivity control with reference energy following", 2005). The wrench is reduced to what the tank
    has left, and damping repays what a prediction missed. */
 static int reflection(const struct heptarm_state *s, struct heptarm_command *out, const struct reflection *p, struct reflection_memory *m) {

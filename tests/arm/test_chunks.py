@@ -124,7 +124,9 @@ def test_times_of_actions_are_checked() -> None:
         action_times(np.nan, 2, rate=10.0)
 
 
-def test_a_target_that_is_refused_ends_the_chunk_at_the_last_good_one_and_the_next_call_tells_why() -> None:
+def test_a_target_that_is_refused_ends_the_chunk_at_the_last_good_one_and_the_next_call_has_the_reason() -> (
+    None
+):
     sent: list[np.ndarray] = []
 
     def send(q: np.ndarray, _: np.ndarray) -> None:
@@ -135,7 +137,7 @@ def test_a_target_that_is_refused_ends_the_chunk_at_the_last_good_one_and_the_ne
     clock = RealClock()
     began = clock.nanos()
     stream = ActionStream(
-        path(), send, time=lambda: (clock.nanos() - began) * 1e-9, clock=clock, period=0.005, lead=0.02
+        path(), send, time=lambda: (clock.nanos() - began) * 1e-9, clock=clock, period=0.005, ahead=0.02
     )
     try:
         times = 0.1 + np.arange(20) / 20.0

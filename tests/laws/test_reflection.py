@@ -40,7 +40,7 @@ def press(*, passive: bool, delay: float, seconds: float = 1.2) -> tuple[np.ndar
     late = deque([plant.place[2]] * round(delay / DT), maxlen=round(delay / DT))
     surplus, heights = [], []
     for _ in range(round(seconds / DT)):
-        depth = max(0.0, wall - late[0])  # of the follower, whose way there and whose force are late
+        depth = max(0.0, wall - late[0])  # of the follower, whose movement and force both come late
         plant.trial.params.wrench = [0.0, 0.0, min(WALL * depth, 150.0), 0.0, 0.0, 0.0]
         plant.torque_step()
         late.append(plant.place[2])

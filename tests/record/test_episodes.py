@@ -165,8 +165,8 @@ def test_the_commands_list_episodes_and_make_a_data_set(
         "failure",
     ]
     assert command.convert(folder, tmp_path / "data", to="lerobot", rate=40.0) == 0
-    told = capsys.readouterr().out
-    assert told.startswith("1 episodes, ") and told.rstrip().endswith(f"in {tmp_path / 'data'}")
+    printed = capsys.readouterr().out
+    assert printed.startswith("1 episodes, ") and printed.rstrip().endswith(f"in {tmp_path / 'data'}")
     assert json.loads((tmp_path / "data/meta/info.json").read_text())["fps"] == 40
     assert command.convert(folder, tmp_path / "data", to="lerobot", label=("failure",), overwrite=True) == 0
     with pytest.raises(CommandRejected, match="there must be episodes with steps, got none"):
@@ -309,7 +309,7 @@ print(data.num_episodes, data.num_frames, tuple(data[0]["observation.images.wris
 chunk = LeRobotDataset("me/insert", root=root, episodes=[1], delta_timestamps={{"action": [0.0, 0.04]}})
 print(tuple(chunk[0]["action"].shape), sorted(data.meta.stats["action"])[:3])
 """
-    told = subprocess.run(
+    printed = subprocess.run(
         [python, "-c", program],
         check=False,
         capture_output=True,
@@ -317,7 +317,7 @@ print(tuple(chunk[0]["action"].shape), sorted(data.meta.stats["action"])[:3])
         timeout=600,
         env=os.environ | {"HF_HUB_OFFLINE": "1", "HF_DATASETS_CACHE": str(tmp_path / "cache")},
     )
-    assert told.returncode == 0, told.stderr[-3000:]
-    first, second = told.stdout.splitlines()
+    assert printed.returncode == 0, printed.stderr[-3000:]
+    first, second = printed.stdout.splitlines()
     assert first == f"3 {sum(map(len, found))} (3, 24, 32) Insert the peg"
     assert second == "(2, 8) ['count', 'max', 'mean']"

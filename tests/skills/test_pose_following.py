@@ -165,14 +165,14 @@ def test_an_arm_follows_a_second_one_that_is_pushed(arm: ha.Arm, tmp_path: Path)
     with ha.connect("sim://iiwa7", watchdog=10.0, timeout=60.0) as leader:
         leader.move(ha.ptp(HOME), speed=1.0)
         began = leader.pose()
-        with skills.LeaderArm(leader) as led:
+        with skills.LeaderArm(leader) as guided:
             leader.operator.start_push([0, 15, 0], duration=300.0)
 
             def goes_on(_: PoseInput) -> bool:
                 return leader.pose().y < began.y + 0.1
 
             skills.follow_poses(
-                arm, led, scale=0.5, while_true=goes_on, watchdog=2.0, duration=90.0, speed=1.0
+                arm, guided, scale=0.5, while_true=goes_on, watchdog=2.0, duration=90.0, speed=1.0
             )
             leader.operator.start_push([0, 0, 0], duration=0.0)
     assert 0.02 < arm.wait_for_rest().pose.y - start.y < 0.08

@@ -122,9 +122,9 @@ def teleop(
         else:
             guide = stack.enter_context(CommandTarget(text=leader).connect())
             access.ask_first(guide, f"Make the real {guide.robot.title} compliant? Somebody has to hold it.")
-            led = stack.enter_context(LeaderArm(guide, clutch=clutch, reflect=reflect))
+            guided = stack.enter_context(LeaderArm(guide, clutch=clutch, reflect=reflect))
             _tell("the leader is compliant; Ctrl-C ends", access)
-            move = lambda: follow_poses(arm, led, scale=scale, speed=speed, duration=limit)  # noqa: E731
+            move = lambda: follow_poses(arm, guided, scale=scale, speed=speed, duration=limit)  # noqa: E731
         stats = []
         if record is None:
             stats.append(_moved(move))

@@ -343,7 +343,7 @@ class ActionStream:
         time: this machine's time since the motion began [s].
         clock: its clock.
         period: time between two targets [s].
-        lead: targets are of the path so far ahead [s]: they are where the arm is to be then.
+        ahead: targets are of the path so far ahead [s]: they are where the arm is to be then.
     """
 
     def __init__(
@@ -354,10 +354,10 @@ class ActionStream:
         time: Callable[[], float],
         clock: Clock,
         period: float,
-        lead: float,
+        ahead: float,
     ) -> None:
         self.path, self._send, self._time, self._clock = path, send, time, clock
-        self._period, self.lead = period, lead
+        self._period, self.ahead = period, ahead
         self._is_on = True
         self._good: Array | None = None  # the last target that was sent
         self._lock = threading.Lock()
@@ -379,7 +379,7 @@ class ActionStream:
         """
         self.raise_failure()
         with self._lock:
-            now = self._time() + self.lead
+            now = self._time() + self.ahead
             if not self._is_on or not self._thread.is_alive():
                 self.path.restart(now, *last)
             taken = self.path.take(times, q, now=now + self._period)
@@ -390,7 +390,7 @@ class ActionStream:
         """Brake from a target with a velocity, and rest there until the next chunk, shape (7,) each [rad, rad/s]."""
         self.raise_failure()
         with self._lock:
-            self.path.restart(self._time() + self.lead, q, dq)
+            self.path.restart(self._time() + self.ahead, q, dq)
             self._go_on()
 
     def _go_on(self) -> None:
@@ -425,7 +425,7 @@ class ActionStream:
             self._ending.wait((due - self._clock.nanos()) * 1e-9)
 
     def _step(self) -> None:
-        now = self._time() + self.lead
+        now = self._time() + self.ahead
         q, dq = self.path.at(now)
         try:
             self._send(q, dq)

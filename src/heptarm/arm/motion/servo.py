@@ -937,7 +937,7 @@ class TargetServo(Servo):
                 time=lambda: self.t,
                 clock=self._clock,
                 period=self.period,
-                lead=self._message.timing.min_trajectory_time,
+                ahead=self._message.timing.min_trajectory_time,
             )
         return self._actions
 
