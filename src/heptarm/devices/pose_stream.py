@@ -201,8 +201,8 @@ def _numbers(values: object, count: int, name: str) -> list[float]:
 def pose_stream(port: int = PORT, *, host: str = "127.0.0.1", silence: float = SILENCE) -> PoseStream:
     """Receive poses by UDP from a phone, a VR controller or another program; see the guide for the datagrams.
 
-    It listens to this machine alone unless you say otherwise: any client that reaches the port moves the arm. The buttons
-    "clutch", "gripper" and "quit" have a role in `heptarm.skills.follow_poses`.
+    It listens to this machine alone unless you say otherwise, since any client that reaches the port moves the arm. The
+    buttons "clutch", "gripper" and "quit" have a role in `heptarm.skills.follow_poses`.
 
     Args:
         port: UDP port; 0: any free one.
