@@ -89,13 +89,14 @@ class HeptarmRobotConfig(RobotConfig):
 
 
 def _named(prefix: str, names: str) -> tuple[str, ...]:
-    return tuple(f"{prefix}.{name}" for name in names.split())
+    return tuple(f"{prefix}_{name}.pos" for name in names.split())
 
 
-#: Parts of an observation that a configuration may ask for: their names, and how they are read from a state.
+#: Parts of an observation that a configuration may ask for: their names, and how they are read from a state. LeRobot's
+#: rollout hands a policy what ends with .pos or .vel, and nothing else.
 _MORE: dict[str, tuple[tuple[str, ...], Any]] = {
     "velocities": (tuple(f"{joint}.vel" for joint in JOINTS), lambda state: np.nan_to_num(state.dq)),
-    "torques": (tuple(f"{joint}.torque" for joint in JOINTS), lambda state: state.tau_ext),
+    "torques": (tuple(f"{joint}_torque.pos" for joint in JOINTS), lambda state: state.tau_ext),
     "pose": (_named("tool", "x y z a b c"), lambda state: [*state.pose.xyz, *state.pose.abc]),
     "wrench": (
         _named("wrench", "fx fy fz tx ty tz"),
@@ -137,7 +138,7 @@ class HeptarmRobot(Robot):
             names.append("gripper.pos")
         for part in self.config.state:
             names += _MORE[part][0]
-        return names + [f"{body}.{axis}" for body in self.config.bodies for axis in "xyz"]
+        return names + [f"{body}_{axis}.pos" for body in self.config.bodies for axis in "xyz"]
 
     @property
     def observation_features(self) -> dict[str, Any]:
