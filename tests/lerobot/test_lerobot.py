@@ -47,7 +47,7 @@ def run(home: Path, command: str, *arguments: str) -> str:
         env=os.environ | offline,
     )
     assert done.returncode == 0, done.stderr[-4000:]
-    return done.stdout + done.stderr
+    return done.stderr + done.stdout
 
 
 def test_a_task_is_recorded_replayed_learnt_and_judged(home: Path, tmp_path: Path) -> None:
