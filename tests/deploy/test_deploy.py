@@ -12,7 +12,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.rl.deploy import DeploySettings, circle, deploy
-from heptarm.rl.deploy_peg import deploy_peg
+from heptarm.rl.deploy_contact import deploy_contact
 from heptarm.rl.film import film
 from heptarm.rl.pilot import PolicyGuard, Watch
 from heptarm.rl.policy import shipped, shipped_peg
@@ -83,14 +83,14 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
         for bad in ([2.0, 0, 0.4], [np.nan, 0, 0.4], [0.5, 0.1]):
             with pytest.raises(ha.CommandRejected):
                 deploy(arm, shipped(feature=True), [bad])
-        with pytest.raises(ha.CommandRejected, match="of the task peg-in-hole, got one of reach"):
-            deploy_peg(arm, cast("Any", shipped()), arm.pose())
+        with pytest.raises(ha.CommandRejected, match="of a task with contacts, got one of reach"):
+            deploy_contact(arm, cast("Any", shipped()), arm.pose())
         with pytest.raises(ha.CommandRejected, match="of the task reach, got one of peg-in-hole"):
             deploy(arm, cast("Any", shipped_peg()), [POINT])
-        with pytest.raises(ha.ShapeError, match="errors"):
-            deploy_peg(arm, shipped_peg(), arm.pose(), [[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])
+        with pytest.raises(ha.ShapeError, match="targets"):
+            deploy_contact(arm, shipped_peg(), arm.pose(), [[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])
         with pytest.raises(ha.CommandRejected, match="tip"):
-            deploy_peg(arm, shipped_peg(), arm.pose())
+            deploy_contact(arm, shipped_peg(), arm.pose())
         assert np.abs(arm.state.q - before).max() < 1e-4
     with pytest.raises(ha.LimitError, match="latency"):
         DeploySettings(latency=3.0)
