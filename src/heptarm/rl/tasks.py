@@ -6,12 +6,16 @@ from typing import Any, TypeAlias, TypeVar
 
 from heptarm.errors import CommandRejected
 from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.rl.contact.plug_insert import PlugInsert
+from heptarm.rl.contact.polish import Polish
+from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.task import ReachTask
 
 #: One definition of what is learned: it serves training, evaluation and an arm.
 Task: TypeAlias = ReachTask | ContactTask
-TASKS: dict[str, type[Task]] = {kind.name: kind for kind in (ReachTask, PegInHole)}
+TASKS: dict[str, type[Task]] = {kind.name: kind for kind in (ReachTask, PegInHole, Push, PickPlace, Polish, PlugInsert)}
 OfTask = TypeVar("OfTask", bound=Task)
 
 

@@ -24,8 +24,7 @@ from heptarm.values.robot import RobotModel, robot
 
 #: Largest number of a task, most decisions of an episode, and the age of the oldest frame.
 _LARGE, _MANY, _OLDEST = 1e6, 1_000_000, 1000
-#: Scales of an observation: [m, rad] and [N, Nm].
-_POSE = np.array([3e-3, 3e-3, 10e-3, 0.035, 0.035, 0.035])
+#: Scales of wrenches in an observation [N, Nm].
 _WRENCH = np.array([10.0, 10.0, 10.0, 0.2, 0.2, 0.2])
 #: Scaled wrenches are clipped to this.
 _MOST = 5.0
@@ -96,6 +95,10 @@ class ContactTask(ABC):
     axes: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4)
     #: Whether the tool is a gripper: an action has one more number, above 0 to close it.
     has_gripper: ClassVar[bool] = False
+    #: Scales of poses in an observation [m, rad].
+    scales: ClassVar[tuple[float, ...]] = (3e-3, 3e-3, 10e-3, 0.035, 0.035, 0.035)
+    #: Site of the scene that the impedance holds, in its body `tool`.
+    tip: ClassVar[str] = "tip"
     #: Numbers that `look`, `hidden` and `remember` return.
     look_size: ClassVar[int] = 0
     hidden_size: ClassVar[int] = 0
@@ -143,8 +146,8 @@ class ContactTask(ABC):
     def scene(self) -> str:
         """The scene in MuJoCo's format, in the base of the arm.
 
-        Its body `tool` is mounted on the flange; a site `tip` in it is what the impedance holds, its axes those of the
-        flange. The shipped gripper is there by `<include file="two-finger-gripper.xml"/>`.
+        Its body `tool` is mounted on the flange; the site `tip` in it is what the impedance holds, its axes those of the
+        flange. The shipped gripper, with a site `tcp`, is there by `<include file="two-finger-gripper.xml"/>`.
         """
 
     @property
@@ -240,10 +243,10 @@ class ContactTask(ABC):
 
     def frame(self, now: Moment) -> Array:
         """What a decision shows, one frame of an observation, shape (n, frame_size)."""
-        axes = np.array(self.axes)
+        axes, scales = np.array(self.axes), np.array(self.scales)
         away = now.command[..., :_NUMBERS] - now.pose
         felt = np.clip((now.wrench / _WRENCH)[..., axes], -_MOST, _MOST)
-        parts = [(now.pose / _POSE)[..., axes], (away / _POSE)[..., axes], felt, now.command[..., _NUMBERS:]]
+        parts = [(now.pose / scales)[..., axes], (away / scales)[..., axes], felt, now.command[..., _NUMBERS:]]
         return np.concatenate([*parts, self.look(now)], axis=-1)
 
     def observe(self, frames: Array) -> Array:

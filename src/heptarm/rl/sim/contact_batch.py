@@ -32,15 +32,15 @@ _ELBOW = (0.5, 2.0)
 #: Deviation of the zero of the torque sensors in an episode, in those of a single reading: what is left of an offset
 #: when the arm turns a little, and what averaging at the start has left of the noise.
 _DRIFT = 0.3
-#: Site of the tool, and of the origin of the task.
-_TIP, _ORIGIN = PREFIX + "tip", "origin"
+#: Site at the origin of the task.
+_ORIGIN = "origin"
 
 
 def build(task: ContactTask) -> Any:
     """The engine's model of a task, an `mujoco.MjModel`; its last six controls are the set-point [m, rad].
 
     Raises:
-        CommandRejected: the scene is not in MuJoCo's format, or has no body `tool` with a site `tip`.
+        CommandRejected: the scene is not in MuJoCo's format, or has no body `tool` with the site of its tip.
     """
     spec = specification(task.robot)
     for servo in list(spec.actuators):
@@ -48,9 +48,9 @@ def build(task: ContactTask) -> Any:
     for geom in spec.geoms:  # the arm itself touches nothing
         geom.contype = geom.conaffinity = 0
     attach_text(spec, task.scene(), what=f"the scene of {task.name}")
-    tip = spec.site(_TIP)
+    tip = spec.site(PREFIX + task.tip)
     if tip is None:
-        raise CommandRejected(f"the scene of {task.name} must have a body `tool` with a site `tip`")
+        raise CommandRejected(f"the scene of {task.name} must have a body `tool` with a site `{task.tip}`")
     arm = spec.body("link_0")
     for body in (arm, *arm.find_all(mujoco.mjtObj.mjOBJ_BODY)):
         body.gravcomp = 1.0
@@ -59,7 +59,7 @@ def build(task: ContactTask) -> Any:
     damp = 2.0 * _RATIO * np.sqrt(stiff * np.repeat([_MASS, _INERTIA], 3))
     for axis in range(6):
         spring = spec.add_actuator(
-            name=f"spring {axis}", trntype=mujoco.mjtTrn.mjTRN_SITE, target=_TIP, refsite=_ORIGIN
+            name=f"spring {axis}", trntype=mujoco.mjtTrn.mjTRN_SITE, target=tip.name, refsite=_ORIGIN
         )
         spring.gear = np.eye(6)[axis]
         spring.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
@@ -126,7 +126,7 @@ class BatchContact(TaskBatch):
         self._filter, self._friction = expand("actuator_dynprm"), expand("geom_friction")
         self._damping = expand("dof_damping")
         self._steels = np.flatnonzero(model.geom_priority == 0)
-        self._reach = float(model.site(_TIP).pos[2])
+        self._reach = float(model.site(PREFIX + task.tip).pos[2])
         self._first = model.qpos0.copy()
         self._mocaps = {
             model.body(body).name.removeprefix(PREFIX): int(model.body_mocapid[body])
@@ -142,8 +142,8 @@ class BatchContact(TaskBatch):
                 self._others[model.joint(joint).name.removeprefix(PREFIX)] = place
         self._gripper: Array | None = None
         if has_gripper(model):
-            index = model.actuator(PREFIX + GRIPPER).id
-            self._gripper = model.actuator_ctrlrange[index][::-1].copy()  # opens at the upper end
+            self._grip = int(model.actuator(PREFIX + GRIPPER).id)
+            self._gripper = model.actuator_ctrlrange[self._grip][::-1].copy()  # opens at the upper end
             for joint in driven_joints(model):
                 self._first[model.jnt_qposadr[joint]] = model.jnt_range[joint, 1]
         self._substeps = round(task.frequency / task.rate / _READINGS)
@@ -221,7 +221,7 @@ class BatchContact(TaskBatch):
         self._state["ctrl"][which, -6:] = given[:, :6]
         if self._gripper is not None:
             closes = given[:, 6] > 0.0 if self.task.has_gripper else np.zeros(len(given), dtype=bool)
-            self._state["ctrl"][which, 0] = np.where(closes, self._gripper[1], self._gripper[0])
+            self._state["ctrl"][which, self._grip] = np.where(closes, self._gripper[1], self._gripper[0])
 
     def observe(self, which: Index | slice = ALL) -> Array:
         """The current observations of all arms or some, shape (envs, n)."""
