@@ -262,7 +262,7 @@ def deploy(
                 value=network.task.name,
                 hint="leave them out",
             )
-        place = Insertion(at, random, seed, tip, mass, latency)
+        place = _Place(at, random, seed, tip, mass, latency)
         return _insert(network, place, out=out, overwrite=overwrite, yes=yes, target=target, as_json=as_json)
     if tip is not None or mass:
         raise CommandRejected(
@@ -295,7 +295,7 @@ def _load(file: Path | None) -> Policy[Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class Insertion:
+class _Place:
     """Where a policy with contacts is deployed, see `deploy`."""
 
     at: tuple[tuple[float, float, float], ...]
@@ -335,7 +335,7 @@ class Insertion:
 
 def _insert(
     network: Policy[Any],
-    place: Insertion,
+    place: _Place,
     *,
     out: Path | None,
     overwrite: bool,

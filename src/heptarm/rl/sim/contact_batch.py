@@ -31,7 +31,7 @@ _MASS, _INERTIA, _RATIO = 5.0, 0.2, 0.7
 _ELBOW = (0.5, 2.0)
 #: Deviation of the zero of the torque sensors in an episode, in those of a single reading: what is left of an offset
 #: when the arm turns a little, and what averaging at the start has left of the noise.
-_DRIFT = 0.3
+_DRIFT = 0.15
 #: Site at the origin of the task.
 _ORIGIN = "origin"
 
