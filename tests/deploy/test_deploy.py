@@ -187,7 +187,7 @@ def test_the_command_line_inserts_a_peg_and_records_it(tmp_path: Path) -> None:
     assert report.success.any() and report.peak_force.max() < 30.0
     assert report.facts["guard"] == {"force": 0} and report.facts["latency"] == 0.02
     recording = ha.load(out.with_suffix(".mcap"))
-    assert len(recording.state.q) > 2000
+    assert recording.complete and len(recording) > 2000
 
 
 @pytest.mark.slow

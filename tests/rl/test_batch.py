@@ -69,7 +69,9 @@ def test_late_commands_come_late() -> None:
     task = ReachTask()
     moved = []
     for late in (0, 3):
-        arms = BatchReach(task, BatchSettings(envs=1, randomisation=Randomisation(latency=(late, late)), starts="together"))
+        arms = BatchReach(
+            task, BatchSettings(envs=1, randomisation=Randomisation(latency=(late, late)), starts="together")
+        )
         begin = arms.q.copy()
         paths = []
         for _ in range(6):
@@ -83,7 +85,9 @@ def test_late_commands_come_late() -> None:
 def test_a_slow_servo_trails() -> None:
     trails = []
     for bandwidth in (5.0, 40.0):
-        arms = BatchReach(ReachTask(), BatchSettings(envs=1, randomisation=Randomisation(bandwidth=(bandwidth,) * 2)))
+        arms = BatchReach(
+            ReachTask(), BatchSettings(envs=1, randomisation=Randomisation(bandwidth=(bandwidth,) * 2))
+        )
         for _ in range(10):
             arms.step(np.ones((1, 7)))
         trails.append(float(np.abs(arms.command - arms.q).max()))
@@ -131,7 +135,9 @@ def test_the_plant_moves_alike() -> None:
     task = ReachTask()
     goals = task.targets(np.random.default_rng(4), 2)
     engines: tuple[dict[str, Any], ...] = ({}, {"engine": PlantEngine})
-    trained, plant = (BatchReach(task, BatchSettings(envs=2, starts="together", seed=4), **engine) for engine in engines)
+    trained, plant = (
+        BatchReach(task, BatchSettings(envs=2, starts="together", seed=4), **engine) for engine in engines
+    )
     assert (trained.reset(goals) == plant.reset(goals)).all()
     for index in range(45):
         action = np.full((2, 7), 0.8 if index < 20 else -0.3 if index < 30 else 0.0)
@@ -144,7 +150,9 @@ def test_the_plant_moves_alike() -> None:
 
 def test_a_plant_with_joint_impedance_and_a_weight_complies() -> None:
     compliant = Randomisation(stiffness=(300.0, 300.0), payload=(1.0, 1.0))
-    arms = BatchReach(ReachTask(), BatchSettings(envs=1, starts="together", randomisation=compliant), engine=PlantEngine)
+    arms = BatchReach(
+        ReachTask(), BatchSettings(envs=1, starts="together", randomisation=compliant), engine=PlantEngine
+    )
     for _ in range(45):
         arms.step(np.zeros((1, 7)))
     assert 0.002 < float((arms.task.tip(arms.command) - arms.task.tip(arms.q))[0, 2]) < 0.05

@@ -164,7 +164,9 @@ def test_warp_moves_the_arms_alike() -> None:
         )
         engines: tuple[dict[str, Any], ...] = ({"engine": WarpEngine}, {})
         for draw in (NONE, hard):
-            warp, batch = (BatchReach(task, BatchSettings(envs=8, randomisation=draw), **engine) for engine in engines)
+            warp, batch = (
+                BatchReach(task, BatchSettings(envs=8, randomisation=draw), **engine) for engine in engines
+            )
             random = np.random.default_rng(0)
             for index in range(40):
                 action = random.uniform(-1, 1, (8, 7))

@@ -14,10 +14,10 @@ import gymnasium
 
 import heptarm.rl
 from heptarm.errors import CommandRejected, NotReady, ShapeError
-from heptarm.rl.evaluate import evaluate
-from heptarm.rl.film import film
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.task import Moment
+from heptarm.rl.evaluate import evaluate
+from heptarm.rl.film import film
 from heptarm.rl.policy import SHIPPED, shipped_peg
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.sim.contact_batch import BatchContact
@@ -62,7 +62,9 @@ def test_who_pushes_straight_down_stays_on_the_rim_and_feels_it() -> None:
 def test_the_same_seed_gives_the_same_run_with_any_threads_and_after_a_load() -> None:
     task = PegInHole(steps=12)
     random = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
-    one, other = (BatchContact(task, BatchSettings(envs=5, randomisation=random, seed=2, threads=n)) for n in (1, 2))
+    one, other = (
+        BatchContact(task, BatchSettings(envs=5, randomisation=random, seed=2, threads=n)) for n in (1, 2)
+    )
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 5, 5))
     for action in actions[:10]:
         assert (one.step(action).observation == other.step(action).observation).all()

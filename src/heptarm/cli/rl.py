@@ -25,10 +25,10 @@ from heptarm.cli.options import (
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, require
 from heptarm.rl import deploy as deployment
-from heptarm.rl.deploy import DeploySettings, circle
-from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.task import ContactTask
+from heptarm.rl.deploy import DeploySettings, circle
+from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.policy import Policy, shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
@@ -64,7 +64,9 @@ AnyPolicy = Annotated[
 
 
 def train(
-    task: Annotated[str, Parameter(help="What is learned: reach, or a task with contacts such as peg-in-hole.")] = "reach",
+    task: Annotated[
+        str, Parameter(help="What is learned: reach, or a task with contacts such as peg-in-hole.")
+    ] = "reach",
     /,
     *,
     out: Annotated[Path | None, Parameter(help="File of the policy, .npz. Default: TASK.npz.")] = None,
@@ -250,8 +252,8 @@ def deploy(
 ) -> int:
     """Let a policy control an arm with a servo motion; needs no torch.
 
-    A policy with contacts inserts as often as --random says where the hole is presumed wrongly, on a virtual cabinet
-    with the scene peg-in-hole; or once where each --at says. A recording is written in any case.
+    A policy with contacts inserts --random times, the hole presumed wrongly each time, on a virtual cabinet with the
+    scene peg-in-hole; or once at each --at. A recording is written in any case.
     """
     network = _load(policy)
     if isinstance(network.task, ContactTask):
@@ -321,7 +323,11 @@ class _Place:
             with arm.tool(held):
                 quat = arm.pose().quat
                 origins = [Pose.of(place, quat) for place in self.at]
-                yield "tool", origins, np.zeros((len(origins), len(task.targets(np.random.default_rng(0), 1)[0])))
+                yield (
+                    "tool",
+                    origins,
+                    np.zeros((len(origins), len(task.targets(np.random.default_rng(0), 1)[0]))),
+                )
             return
         if not isinstance(task, PegInHole):
             raise CommandRejected(
@@ -344,7 +350,7 @@ def _insert(
     as_json: bool,
 ) -> int:
     """Deploy a policy with contacts, and record it."""
-    out = out or Path(f"{network.task.name}-{datetime.now():%Y%m%d-%H%M%S}")  # noqa: DTZ005  of this machine
+    out = out or Path(f"{network.task.name}-{datetime.now():%Y%m%d-%H%M%S}")
     recording = refuse_existing(out.with_suffix(".mcap"), overwrite=overwrite, name="out")
     _refuse_reports(out, overwrite=overwrite, film=False)
     with target.connect() as arm:
@@ -364,7 +370,9 @@ def _insert(
                 network,
                 origins,
                 targets,
-                settings=ContactSettings(frame=frame, latency=place.latency, stale=2.0 if arm.is_virtual else 0.25),
+                settings=ContactSettings(
+                    frame=frame, latency=place.latency, stale=2.0 if arm.is_virtual else 0.25
+                ),
                 progress=show,
             )
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)

@@ -1,9 +1,9 @@
-"""Deployment of a policy of a task with contacts on a virtual or real arm, with observations and set-points of training.
+"""Deployment of a policy of a task with contacts on an arm, with the observations and set-points of training.
 
 The policy decides at the task's rate; between two decisions the set-point of the Cartesian impedance moves in small
-steps over a servo motion. All times are of the robot's clock, so that a simulator may run at any speed. The task's leash
-and box bound the forces, and the largest force of the impedance, which the cabinet keeps. Nothing here needs torch or
-MuJoCo.
+steps over a servo motion. All times are of the robot's clock, so that a simulator may run at any speed. The task's
+leash and box bound the forces, and the largest force of the impedance, which the cabinet keeps. Nothing here needs
+torch or MuJoCo.
 """
 
 from __future__ import annotations
@@ -189,9 +189,7 @@ def _check(
     if task.has_gripper and gripper is None:
         raise CommandRejected(f"gripper must be given: the task {task.name} uses it", parameter="gripper")
     if task.look_size and bodies is None:
-        raise CommandRejected(
-            f"bodies must be given: the task {task.name} looks at them", parameter="bodies"
-        )
+        raise CommandRejected(f"bodies must be given: the task {task.name} looks at them", parameter="bodies")
     fastest = task.step * task.rate * np.sqrt(3.0)
     if fastest > settings.speed:
         raise LimitError(
@@ -273,7 +271,9 @@ class _Run:
         poses, joints, forces, missing, late = [pose], [state.q], [], [], 0
         for step in range(task.steps):
             last = now.command
-            command = task.advance(last, pose, self._policy(task.observe(np.array(frames))).astype(np.float64))
+            command = task.advance(
+                last, pose, self._policy(task.observe(np.array(frames))).astype(np.float64)
+            )
             wrenches = []
             for part in range(1, _FINE + 1):
                 waiting.append(last + (command - last) * part / _FINE)

@@ -1,4 +1,4 @@
-"""Tasks as Gymnasium environments: one arm by `make("heptarm/PegInHole-v0")`, many at once in one process by `make_vec`."""
+"""Tasks as Gymnasium environments: one arm by `make("heptarm/Push-v0")`, many at once in one process by `make_vec`."""
 
 from __future__ import annotations
 
@@ -110,7 +110,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
         seen = self._arms.reset(goals, seed=own)
         self._open = True
         tip, left = self._arms.outcome()
-        return _seen(seen[0], self._space), self._info(tip[0], float(left[0]), self._arms.target[0].copy(), 0.0)
+        return _seen(seen[0], self._space), self._info(
+            tip[0], float(left[0]), self._arms.target[0].copy(), 0.0
+        )
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One decision.

@@ -15,7 +15,9 @@ from heptarm.rl.task import ReachTask
 
 #: One definition of what is learned: it serves training, evaluation and an arm.
 Task: TypeAlias = ReachTask | ContactTask
-TASKS: dict[str, type[Task]] = {kind.name: kind for kind in (ReachTask, PegInHole, Push, PickPlace, Polish, PlugInsert)}
+TASKS: dict[str, type[Task]] = {
+    kind.name: kind for kind in (ReachTask, PegInHole, Push, PickPlace, Polish, PlugInsert)
+}
 OfTask = TypeVar("OfTask", bound=Task)
 
 

@@ -1,8 +1,8 @@
-"""What insertions share: a part on the flange, and a hole whose place is known to a few millimetres and degrees.
+"""The base of insertions: a part on the flange, and a hole whose place is known to a few millimetres and degrees.
 
 * **Reset.** The tip is some millimetres above the place where the hole should be; the hole itself is drawn around it.
-* **Observation.** A part that is pressed onto the rim is supported on one side: the moment shows where the hole is, which
-  is why no spiral is needed.
+* **Observation.** A part that is pressed onto the rim is supported on one side: the moment shows where the hole is,
+  which is why no spiral is needed.
 * **Action.** Steps along x, y, z and turns about x and y.
 * **Reward.** Privileged: the true hole is known to the simulator alone.
 """

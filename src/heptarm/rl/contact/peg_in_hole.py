@@ -1,7 +1,7 @@
 """The peg-in-hole task: put a round peg into a hole, see `heptarm.rl.contact.insertion`.
 
-The scene has the dimensions of the shipped scene `peg-in-hole`: a peg of 20 mm, a hole wider by `clearance`. A round peg
-needs no turn about its own axis. It is there when it is `depth` deep in the hole at the end, within `radius`.
+The scene has the dimensions of the shipped scene `peg-in-hole`: a peg of 20 mm, a hole wider by `clearance`. A round
+peg needs no turn about its own axis. It is there when it is `depth` deep in the hole at the end, within `radius`.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ class PickPlace(ContactTask):
     has_gripper: ClassVar[bool] = True
     look_size: ClassVar[int] = 6
     has_teacher: ClassVar[bool] = True
-    tip: ClassVar[str] = "tcp"
+    site: ClassVar[str] = "tcp"
     scales: ClassVar[tuple[float, ...]] = (0.05, 0.05, 0.05, 0.1, 0.1, 0.1)
     origin: ClassVar[Pose] = Pose.of((0.6, 0.0, 0.2), (0.0, 1.0, 0.0, 0.0))
     friction: ClassVar[tuple[float, float]] = (0.3, 0.6)
@@ -122,7 +122,9 @@ class PickPlace(ContactTask):
         away = np.linalg.norm(cube - now.pose[..., :3], axis=-1)
         is_there = left <= self.radius
         result: Array = (
-            -0.5 * np.minimum(left / _SCALE, 2.0) - 0.2 * np.where(is_there, 0.0, np.minimum(away / _SCALE, 2.0)) + 0.5 * is_there
+            -0.5 * np.minimum(left / _SCALE, 2.0)
+            - 0.2 * np.where(is_there, 0.0, np.minimum(away / _SCALE, 2.0))
+            + 0.5 * is_there
         )
         return result
 

@@ -118,7 +118,8 @@ class Polish(ContactTask):
         part = np.floor((now.pose[..., 1] / self.length + 0.5) * _CELLS)
         counts = (np.abs(now.pose[..., 0]) < _ON) & (self._error(now) < _CLOSE)
         passed = (np.arange(_CELLS) == part[..., None]) & counts[..., None]
-        return np.maximum(now.memory, passed)
+        result: Array = np.maximum(now.memory, passed)
+        return result
 
     def missing(self, now: Moment) -> Array:
         """Length of the path that was not passed with the wanted force."""
@@ -129,7 +130,10 @@ class Polish(ContactTask):
         """The wanted force, on the path, much of it done."""
         aside = np.abs(now.pose[..., 0]) / _ON
         result: Array = (
-            now.memory.mean(axis=-1) - 0.3 * np.minimum(self._error(now), 2.0) - 0.1 * np.minimum(aside, 2.0) - 0.5
+            now.memory.mean(axis=-1)
+            - 0.3 * np.minimum(self._error(now), 2.0)
+            - 0.1 * np.minimum(aside, 2.0)
+            - 0.5
         )
         return result
 
@@ -140,7 +144,9 @@ class Polish(ContactTask):
         surface = height + about_x * y - about_y * x
         touches = now.pose[..., 2] > surface - 1e-3
         goal = np.zeros((*x.shape, 6))
-        goal[..., 1] = np.where(self._error(now) < _CLOSE, now.command[..., 1] + 1.5 * self.step, now.command[..., 1])
+        goal[..., 1] = np.where(
+            self._error(now) < _CLOSE, now.command[..., 1] + 1.5 * self.step, now.command[..., 1]
+        )
         more = (wanted - self._force(now)) / self.stiffness
         goal[..., 2] = np.where(touches, now.command[..., 2] + more, surface + 1e-3)
         return self.steer(now, goal)

@@ -122,31 +122,35 @@ class Push(ContactTask):
         behind, _ = self._behind(now)
         away = np.linalg.norm(behind - now.pose[..., :2], axis=-1)
         result: Array = (
-            -0.5 * np.minimum(left / _SCALE, 2.0) - 0.1 * np.minimum(away / _SCALE, 2.0) + 0.5 * (left <= self.radius)
+            -0.5 * np.minimum(left / _SCALE, 2.0)
+            - 0.1 * np.minimum(away / _SCALE, 2.0)
+            + 0.5 * (left <= self.radius)
         )
         return result
 
     def teach(self, now: Moment) -> Array:
         """Go round the puck to behind it, then push it along the line to the goal."""
         puck, goal, rod = now.bodies["puck"][..., :2], now.target[..., 2:4], now.pose[..., :2]
-        behind, way = self._behind(now)
-        aside = np.stack([-way[..., 1], way[..., 0]], axis=-1)
+        behind, ahead = self._behind(now)
+        aside = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
         off = ((rod - puck) * aside).sum(axis=-1, keepdims=True)
-        along = ((rod - puck) * way).sum(axis=-1, keepdims=True)
+        along = ((rod - puck) * ahead).sum(axis=-1, keepdims=True)
         is_behind = (along < 0.0) & (np.abs(off) < _BEHIND)
         is_beside = (along > -_PUCK - _ROD) & ~is_behind
         side = np.where(off >= 0.0, 1.0, -1.0) * (_PUCK + _ROD + _GAP)
         around = np.where(np.abs(off) < _PUCK + _ROD, rod + (side - off) * aside, behind + side * aside)
         left = np.linalg.norm(goal - puck, axis=-1, keepdims=True)
-        push = puck - (_PUCK + _ROD) * way - 1.5 * off * aside + np.minimum(left, 0.02) * way
+        push = puck - (_PUCK + _ROD) * ahead - 1.5 * off * aside + np.minimum(left, 0.02) * ahead
         goal_of_rod = np.where(is_behind, push, np.where(is_beside, around, behind))
         is_there = left < 0.3 * self.radius
-        wanted = np.concatenate([np.where(is_there, rod - 0.01 * way, goal_of_rod), now.pose[..., 2:]], axis=-1)
+        wanted = np.concatenate(
+            [np.where(is_there, rod - 0.01 * ahead, goal_of_rod), now.pose[..., 2:]], axis=-1
+        )
         return self.steer(now, wanted)
 
     def _behind(self, now: Moment) -> tuple[Array, Array]:
         """Where the rod begins to push, and the direction to the goal; shape (n, 2) each."""
         puck, goal = now.bodies["puck"][..., :2], now.target[..., 2:4]
-        way = goal - puck
-        way = way / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-6)
-        return puck - (_PUCK + _ROD + _GAP) * way, way
+        ahead = goal - puck
+        ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-6)
+        return puck - (_PUCK + _ROD + _GAP) * ahead, ahead

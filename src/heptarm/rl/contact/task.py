@@ -1,4 +1,4 @@
-"""What tasks with contacts share: observation, action and safety of an arm under a Cartesian impedance.
+"""The base of tasks with contacts: observation, action and safety of an arm under a Cartesian impedance.
 
 A policy moves the set-point of the impedance in steps. The set-point stays within a leash of the measured pose, so that
 the spring presses no harder than leash times stiffness, and within a box. An observation shows, of some of the last
@@ -98,7 +98,7 @@ class ContactTask(ABC):
     #: Scales of poses in an observation [m, rad].
     scales: ClassVar[tuple[float, ...]] = (3e-3, 3e-3, 10e-3, 0.035, 0.035, 0.035)
     #: Site of the scene that the impedance holds, in its body `tool`.
-    tip: ClassVar[str] = "tip"
+    site: ClassVar[str] = "tip"
     #: Numbers that `look`, `hidden` and `remember` return.
     look_size: ClassVar[int] = 0
     hidden_size: ClassVar[int] = 0
@@ -146,8 +146,8 @@ class ContactTask(ABC):
     def scene(self) -> str:
         """The scene in MuJoCo's format, in the base of the arm.
 
-        Its body `tool` is mounted on the flange; the site `tip` in it is what the impedance holds, its axes those of the
-        flange. The shipped gripper, with a site `tcp`, is there by `<include file="two-finger-gripper.xml"/>`.
+        Its body `tool` is mounted on the flange; the site `tip` in it is what the impedance holds, its axes those of
+        the flange. The shipped gripper, with a site `tcp`, is there by `<include file="two-finger-gripper.xml"/>`.
         """
 
     @property
@@ -189,7 +189,7 @@ class ContactTask(ABC):
     def look(self, now: Moment) -> Array:
         """What an observation shows besides pose, set-point and wrench, shape (n, look_size), about -1 to 1.
 
-        It may use what an arm knows, so of the target what it is told.
+        It may use what an arm knows, so of the target what it knows.
         """
         return np.zeros((*now.pose.shape[:-1], 0))
 
@@ -246,7 +246,12 @@ class ContactTask(ABC):
         axes, scales = np.array(self.axes), np.array(self.scales)
         away = now.command[..., :_NUMBERS] - now.pose
         felt = np.clip((now.wrench / _WRENCH)[..., axes], -_MOST, _MOST)
-        parts = [(now.pose / scales)[..., axes], (away / scales)[..., axes], felt, now.command[..., _NUMBERS:]]
+        parts = [
+            (now.pose / scales)[..., axes],
+            (away / scales)[..., axes],
+            felt,
+            now.command[..., _NUMBERS:],
+        ]
         return np.concatenate([*parts, self.look(now)], axis=-1)
 
     def observe(self, frames: Array) -> Array:
@@ -293,7 +298,9 @@ class ContactTask(ABC):
         """
         axes = np.array(self.axes)
         steps = np.repeat([self.step, self.turn], 3)
-        result: Array = np.clip(((goal - now.command[..., :_NUMBERS]) / (ahead * steps))[..., axes], -1.0, 1.0)
+        result: Array = np.clip(
+            ((goal - now.command[..., :_NUMBERS]) / (ahead * steps))[..., axes], -1.0, 1.0
+        )
         return result
 
     # ------------------------------------------------------------------------------ in files

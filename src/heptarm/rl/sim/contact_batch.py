@@ -1,8 +1,8 @@
 """Many simulated arms in a task with contacts: full dynamics, a Cartesian impedance inside the engine, contacts.
 
-The impedance is six MuJoCo actuators between two sites, the tip of the tool and the origin of the task: their lengths are
-the pose, their controls the set-point, so that no law runs in Python between two decisions. The weight of arm and tool
-counts as compensated.
+The impedance is six MuJoCo actuators between two sites, the tip of the tool and the origin of the task: their lengths
+are the pose, their controls the set-point, so that no law runs in Python between two decisions. The weight of arm and
+tool counts as compensated.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ def build(task: ContactTask) -> Any:
     for geom in spec.geoms:  # the arm itself touches nothing
         geom.contype = geom.conaffinity = 0
     attach_text(spec, task.scene(), what=f"the scene of {task.name}")
-    tip = spec.site(PREFIX + task.tip)
+    tip = spec.site(PREFIX + task.site)
     if tip is None:
-        raise CommandRejected(f"the scene of {task.name} must have a body `tool` with a site `{task.tip}`")
+        raise CommandRejected(f"the scene of {task.name} must have a body `tool` with a site `{task.site}`")
     arm = spec.body("link_0")
     for body in (arm, *arm.find_all(mujoco.mjtObj.mjOBJ_BODY)):
         body.gravcomp = 1.0
@@ -126,7 +126,7 @@ class BatchContact(TaskBatch):
         self._filter, self._friction = expand("actuator_dynprm"), expand("geom_friction")
         self._damping = expand("dof_damping")
         self._steels = np.flatnonzero(model.geom_priority == 0)
-        self._reach = float(model.site(PREFIX + task.tip).pos[2])
+        self._reach = float(model.site(PREFIX + task.site).pos[2])
         self._first = model.qpos0.copy()
         self._mocaps = {
             model.body(body).name.removeprefix(PREFIX): int(model.body_mocapid[body])
@@ -192,7 +192,7 @@ class BatchContact(TaskBatch):
         count, task, random, state = len(which), self.task, self._random, self._state
         self.pose[which], self._memory[which] = starts, 0.0
         self._filter[which, -6:, 0] = 1.0 / self.randomisation.draw_bandwidth(random, count)[:, None]
-        self._friction[np.ix_(which, self._steels, [0])] = random.uniform(*task.friction, (count, 1, 1))
+        self._friction[which[:, None], self._steels, 0] = random.uniform(*task.friction, (count, 1))
         self._damping[which, :7] = _ELBOW[1] + self._stuck * random.uniform(0.0, 1.0, (count, 1))
         self._gain[which] = random.uniform(1.0 - GAIN, 1.0 + GAIN, (count, 7))
         self._zero[which] = _DRIFT * self._single * random.standard_normal((count, 7))
@@ -226,9 +226,7 @@ class BatchContact(TaskBatch):
     def observe(self, which: Index | slice = ALL) -> Array:
         """The current observations of all arms or some, shape (envs, n)."""
         seen = self.task.observe(self._frames[:, which])
-        return (
-            np.concatenate([seen, self.task.hidden(self.moment(which))], axis=-1) if self._reveal else seen
-        )
+        return np.concatenate([seen, self.task.hidden(self.moment(which))], axis=-1) if self._reveal else seen
 
     def teach(self) -> Array:
         """What one who knows everything would do, shape (envs, actions)."""
