@@ -138,6 +138,9 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "CollisionModel.add": {"name": "post", "shape": heptarm.shapes.sphere(0.1), "at": POSE},
     "CollisionModel.add_points": {"cloud": [[0.5, 0.0, 0.5]]},
     "CollisionModel.remove": {"body": "cube"},
+    "CollisionModel.set_color": {"body": "cube", "color": (0.9, 0.2, 0.1)},
+    "CollisionModel.color": {"body": "cube"},
+    "CollisionModel.of": {"outline": heptarm.CollisionModel("iiwa14").outline()},
     "CollisionModel.become": {"other": heptarm.CollisionModel("iiwa14", scene="table")},
     "CollisionModel.allowing": {"pairs": (("cube", "table"),)},
     "Mesh": {

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from heptarm.io.plan_box import PlanBox, PlanOutline
+from heptarm.io.panel_box import PanelBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import HEPTARM, objects, refused, run, sim
 from tests.conftest import RunningCabinet
@@ -162,7 +162,7 @@ def test_dry_run_moves_nothing(target: str) -> None:
 @contextmanager
 def open_panel() -> Iterator[list[PlanOutline]]:
     """The plans that an open panel takes meanwhile."""
-    panel, taken, ended = PlanBox(["iiwa14"]), list[PlanOutline](), threading.Event()
+    panel, taken, ended = PanelBox(["iiwa14"]), list[PlanOutline](), threading.Event()
 
     def take() -> None:
         is_last = False

@@ -347,6 +347,24 @@ def test_axes_that_moved_and_rest_in_the_next_step_end_nothing() -> None:
     assert AxisLimits(robot).fraction(np.array([-2.4e-5, 0, 0, 0, 5e-6, 1.4e-5, -1.8e-5]), np.zeros(7)) == 1.0
 
 
+@pytest.mark.parametrize("bend", [-300.0, -150.0, 0.0, 150.0, 400.0])
+@pytest.mark.parametrize("needed", [0.5, 1.01, 1.25, 3.0])
+def test_a_step_of_time_is_corrected_until_each_axis_can_follow(needed: float, bend: float) -> None:
+    """Where the line bends, three corrections left A5 1.002 times its acceleration."""
+    robot = Plant("iiwa14", q=tuple(np.radians(HOME).tolist())).robot
+    here, before = np.radians(HOME), 0.3 * robot.dq_max * TICK
+    most = robot.ddq_max * TICK**2
+    speed = (before + needed * most) / TICK / (1.0 + bend * TICK)
+
+    def at(step: float) -> np.ndarray:
+        return np.asarray(here + speed * step * (1.0 + bend * step))
+
+    step, there = AxisLimits(robot).followable(at, here, before, TICK)
+    assert (np.abs(there - here - before) <= most).all() and (there == at(step)).all()
+    if needed < 1.0 and bend == 0.0:
+        assert step == TICK
+
+
 @pytest.mark.parametrize("surplus", [0.9, 0.99, 1.005, 1.015, 1.019])
 def test_where_a_profile_rests_next_to_a_singularity_each_axis_can_stop_within_a_tick(surplus: float) -> None:
     """An axis that turns 30 rad per second of the line stopped with 2.4 times its acceleration."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from heptarm.errors import CommandRejected
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.panel.process import RATE, PanelOptions, open_server
 from heptarm.record.recording import Recording, load
 from heptarm.values.checks import Array

@@ -226,7 +226,7 @@ class RecordingFile:
         image, calibration = self._camera
         for channel, data in (
             (self._frames, encode_transforms(at, [(head, pose.quat.tolist())])),
-            (calibration, encode_calibration(at, frame, camera.size, camera.matrix)),
+            (calibration, encode_calibration(at, frame, camera.size, camera.matrix, camera.distortion)),
             (image, encode_image(at, frame, picture.data)),
         ):
             self._out.add_message(channel, received, data, at, number)

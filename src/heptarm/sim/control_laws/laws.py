@@ -87,11 +87,13 @@ class Superposition:
         q: set-point of the next tick, shape (7,) [rad].
         tau: additional torques, shape (7,) [Nm]; None: none.
         wrench: additional force and torque of the arm at the flange, base axes, shape (6,) [N, Nm]; None: none.
+        is_missing: the client owes its load: position control brakes the arm where it is, and holds it.
     """
 
     q: Array
     tau: Array | None = None
     wrench: Array | None = None
+    is_missing: bool = False
 
 
 class FlangeMotion(Protocol):

@@ -657,9 +657,11 @@ class Interpolator:
         is_hold = isinstance(run.plan.motion, Hold)
         if self.action is not None and is_hold and not (run.cancelled or run.failure):
             run.phase = "overlaid"
-            self._command.after = self.action.q
+            self._command.after = self._held(run) if self.action.is_missing else self._overlaid(run, self.action)
             return 0.0, nan
         if run.phase == "overlaid":
+            if not self._control.is_stiff:  # the spring that torques have wound would throw the arm
+                self._take_over()
             self._halt(run)
             return self._follow(run)
         run.time += self.step
@@ -667,6 +669,20 @@ class Interpolator:
             run.settle()
             self._reach(run, 1.0)
         return min(1.0, run.time / run.plan.duration), run.plan.duration - run.time
+
+    def _overlaid(self, run: RunningMotion, action: Superposition) -> Array:
+        """The set-point of an overlay, under the control mode of its hold."""
+        if run.follower is not None:
+            run.follower, command = None, run.command
+            self._control.take(command.mode, tcp=command.tcp, axes=command.axes)
+        return action.q
+
+    def _held(self, run: RunningMotion) -> Array:
+        """The set-point of an overlay whose load is missing: the spring that it has wound would throw the arm."""
+        if run.follower is None:
+            self._take_over()
+            run.follower = self._braking_axes(FAST_JERK)
+        return run.follower.advance(TICK)
 
     # ------------------------------------------------------------------------------------------------ to the end
 
@@ -723,7 +739,10 @@ class Interpolator:
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
         if is_apart or self._command.beyond(run.halt(here, speed, hardest)) is not None:
-            run.brake_by(braking_axes(self._robot, here, speed, jerk=jerk))
+            run.brake_by(self._braking_axes(jerk))
+
+    def _braking_axes(self, jerk: float) -> SmartFollower:
+        return braking_axes(self._robot, self._command.after, self._command.speed, jerk=jerk)
 
     def _cancel(self, cancellation: Cancellation) -> None:
         """Execute a cancellation."""
@@ -838,10 +857,14 @@ class Interpolator:
 
     def _stop_at_limit(self, run: RunningMotion, text: str) -> None:
         """A limit of the control mode is exceeded: switch to position control and brake from the measured velocity."""
-        self._control.stiffen()
-        self._command.continue_from(self._q, self._dq)
+        self._take_over()
         run.settling = 0
         self._fail(run, text)
+
+    def _take_over(self) -> None:
+        """Switch to position control where the arm is, as fast as it is."""
+        self._control.stiffen()
+        self._command.continue_from(self._q, self._dq)
 
 
 def _clipped(s: float) -> float:

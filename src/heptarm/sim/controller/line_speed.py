@@ -41,6 +41,8 @@ _ROUNDING, _AT_REST = 1.02, 1e-6
 #: Ticks of a slowed trajectory that are checked before it is followed: until the next target, usually.
 _CHECKED = 12
 _TINY = 1e-12
+#: How often a step in time is corrected for the axes at most, and the largest part of a correction that is left to do.
+_CORRECTIONS, _LEFT = 8, 0.8
 #: Margin of the fraction of a step, for the noise of the inverse kinematics.
 _EXACT = 1e-4
 
@@ -142,6 +144,31 @@ class AxisLimits:
         speeds = np.diff(np.array(q), axis=0) / TICK
         changes = np.diff(np.vstack([speed, speeds]), axis=0) / TICK
         return bool((np.abs(changes) <= self._hardest).all() and (np.abs(speeds) <= self._fastest).all())
+
+    def followable(
+        self, at: Callable[[float], Array], here: Array, before: Array, dt: float
+    ) -> tuple[float, Array]:
+        """The step of time nearest to another one with which no axis changes its speed too much, and its set-point.
+
+        A profile was found from samples: between two of them an axis may need a few per cent more.
+
+        Args:
+            at: the set-point after a step of time [s], shape (7,) [rad].
+            here: the set-point now, likewise.
+            before: the step of the set-points that led here, likewise.
+            dt: the step of time that is asked for [s].
+        """
+        step, there, last = dt, at(dt), 1.0
+        for _ in range(_CORRECTIONS if dt > 0.0 else 0):
+            fraction = self.fraction(before, there - here)
+            if fraction == 1.0:
+                break
+            # the speed changes with the step, so that a correction leaves a part of itself, and the next ones of that
+            left = (fraction - 1.0) / (last - 1.0) if last != 1.0 else 0.0
+            last = fraction
+            step *= 1.0 + (fraction - 1.0) / (1.0 - min(max(0.0, left), _LEFT))
+            there = at(step)
+        return step, there
 
     def fraction(self, before: Array, step: Array) -> float:
         """The fraction of a set-point's step nearest to 1 with which no axis changes its speed too much.

@@ -234,8 +234,6 @@ _SLOW = 0.05
 #: A target that no trajectory leads to yet is tried again after this time [s]; and these are the times of a trajectory
 #: after which the axes try to be at rest [s].
 _AGAIN, _STOPS = 0.01, (0.02, 0.05, 0.1, 0.2)
-#: How often a step in time is corrected for the axes at most.
-_CORRECTIONS = 3
 #: An acceleration whose square is at most this times speed and jerk ends before the speed does.
 _SOONER = 1.9
 #: A velocity or acceleration perpendicular to the line that is smaller than this [m/s, rad/s, ...] is rounding.
@@ -358,9 +356,11 @@ class StraightFollower:
         if trajectory is None:
             self.resting += dt
         else:
-            step = self._followable(trajectory, dt)
+            elapsed = self._elapsed
+            step, self._q = self._axes.followable(
+                lambda step: self._set_point(trajectory, elapsed + step), before, self._step, dt
+            )
             self._elapsed += step
-            self._q = self._set_point(trajectory, self._elapsed)
             trajectory.otg.time = trajectory.profile.at(self._elapsed)[0]
             self.resting = 0.0 if self._goal is not None else max(0.0, trajectory.otg.over)
             if dt > 0.0:
@@ -374,22 +374,6 @@ class StraightFollower:
             self.aim(self._goal)
         self._step = self._q - before
         return self._q
-
-    def _followable(self, trajectory: _Trajectory, dt: float) -> float:
-        """The step of time nearest to another one [s] with which no axis changes its speed too much.
-
-        The profile was found from samples: between two of them an axis may need a few per cent more.
-        """
-        step, later = dt, self._set_point(trajectory, self._elapsed + dt)
-        for _ in range(_CORRECTIONS):
-            if dt <= 0.0:
-                break
-            nearest = self._axes.fraction(self._step, later - self._q)
-            if nearest == 1.0:
-                break
-            step *= nearest
-            later = self._set_point(trajectory, self._elapsed + step)
-        return step
 
     def brake(self, *, scale: float, rate: float) -> None:
         """Come to rest along the line; ends when `is_still`.

@@ -357,7 +357,7 @@ class Controller:
         self._rate(now)
         if self.overlay is not None:
             self._advance_overlay(reading, now)
-        self.superposition = self._superpose()
+        self.superposition = self._superpose(reading)
         due = self._ticks % self.configuration.period_ms == 0
         self._ticks += 1
         return self._message(reading, now) if due else None
@@ -408,13 +408,17 @@ class Controller:
         self._tau = self._wrench = None
         self._go(m.SessionState.COMMANDING_ACTIVE)
 
-    def _superpose(self) -> Superposition | None:
-        if self.state is not m.SessionState.COMMANDING_ACTIVE or self._set_point is None:
+    def _superpose(self, reading: Reading) -> Superposition | None:
+        set_point = self._set_point
+        if self.state is not m.SessionState.COMMANDING_ACTIVE or set_point is None:
             return None
-        q = self._set_point.tick()
-        if self._set_point.age > max(COAST, 2 * self.configuration.receive_ms):
-            self._tau = self._wrench = None  # a load without new commands would push forever
-        return Superposition(q, self._tau, self._wrench)
+        q = set_point.tick()
+        if self._tau is None and self._wrench is None:
+            return Superposition(q)
+        if set_point.age <= max(COAST, 2 * self.configuration.receive_ms):
+            return Superposition(q, self._tau, self._wrench)
+        set_point.stay(np.array(reading.q_cmd))  # the load would push forever
+        return Superposition(q, is_missing=True)
 
     def _end(self, cause: str, text: str) -> None:
         if self.overlay is None:

@@ -45,16 +45,17 @@ class CommandInterpolator:
         self._speed = np.zeros(7)  # [rad/tick], as all speeds here
         self._time = 0  # ticks so far
         self._arrival = -ticks - self._coast  # of the last command
+        self._late = 0  # how late that was
         self._knots = deque([_Knot(0, start, np.zeros(7))])  # the one followed, and later ones
         self._has_begun = False
         self._window = deque([start] * ticks, maxlen=ticks)  # of the reference
         self._before = start  # the reference of the last tick
-        self._is_broken = False
+        self._is_broken = self._stays = False
 
     @property
     def age(self) -> int:
-        """Ticks since the last command."""
-        return self._time - self._arrival
+        """Ticks since the last command was due, at the latest."""
+        return self._time - self._arrival + self._late
 
     def command(self, q: Array, *, after: int, late: int = 0) -> None:
         """Take a command.
@@ -64,11 +65,16 @@ class CommandInterpolator:
             after: ticks of the client's time since the command before.
             late: ticks since the message that it answers, beyond the one in which an answer is due.
         """
-        self._arrival = self._time
+        self._arrival, self._late = self._time, late
         last, due = self._knots[-1], self._time - late + self._ticks
         before = last.due if self._has_begun else due - after
-        self._has_begun, self._is_broken = True, self._is_broken or before < self._time
+        self._is_broken = self._is_broken or self._stays or before < self._time
+        self._has_begun, self._stays = True, False
         self._knots.append(_Knot(max(due, before + 1), q, (q - last.q) / after))
+
+    def stay(self, q: Array) -> None:
+        """Be at a position, shape (7,) [rad], until the next command; from there it returns to the commands."""
+        self.q, self._speed, self._stays = q, np.zeros(7), True
 
     def tick(self) -> Array:
         """The set-point of the next tick, shape (7,) [rad]."""
@@ -80,7 +86,7 @@ class CommandInterpolator:
         knot = self._knots[0]
         over = self._time - knot.due
         self._is_broken = self._is_broken or over > 0
-        if over > self._coast:
+        if self._stays or over > self._coast:
             self._window.extend([self.q] * self._ticks)
             self._before = self.q
             step = self._bounded(np.zeros(7))
