@@ -101,7 +101,7 @@ def test_a_task_goes_through_a_file() -> None:
     assert task_from_dict(task.as_dict()) == task
     for kind in TASKS.values():
         assert task_from_dict(kind().as_dict()) == kind()
-    with pytest.raises(CommandRejected, match="task must be one of reach, peg-in-hole, got 'juggle'"):
+    with pytest.raises(CommandRejected, match="task must be one of reach, peg-in-hole, .*got 'juggle'"):
         task_from_dict({"name": "juggle"})
     with pytest.raises(CommandRejected, match="unknown entries of the task: colour"):
         task_from_dict({"name": "peg-in-hole", "colour": 1})

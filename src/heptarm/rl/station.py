@@ -28,7 +28,7 @@ _BEFORE, _SPEED, _NEAR = deg(0, 25, 0, -90, 0, 65, 0), 0.5, 0.1
 def held_peg(arm: Arm) -> Iterator[Pose]:
     """Take the peg out of its holder; it is in the gripper and attached while the `with` block runs.
 
-    The block gets the pose of the hole: origin in the middle of the rim, z into it. The frame of the peg's end is "tip".
+    The block gets the pose of the hole: origin in the middle of the rim, z into it. The peg's end is the frame "tip".
 
     Args:
         arm: of a virtual cabinet with the scene `peg-in-hole`.

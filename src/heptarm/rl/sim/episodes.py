@@ -19,6 +19,7 @@ from heptarm.values.checks import Array, instance, integer, word
 Index: TypeAlias = npt.NDArray[np.integer[Any]]
 #: Most arms, and threads.
 _MANY = 1_000_000
+_LARGEST_SEED = 2**63 - 1
 #: Selects every arm without a copy.
 ALL = slice(None)
 
@@ -75,6 +76,8 @@ class BatchSettings:
         instance(self.randomisation, Randomisation, "randomisation")
         for name in ("envs", "threads"):
             integer(getattr(self, name), name, 1, _MANY)
+        if not isinstance(self.seed, np.random.SeedSequence):
+            integer(self.seed, "seed", 0, _LARGEST_SEED)
         word(self.starts, "starts", ("staggered", "together"))
 
 
