@@ -25,17 +25,17 @@ from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import TASKS, environment, task_named
 
 CONTACT = [name for name, kind in TASKS.items() if issubclass(kind, ContactTask)]
-THREE = BatchSettings(envs=3, starts="together", seed=3, threads=1)
+TWO = BatchSettings(envs=2, starts="together", seed=3, threads=1)
 
 
 @pytest.mark.parametrize("name", CONTACT)
 def test_who_knows_everything_succeeds_and_who_does_nothing_does_not(name: str) -> None:
     task = task_named(name)
     assert isinstance(task, ContactTask)
-    arms = BatchContact(task, THREE)
+    arms = BatchContact(task, TWO)
     _, left = arms.outcome()
     assert left.min() > 2.0 * task.radius
-    force = np.zeros(3)
+    force = np.zeros(2)
     for _ in range(task.steps - 1):
         step = arms.step(arms.teach())
         force = np.maximum(force, step.force)
@@ -67,19 +67,19 @@ def test_gymnasium_and_stable_baselines_find_nothing_to_complain_of(kind: type) 
 
 def test_a_batch_goes_on_after_a_load_as_if_nothing_had_been() -> None:
     task = PickPlace(steps=20)
-    arms = BatchContact(task, THREE)
+    arms = BatchContact(task, TWO)
     for _ in range(5):
         arms.step(arms.teach())
-    other = BatchContact(task, BatchSettings(envs=3, seed=9, threads=2))
+    other = BatchContact(task, BatchSettings(envs=2, seed=9, threads=2))
     other.load(arms.save())
-    action = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 4))
+    action = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 4))
     for _ in range(10):
         assert (arms.step(action).observation == other.step(action).observation).all()
 
 
 def test_bodies_are_seen_where_they_are_placed() -> None:
     task = Push()
-    arms = BatchContact(task, THREE)
+    arms = BatchContact(task, TWO)
     assert arms.bodies()["puck"][:, :2] == pytest.approx(arms.target[:, :2])
     turned = np.array([[0.01, 0.02, -0.1, 0.3, -0.2, 0.5]])
     assert arms._seen_from_origin(arms._in_base(turned)) == pytest.approx(turned)
@@ -116,9 +116,9 @@ def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
             return "<mujoco><worldbody/></mujoco>"
 
     with pytest.raises(CommandRejected, match="the scene of broken cannot be read"):
-        simulate(Broken(), THREE)
+        simulate(Broken(), TWO)
     with pytest.raises(CommandRejected, match="a body `tool` with a site `tip`"):
-        simulate(Handless(), THREE)
+        simulate(Handless(), TWO)
     with pytest.raises(CommandRejected, match="no teacher"):
         ContactTask.teach(Push(), Moment(*(np.zeros(6),) * 4))
 
