@@ -201,4 +201,10 @@ def test_a_force_above_the_guard_ends_the_episode_at_rest() -> None:
         beside = hole.shifted(y=0.02, frame="tool")
         report = deploy_contact(arm, policy, policy.task.presumed(beside, error), [error], settings=gentle)
         assert report.facts["guard"] == {"force": 1} and not report.success.any()
+        broken = shipped_peg()
+        broken.layers[-1] = (broken.layers[-1][0], np.full(5, np.nan, dtype=np.float32))
+        with pytest.raises(ha.CommandRejected, match="an action of the policy must be finite"):
+            deploy_contact(
+                arm, broken, policy.task.presumed(hole, error), [error], settings=ContactSettings(stale=2.0)
+            )
         arm.wait_for_rest()

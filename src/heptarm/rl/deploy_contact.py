@@ -124,7 +124,8 @@ def deploy_contact(
         The report; forces are those of the arm's own estimate. Its facts have the interventions of the guard.
 
     Raises:
-        CommandRejected: a policy of another task, no such frame, or bodies or a gripper that the task needs and lacks.
+        CommandRejected: a policy of another task, no such frame, or bodies or a gripper that the task needs and lacks;
+            an action that is not finite, upon which the arm stops.
         LimitError: a robot that is not the task's, or a set-point that could be faster than the guard allows.
         ShapeError: targets of another shape, or not finite.
         StaleState: no more states arrived; the arm was stopped.
@@ -271,9 +272,7 @@ class _Run:
         poses, joints, forces, missing, late = [pose], [state.q], [], [], 0
         for step in range(task.steps):
             last = now.command
-            command = task.advance(
-                last, pose, self._policy(task.observe(np.array(frames))).astype(np.float64)
-            )
+            command = task.advance(last, pose, self._action(np.array(frames)))
             wrenches = []
             for part in range(1, _FINE + 1):
                 waiting.append(last + (command - last) * part / _FINE)
@@ -306,6 +305,21 @@ class _Run:
             late,
             ended="early" if left else "",
         )
+
+    def _action(self, frames: Array) -> Array:
+        """What the policy decides.
+
+        Raises:
+            CommandRejected: that is not finite; the arm stops.
+        """
+        action = np.asarray(self._policy(self._task.observe(frames)), dtype=np.float64)
+        if not np.isfinite(action).all():
+            raise CommandRejected(
+                f"an action of the policy must be finite, got {action.tolist()}",
+                parameter="policy",
+                hint="train it again, or evaluate it with `heptarm rl eval`",
+            )
+        return action
 
     def _moment(self, origin: Pose, pose: Array, command: Array, wrench: Array, target: Array) -> Moment:
         seen = {} if self._bodies is None else self._bodies()
