@@ -147,6 +147,24 @@ def test_its_ppo_learns_on_the_same_simulator() -> None:
     assert evaluate(policy, 50, task=task).mean < 0.5 * before
 
 
+# ---------------------------------------------------------------------------------- RSL-RL
+
+
+def test_rsl_rl_gets_tensors_of_all_arms() -> None:
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    pytest.importorskip("tensordict", reason="tensordict is not installed")
+    from heptarm.rl.sim.rsl_env import RslArms
+
+    env = RslArms(BatchReach(ReachTask(steps=3), BatchSettings(envs=4, starts="together")))
+    assert env.get_observations()["policy"].shape == (4, 17)
+    for index in range(3):
+        seen, reward, done, extras = env.step(torch.zeros(4, env.num_actions))
+        assert seen["policy"].shape == (4, 17) and reward.shape == done.shape == (4,)
+        assert bool(done.all()) == bool(extras["time_outs"].all()) == (index == 2)
+    env.episode_length_buf = torch.full((4,), 2)
+    assert env.step(torch.zeros(4, env.num_actions))[2].all()
+
+
 # ---------------------------------------------------------------------------------- MuJoCo Warp
 
 
