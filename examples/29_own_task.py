@@ -1,6 +1,6 @@
 """A task of your own, in one file: press with 8 N on a plate whose height is known to 5 mm, and hold it.
 
-28_own_task.py [STEPS [POLICY.npz]]     trains for so many environment steps; 0 by default: only its teacher is tried
+29_own_task.py [STEPS [POLICY.npz]]     trains for so many environment steps; 0 by default: only its teacher is tried
 """
 
 import sys
