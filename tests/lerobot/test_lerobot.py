@@ -105,7 +105,7 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         *("--num_workers=0", "--wandb.enable=false", f"--output_dir={trained}"),
     )
     policy = f"--policy.path={trained / 'checkpoints' / 'last' / 'pretrained_model'}"
-    told = run(
+    said = run(
         home,
         "lerobot-rollout",
         *ROBOT,
@@ -115,7 +115,7 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         "--duration=3",
         "--task=put it",
     )
-    assert "Duration limit reached" in told
+    assert "Duration limit reached" in said
     judged = tmp_path / "judged"
     run(
         home,
@@ -157,5 +157,5 @@ with robot:
         print(error)
     assert robot.send_action({**here, "joint_1.pos": 9.0})["joint_1.pos"] == robot.arm.robot.q_max[0]
 """
-    told = run(home, "python", "-c", program)
-    assert "speed must be in (0, 1], got 0" in told and "is not connected" in told and "finite" in told
+    said = run(home, "python", "-c", program)
+    assert "speed must be in (0, 1], got 0" in said and "is not connected" in said and "finite" in said
