@@ -318,7 +318,8 @@ struct pose_limits {
 struct fri_seam {
     word *header, *states, *commands, *events, *trouble, *offered, *outputs, *reply;
     word history;
-    word version, sock, remote, parent, busy_poll;
+    word version, sock, remote, parent;
+    double busy_poll;
     struct joint_limits joint_limits;
     struct pose_limits pose_limits;
     double lowest[7], highest[7], fastest[7];

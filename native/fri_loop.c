@@ -76,7 +76,7 @@ word fri_echo(int sock, word turns, word *took) {
    then asks for it again and again: no waking of the thread adds to the latency. It sleeps again if the message is late. */
 static ssize_t next_message(struct fri_loop *l, struct sockaddr_in *from, word *received) {
     int sock = (int)l->seam->sock;
-    word polls = l->seam->busy_poll, due = l->session.received + l->session.period;
+    word polls = (word)(1e9 * l->seam->busy_poll), due = l->session.received + l->session.period;
     if (polls && l->session.period) {
         word asleep = due - polls - clock_now(CLOCK_MONOTONIC);
         struct pollfd waiting = {.fd = sock, .events = POLLIN};

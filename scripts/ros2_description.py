@@ -8,11 +8,11 @@ ROS 1 has the same files by links; only views differ in the names of their plugi
 from __future__ import annotations
 
 import sys
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 
+from heptarm.export.tree import FLANGE, TreeBody, tree_of
 from heptarm.values.checks import Array
 from heptarm.values.robot import FLANGE_RADIUS, FLANGES, ROBOTS, RobotModel
 
@@ -23,20 +23,9 @@ MESHES = "ros2/heptarm_description/meshes"
 
 
 def _list(values: Array) -> str:
-    return "[" + ", ".join(f"{value:.9g}" for value in np.asarray(values).ravel()) + "]"
-
-
-def _base(robot: RobotModel) -> tuple[str, Array, Array]:
-    """Mass [kg], centre of mass [m] and inertia xx xy xz yy yz zz [kg m²] of the base, as the simulator has them."""
-    path = ROOT / "src/heptarm/sim/models" / f"{_shape(robot)}.xml"
-    inertial = ET.parse(path).getroot().find(".//body[@name='link_0']/inertial")
-    assert inertial is not None
-    xx, yy, zz, xy, xz, yz = map(float, inertial.get("fullinertia", "").split())
-    return (
-        inertial.get("mass", ""),
-        np.fromstring(inertial.get("pos", ""), sep=" "),
-        np.array([xx, xy, xz, yy, yz, zz]),
-    )
+    # what MuJoCo has computed is rounded to where the numbers of the model end
+    numbers = np.round(np.asarray(values).ravel(), 15) + 0.0
+    return "[" + ", ".join(f"{value:.9g}" for value in numbers) + "]"
 
 
 def _shape(robot: RobotModel) -> str:
@@ -51,55 +40,58 @@ def _mesh(robot: RobotModel, index: int) -> str:
 
 
 def model(robot: RobotModel) -> str:
-    """Kinematics, limits and inertias of a robot as YAML; angles in rad, lengths in m."""
-    links = robot.links
+    """Kinematics, limits and inertias of a robot as YAML, from the tree that `heptarm export` writes; rad, m."""
+    bodies = {body.name: body for body in tree_of(robot, tool=None, scene="")}
+    arm = [bodies[f"link_{index}"] for index in range(8)]
+    ends = [*(body.pose.xyz for body in arm[2:]), bodies[FLANGE].pose.xyz]
     lines = [
         f"# {robot.title}; written by scripts/ros2_description.py",
         f"title: {robot.title}",
         "joints:",
     ]
-    axes = ("0 0 1", "0 1 0", "0 0 1", "0 -1 0", "0 0 1", "0 1 0", "0 0 1")
-    for i in range(7):
-        following = links.origin[i + 1] if i < 6 else links.flange
-        inertia = links.inertia[i]
+    for index, (body, following) in enumerate(zip(arm[1:], ends, strict=True), 1):
+        joint = body.joint
+        assert joint is not None
         lines += [
-            f"  - name: A{i + 1}",
-            f"    origin: {_list(links.origin[i])}",
-            f"    axis: {axes[i]}",
-            f"    lower: {robot.q_min[i]:.9g}",
-            f"    upper: {robot.q_max[i]:.9g}",
-            f"    velocity: {robot.dq_max[i]:.9g}",
-            f"    effort: {robot.tau_max[i]:.9g}",
-            f"    mass: {links.mass[i]:.9g}",
-            f"    com: {_list(links.com[i])}",
-            f"    inertia: {_list(inertia[np.triu_indices(3)])}",
+            f"  - name: {joint.name}",
+            f"    origin: {_list(body.pose.xyz)}",
+            f"    axis: {' '.join(f'{part:g}' for part in joint.axis)}",
+            f"    lower: {joint.low:.9g}",
+            f"    upper: {joint.high:.9g}",
+            f"    velocity: {joint.speed:.9g}",
+            f"    effort: {joint.effort:.9g}",
+            f"    damping: {joint.damping:.9g}",
+            f"    friction: {joint.friction:.9g}",
+            *_inertial(body, "    "),
             f"    next: {_list(following)}",
-            f"    radius: {RADIUS[i + 1]:g}",
-            f"    mesh: {_mesh(robot, i + 1)}",
+            f"    radius: {RADIUS[index]:g}",
+            f"    mesh: {_mesh(robot, index)}",
         ]
-    mass, com, inertia = _base(robot)
     lines += [
         "base:",
-        f"  mass: {mass}",
-        f"  com: {_list(com)}",
-        f"  inertia: {_list(inertia)}",
-        f"  height: {links.origin[0][2]:.9g}",
+        *_inertial(arm[0], "  "),
+        f"  height: {arm[1].pose.z:.9g}",
         f"  radius: {RADIUS[0]:g}",
         f"  mesh: {_mesh(robot, 0)}",
         "flanges:",
     ]
     for flange in FLANGES.values():
-        links = robot.with_flange(flange).links
+        of_flange = {body.name: body for body in tree_of(robot.with_flange(flange), tool=None, scene="")}
         lines += [
             f"  {flange.name}:",
             f"    height: {flange.height:g}",
             f"    around: {FLANGE_RADIUS:g}",
-            f"    mass: {links.mass[6]:.9g}",
-            f"    com: {_list(links.com[6])}",
-            f"    inertia: {_list(links.inertia[6][np.triu_indices(3)])}",
-            f"    next: {_list(links.flange)}",
+            *_inertial(of_flange["link_7"], "    "),
+            f"    next: {_list(of_flange[FLANGE].pose.xyz)}",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _inertial(body: TreeBody, indent: str) -> list[str]:
+    """Mass, centre of mass, and inertia xx xy xz yy yz zz of a body."""
+    inertia = body.inertia[np.triu_indices(3)]
+    rows = (f"mass: {body.mass:.9g}", f"com: {_list(body.com)}", f"inertia: {_list(inertia)}")
+    return [indent + row for row in rows]
 
 
 def limits(robot: RobotModel) -> str:

@@ -28,6 +28,7 @@ from heptarm.do import notify
 from heptarm.fri import SessionState
 from heptarm.modes import CartesianImpedance, Position
 from heptarm.planning import find_path
+from heptarm.record.demonstration import Demonstrations
 from heptarm.values.robot import robot
 from heptarm.values.state import State
 from heptarm.when import force
@@ -104,6 +105,9 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Trajectory.load": {"path": "no such file"},
     "load": {"path": "no such file"},
     "replay_in_sim": {"recording": "no such file"},
+    "load_episodes": {"folder": "no such folder", "labels": ("success",)},
+    "save_lerobot": {"episodes": Demonstrations(Path("no such folder"), ()), "folder": "no such folder"},
+    "Arm.episodes": {"folder": "no such folder", "cameras": (), "streams": None, "reset": None},
     "export_model": {"path": "no such format"},
     "record_client": {"path": "no folder of mine/run.mcap"},
     "Recording.__getitem__": {"name": "q"},
@@ -138,6 +142,9 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "CollisionModel.add": {"name": "post", "shape": heptarm.shapes.sphere(0.1), "at": POSE},
     "CollisionModel.add_points": {"cloud": [[0.5, 0.0, 0.5]]},
     "CollisionModel.remove": {"body": "cube"},
+    "CollisionModel.set_color": {"body": "cube", "color": (0.9, 0.2, 0.1)},
+    "CollisionModel.color": {"body": "cube"},
+    "CollisionModel.of": {"outline": heptarm.CollisionModel("iiwa14").outline()},
     "CollisionModel.become": {"other": heptarm.CollisionModel("iiwa14", scene="table")},
     "CollisionModel.allowing": {"pairs": (("cube", "table"),)},
     "Mesh": {
@@ -198,6 +205,7 @@ _OPEN = "NaN keeps the default"
 _FREE = "infinite: no limit"
 #: Values with a documented meaning that their type does not show: function or parameter, the bad value, the meaning.
 ACCEPTED: dict[tuple[str, str], str] = {
+    **{(f"PartialPose.{name}", "nan"): "keeps this coordinate" for name in "xyzabc"},
     **{("Dynamics", bad): _OPEN for bad in ("nan", "nan array")},
     ("PoseLimits", "inf"): _FREE,
     **{
@@ -262,7 +270,11 @@ REPORTS = (
         "Collision",
         "CompiledLaw",
         "Contact",
+        "Demonstration",
+        "Demonstrations",
         "Detour",
+        "Episode",
+        "EpisodeSet",
         "Deviation",
         "FollowedPath",
         "ForeseenCollision",
@@ -285,6 +297,7 @@ REPORTS = (
         "Recording",
         "RepeatedMotion",
         "StatesOfArms",
+        "TakenChunk",
         "TouchOnPath",
         "Twin",
         "TwistServo",

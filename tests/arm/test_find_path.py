@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -223,12 +224,19 @@ def test_what_is_not_in_the_way_changes_nothing(
 
 
 def test_an_arm_without_a_way_rests_before_what_came(
-    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None
+    arm: ha.Arm, wall: ha.CollisionModel, full_speed: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = arm.find_path(RIGHT, avoid=wall, timeout=60.0)
+    searched: list[Any] = []
+
+    def find_path(*given: Any, **words: Any) -> ha.Path:
+        searched.append(words["start"])
+        return planning.find_path(*given, **words)
+
+    monkeypatch.setattr("heptarm.arm.motion.foresight.find_path", find_path)
     with pytest.raises(ha.NoPath, match="goal is in collision.* ball") as error:
         arm.follow(path, on_progress=Newcomer(arm, wall, on_path(path, 1.0)))
-    assert error.value.reason == "goal"
+    assert error.value.reason == "goal" and len(searched) == 1
     state = arm.wait_for_rest(timeout=30.0)
     assert np.abs(state.q - RIGHT).max() > 0.1 and wall.touching(state.q) == ()
 

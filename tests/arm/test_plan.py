@@ -11,7 +11,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import do, model, modes
-from heptarm.io.plan_box import PlanBox
+from heptarm.io.panel_box import PanelBox
 from heptarm.values.checks import Array
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose, deg
@@ -282,7 +282,7 @@ def test_it_is_shown_in_an_open_panel_or_in_the_browser(
     preview = arm.plan(PROGRAMS["blended"])
     page = preview.show()
     assert page is not None and "Plotly.newPlot" in page.read_text() and opened == [page.as_uri()]
-    box = PlanBox(["iiwa14"])
+    box = PanelBox(["iiwa14"])
     box.take()
     assert preview.show() is None and len(opened) == 1
     found = box.take()

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from heptarm import calibration, model
 from heptarm.calibration.load_estimate import consistent, load_regressor
-from heptarm.calibration.load_motion import _postures
+from heptarm.calibration.load_motion import _postures, moving_samples
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.sim.plant.sensor_errors import TORQUE_NOISE, SensorErrors
+from heptarm.model.dynamics import inverse_dynamics_rows
+from heptarm.sim.plant.sensor_errors import POSITION_NOISE, TORQUE_NOISE, SensorErrors
 from heptarm.values.checks import Array
+from heptarm.values.motion.ptp import Ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import Body, robot
 from heptarm.values.tool import Tool
-from tests.long import longer
+from tests.long import few, longer
 
 IIWA = robot("iiwa14")
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
@@ -25,6 +30,10 @@ LOAD = Body(
 #: A load whose inertia matters: 3 kg, 30 cm long.
 LONG_LOAD = Body(
     3.0, np.array([0.0, 0.01, 0.12]), inertia=np.array([0.03, 0.028, 0.006, 0.001, -0.002, 0.001])
+)
+#: 4 kg, 60 cm long.
+LONG_TOOL = Body(
+    4.0, np.array([0.0, 0.02, 0.22]), inertia=np.array([0.1212, 0.1208, 0.002033, 0.0, 0.001, -0.002])
 )
 STILL = np.zeros(7)
 #: States of which each rest is the mean.
@@ -50,6 +59,33 @@ def in_motion(
         random = np.random.default_rng(len(q) + seed)
         shown = true + errors._gain * true + errors._offset + noise * random.standard_normal(noise.shape)
     return calibration.LoadSamples(q, shown, np.array(expected) - shown, noise, dq, ddq)
+
+
+def moving(
+    seed: int | None, load: Body, declared: Body | None = None, excitation: str = "full"
+) -> calibration.LoadSamples:
+    """What the sensors of a seed show in the motions of a plan, at 500 Hz; quintic ones instead of PTP."""
+    plan = calibration.LoadPlan(IIWA, excitation, RESTS, 0.5, 1.0, 0.0, STILL[:3], STILL[:3])
+    goals = [HOME, *(np.asarray(motion.q) for motion in plan.motions if isinstance(motion, Ptp))]
+    legs = []
+    for before, after in pairwise(goals):
+        far = np.abs(after - before)
+        by = max(float((1.875 * far / (plan.speed * IIWA.dq_max)).max()), math.sqrt(0.577 * far.max()))
+        x = np.arange(0.0, 1.0, 1.0 / (500.0 * by))[:, None]
+        shapes = (x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x))
+        legs.append(np.hstack([(after - before) * shape / by**order for order, shape in enumerate(shapes)]))
+        legs[-1][:, :7] += before
+    q, dq, ddq = np.split(np.concatenate(legs), 3, axis=1)
+    true, expected = (inverse_dynamics_rows(IIWA, q, dq, ddq, load=body) for body in (load, declared))
+    shown = true
+    if seed is not None:
+        errors, random = SensorErrors(IIWA, seed), np.random.default_rng(seed)
+        noise = TORQUE_NOISE * IIWA.tau_max * random.standard_normal(q.shape)
+        shown = true + errors._gain * true + errors._offset + noise
+        q = q + POSITION_NOISE * random.standard_normal(q.shape)
+    times = np.arange(len(q)) / 500.0
+    recorded = calibration.ArmSamples(times, q, q, shown, expected - shown, shown)
+    return moving_samples(recorded, IIWA, declared=declared)
 
 
 def swings(count: int) -> tuple[Array, Array, Array]:
@@ -120,6 +156,40 @@ def test_inertia_from_a_motion() -> None:
         assert np.allclose(found.inertia[:3], LONG_LOAD.inertia[:3], rtol=0.15)
         Body(found.mass, found.com, inertia=found.inertia)  # a body has it
     assert (inside >= 0.9 * runs).all(), inside
+
+
+@pytest.mark.parametrize(
+    ("excitation", "load", "declared"),
+    few([("short", LONG_LOAD, None), ("full", LONG_TOOL, Body(3.0, np.array([0.0, 0.0, 0.2])))], 1),
+)
+def test_inertia_from_recorded_motions(excitation: str, load: Body, declared: Body | None) -> None:
+    runs, off = longer(1, 50), []
+    for seed in range(runs):
+        samples = at_rest(seed, load, declared).joined(moving(seed, load, declared, excitation))
+        found = calibration.estimate_load(samples, robot=IIWA, declared=declared)
+        off.append((found.inertia - load.inertia) / found.sigma_inertia)
+        assert found.matters == (True, True, True) and "does not matter" not in str(found)
+        assert np.allclose(found.inertia[:3], load.inertia[:3], rtol=0.15)
+    assert np.abs(off).max() < 4.0
+    assert runs == 1 or (np.abs(off) <= 2.0).mean() >= 0.9
+
+
+def test_an_inertia_that_no_motion_shows_does_not_matter() -> None:
+    small = Body(1.0, np.array([0.0, 0.0, 0.05]), inertia=np.array([0.003, 0.0028, 0.001, 0.0, 0.0, 0.0]))
+    found = calibration.estimate_load(
+        at_rest(None, small).joined(moving(None, small, None, "short")), robot=IIWA
+    )
+    assert found.matters == (True, True, False)
+    assert "zz does not matter: no motion of the arm shows less than 0.002" in str(found)
+    assert abs(found.inertia[2] - 0.001) < 3.0 * found.sigma_inertia[2]
+
+
+def test_motions_too_slow_for_an_inertia_are_refused() -> None:
+    times = np.arange(2000) / 500.0
+    q = HOME + 0.1 * np.sin(times)[:, None] * np.ones(7)
+    slow = calibration.ArmSamples(times, q, q, q, q, q)
+    with pytest.raises(CommandRejected, match=r"no axis accelerates by 0\.5 rad/s"):
+        moving_samples(slow, IIWA, declared=None)
 
 
 def test_an_impossible_inertia_becomes_one_that_a_body_can_have() -> None:

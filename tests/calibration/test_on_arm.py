@@ -94,6 +94,29 @@ def test_verify_load_warns_and_refuses(arm: ha.Arm, caplog: pytest.LogCaptureFix
     assert "a compliant arm sinks under a load that it does not know" in caplog.text
 
 
+def test_a_motion_that_would_sink_far_is_refused_and_a_contact_is_not(arm: ha.Arm) -> None:
+    compliant, refused = (
+        modes.JointImpedance(500.0),
+        r"the load data leave .* at most 8\.0% are allowed before",
+    )
+    arm.operator.start_push((0.0, 0.0, -50.0), duration=60.0)  # as five more kilograms
+    arm.wait_until(lambda state: LoadCheck.of(arm.robot, state.q, state.tau_ext).weight > 0.1)
+    for begin in (
+        lambda: arm.move(ha.hold(0.05), mode=compliant),
+        lambda: arm.start([ha.hold(0.05), ha.hold(0.05)], mode=compliant),
+        lambda: arm.servo("joint", mode=compliant),
+        lambda: arm.fri("torque", mode=compliant),
+    ):
+        with pytest.raises(ha.NotReady, match=refused):
+            begin()
+    assert isinstance(arm.state.mode, modes.Position)
+    arm.operator.start_push((0.0, 0.0, 70.0), duration=60.0)  # it leans on a table
+    arm.wait_until(lambda state: state.wrench.force[2] > 40.0)
+    arm.move(ha.hold(0.05), mode=modes.JointImpedance(1000.0))
+    arm.operator.start_push((0.0, 0.0, 0.0), duration=0.0)
+    arm.move(ha.ptp(HOME))
+
+
 def test_the_tip_from_confirmed_poses(arm: ha.Arm) -> None:
     home = ha.Pose.from_matrix(model.forward(arm.robot, HOME))
     turns = [home.rotated(*ha.deg(*abc)) for abc in ((0, 30, 0), (25, -30, 0), (-25, 0, 30), (0, 0, -30))]

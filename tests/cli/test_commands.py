@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from heptarm.io.plan_box import PlanBox, PlanOutline
+from heptarm.io.panel_box import PanelBox, PlanOutline
 from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import HEPTARM, objects, refused, run, sim
 from tests.conftest import RunningCabinet
@@ -162,7 +162,7 @@ def test_dry_run_moves_nothing(target: str) -> None:
 @contextmanager
 def open_panel() -> Iterator[list[PlanOutline]]:
     """The plans that an open panel takes meanwhile."""
-    panel, taken, ended = PlanBox(["iiwa14"]), list[PlanOutline](), threading.Event()
+    panel, taken, ended = PanelBox(["iiwa14"]), list[PlanOutline](), threading.Event()
 
     def take() -> None:
         is_last = False
@@ -242,6 +242,9 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
             ("goal is in collision",),
         ),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
+        (("move", "lin-rel", "--x", "0.01", "--speed", "50"), ("did you mean 0.5?",)),
+        (("move", "ptp", "0", "90", "0", "-90", "0", "60", "0"), ("did you mean them in degrees? --deg",)),
+        (("move", "lin", "0.5", "0", "0.4", "180", "0", "180"), ("did you mean them in degrees? --deg",)),
     ],
 )
 def test_refusals_are_one_sentence_and_exit_code_1(

@@ -16,7 +16,7 @@ def read_usd(path: str) -> dict[str, Any]:
 
     stage = Usd.Stage.Open(path)
     cache = UsdGeom.XformCache()
-    found: dict[str, Any] = {"poses": {}, "masses": {}, "joints": {}}
+    found: dict[str, Any] = {"poses": {}, "masses": {}, "joints": {}, "resistance": {}}
     for one in stage.Traverse():
         if one.IsA(UsdGeom.Xform):
             matrix = cache.GetLocalToWorldTransform(one)
@@ -29,6 +29,11 @@ def read_usd(path: str) -> dict[str, Any]:
                 joint.GetLowerLimitAttr().Get(),
                 joint.GetUpperLimitAttr().Get(),
             ]
+            drive = UsdPhysics.DriveAPI(one, "angular").GetDampingAttr()
+            of_physx = [
+                one.GetAttribute(f"physxJoint:{name}").Get() for name in ("jointFriction", "armature")
+            ]
+            found["resistance"][one.GetName()] = [drive.Get(), *of_physx]
     return found
 
 

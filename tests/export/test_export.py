@@ -192,6 +192,10 @@ def test_usd_core_and_yourdfpy_read_it(tmp_path: Path) -> None:
         assert np.abs(np.array(read["usd"]["poses"][name]) - pose).max() < NEAR, name
     # single precision, by the schema
     assert read["usd"]["masses"]["gripper"] == pytest.approx(TOOL.mass, rel=1e-6)
+    arm = compiled(MODEL)
+    assert list(read["usd"]["resistance"]["joint_A3"]) == pytest.approx(
+        [np.radians(arm.dof_damping[2]), arm.dof_frictionloss[2], arm.dof_armature[2]], rel=1e-6
+    )
     limits = np.radians([read["usd"]["joints"][f"joint_A{index}"] for index in range(1, 8)])
     assert limits[:, 1] == pytest.approx(robot(MODEL).q_max, rel=1e-6)
 
@@ -210,7 +214,7 @@ def test_a_scene_with_a_gripper(model: str, tmp_path: Path) -> None:
 
 def test_friction_and_rotors_that_were_identified(tmp_path: Path) -> None:
     """What the file of a fitted arm knows is in the joints; another robot's is refused."""
-    for suffix in ("xml", "urdf", "sdf"):
+    for suffix in ("xml", "urdf", "sdf", "usda"):
         ha.export_model(tmp_path / f"arm.{suffix}", robot=MODEL, fitted=HIDDEN)
     found = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
     dofs = [int(found.joint(f"A{axis + 1}").dofadr[0]) for axis in range(7)]
@@ -225,6 +229,14 @@ def test_friction_and_rotors_that_were_identified(tmp_path: Path) -> None:
         )
     frictions = [float(one.text or "nan") for one in ET.parse(tmp_path / "arm.sdf").iter("friction")]
     assert frictions == pytest.approx(HIDDEN["coulomb"].value.tolist(), abs=NEAR)
+    text = (tmp_path / "arm.usda").read_text()
+    for attribute, name, per in (
+        ("drive:angular:physics:damping", "viscous", np.pi / 180.0),
+        ("physxJoint:jointFriction", "coulomb", 1.0),
+        ("physxJoint:armature", "rotor", 1.0),
+    ):
+        values = [float(one) for one in re.findall(rf"float {attribute} = ([-+.e\d]+)", text)]
+        assert values == pytest.approx((per * HIDDEN[name].value).tolist(), abs=NEAR), attribute
     with pytest.raises(ha.CommandRejected, match="fitted must be an arm of the iiwa7, got one of the iiwa14"):
         ha.export_model(tmp_path / "other.urdf", robot="iiwa7", fitted=HIDDEN)
 

@@ -589,6 +589,65 @@ def test_a_page_of_two_arms_draws_both_and_its_stop_stops_both(model: PanelArm) 
         panel.close()
 
 
+def test_a_page_draws_the_world_of_a_program_and_plans_around_it(
+    model: PanelArm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("viser")
+    from heptarm.panel.process import Panel
+
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    arm = PanelArm(model.arm, halt=lambda: None)
+    panel = Panel([arm], PanelOptions(port=0))
+    page = panel._pages[0]
+
+    def drawn(*names: str) -> bool:
+        panel.draw(0)
+        return set(page._bodies._bodies) == set(names)
+
+    try:
+        panel.draw(0)
+        world = ha.CollisionModel("iiwa14", scene="table")
+        ball = ha.shapes.sphere(0.1)
+        world.add("ball", ball, at=Pose.at(0.5, 0.4, 0.4), color=(1.0, 0.2, 0.0, 0.5))
+        world.add_points([[0.6, -0.5, 0.5]], radius=0.02)
+        assert world.show()
+        until(lambda: drawn("ball", "points"))
+        frame, mesh, label = page._bodies._bodies["ball"][1]
+        assert tuple(frame.position) == (0.5, 0.4, 0.4) and label.text == "ball"
+        assert tuple(mesh.color) == (255, 51, 0) and mesh.opacity == 0.5
+        assert np.ptp(mesh.vertices, axis=0) == pytest.approx([0.2] * 3, abs=2e-3)
+        assert "block" in page._world.places, "the scene of the program is drawn, too"
+
+        # a change of place moves what is drawn; the free bodies of the scene are where the program has them
+        world.place("block", Pose.at(0.4, 0.5, 0.3))
+        world.place("ball", Pose.at(0.55, 0.3, 0.5))
+        until(lambda: drawn("ball", "points") and tuple(frame.position) == (0.55, 0.3, 0.5))
+        assert page._bodies._bodies["ball"][1][1] is mesh
+        assert page._world.places["block"].distance_to(Pose.at(0.4, 0.5, 0.3)) < 1e-9
+
+        # what the arm holds moves with it; what is in the way is planned around
+        world.hold("block", Pose.at(0.0, 0.0, 0.1))
+        held = Pose.from_matrix(forward(model.arm.robot, model.arm.state.q)) @ Pose.at(0.0, 0.0, 0.1)
+        until(lambda: drawn("ball", "points") and page._world.places["block"].distance_to(held) < 1e-3)
+        there = HOME.copy()
+        there[0] = 0.7
+        goal = Pose.from_matrix(forward(model.arm.robot, there))
+        world.place("ball", goal)
+        until(lambda: drawn("ball", "points") and tuple(frame.position) == tuple(goal.xyz))
+        with pytest.raises(NoPath, match="ball"):
+            arm.plan_to(goal, places=page._world.places)
+
+        # other bodies, another arm, nothing
+        world.remove("points")
+        world.become(world.with_arm("right", at=Pose.at(1.4, 0.0, 0.0), q=HOME))
+        until(lambda: drawn("ball") and set(page._bodies._arms) == {"right"})
+        world.hide()
+        until(lambda: drawn() and not page._bodies._arms and not page._world.places)
+    finally:
+        panel.close()
+        arm.close()
+
+
 def test_the_command_refuses_what_contradicts_itself() -> None:
     done = run("panel", "--read-only", "--allow-control", "--target", "sim://localhost:1")
     assert done.returncode == 1 and "contradict" in done.stderr

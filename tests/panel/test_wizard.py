@@ -13,7 +13,7 @@ import pytest
 import heptarm as ha
 from heptarm import model as kinematics
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, ShapeError
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.io.targets import SavedTarget, add_target, saved_targets
 from heptarm.panel import texts
 from heptarm.panel.wizard import Wizard, WizardSettings, WizardStep

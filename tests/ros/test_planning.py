@@ -272,11 +272,50 @@ def test_a_refused_message_changes_nothing(context: Any, wrong: Any, text: str) 
         world=world,
         robot_state=message(attached_collision_objects=[]),
         allowed_collision_matrix=message(entry_values=[]),
+        object_colors=[],
     )
     for handler, one in ((scene.collision_object, wrong), (scene.planning_scene, both)):
         with pytest.raises(HeptarmError, match=text):
             handler(context, one)
         assert set(context.world.bodies) == {"post"} and context.world.model is before
+
+
+def test_bodies_have_the_colours_of_a_scene_also_those_that_come_later(
+    context: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        scene, "class_of", lambda *_: lambda **fields: message(header=header(), color=message(), **fields)
+    )
+    monkeypatch.setattr(scene, "_object", lambda *_: message())
+
+    def send(*, is_diff: bool = True, **colors: tuple[float, ...]) -> None:
+        named = [
+            message(id=name, color=message(**dict(zip("rgba", color)))) for name, color in colors.items()
+        ]
+        scene.planning_scene(
+            context,
+            message(
+                is_diff=is_diff,
+                world=message(collision_objects=[], octomap=message(octomap=message(data=[]))),
+                robot_state=message(attached_collision_objects=[]),
+                allowed_collision_matrix=message(entry_values=[]),
+                object_colors=named,
+            ),
+        )
+
+    scene.collision_object(context, body("post", pose=pose((0.5, 0.3, 0.2))))
+    red, blue = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)
+    send(post=red, later=blue)
+    assert context.world.model.color("post") == red
+    scene.collision_object(context, body("later", pose=pose((0.0, 0.6, 0.2))))
+    assert context.world.model.color("later") == blue
+    reported = scene.scene_fields(context)["object_colors"]
+    assert {entry.id: tuple(vars(entry.color).values()) for entry in reported} == {"post": red, "later": blue}
+    with pytest.raises(HeptarmError, match=r"color of 'post' \(red\) must be in \[0, 1\], got 255"):
+        send(later=red, post=(255.0, 0.0, 0.0, 255.0))
+    assert context.world.model.color("later") == blue, "a refused message changes nothing"
+    send(is_diff=False)
+    assert not context.world.bodies and not context.world.colors
 
 
 def test_what_cannot_be_attached_is_refused(context: Any) -> None:

@@ -152,6 +152,15 @@ def test_bad_values_of_picking_and_placing(
     arm: ha.Arm, gripper: ha.TwoSignalGripper, world: ha.CollisionModel
 ) -> None:
     before = arm.wait_for_rest().q_cmd
+    gripper.close()
+    with pytest.raises(ha.ShapeError, match="gripper must have open, close, is_open, holds_something, got 3"):
+        pick(arm, 3, "part_1", world=world)  # type: ignore[arg-type]
+    with pytest.raises(ha.ShapeError, match="gripper must have"):
+        place(arm, "left", "part_1", ha.Pose.at(0.6, 0.0, 0.3), world=world)  # type: ignore[arg-type]
+    with pytest.raises(ha.ShapeError, match=r"candidates\[0\] must be a Grasp"):
+        pick(arm, gripper, "part_1", world=world, candidates=[ha.Pose.at(z=0.1)])  # type: ignore[list-item]
+    with pytest.raises(ha.CommandRejected, match="model of this robot, the iiwa14, got one of the iiwa7"):
+        pick(arm, gripper, "part_1", world=ha.CollisionModel("iiwa7", scene="bins"))
     with pytest.raises(ha.CommandRejected, match="body must be a free body of the scene, one of part_1"):
         pick(arm, gripper, "part_9", world=world)
     with pytest.raises(ha.ShapeError, match="world must be a model of bodies, got 3"):
@@ -167,7 +176,7 @@ def test_bad_values_of_picking_and_placing(
         ha.NoPath, match="none of 1 poses at part_1 can be reached; of the first one: goal has no"
     ):
         pick(arm, gripper, "part_1", world=world, candidates=[far])
-    assert np.abs(arm.state.q_cmd - before).max() < 1e-6  # nothing moved
+    assert np.abs(arm.state.q_cmd - before).max() < 1e-6 and not gripper.is_open  # nothing moved
 
 
 @pytest.mark.parametrize("seed", range(longer(1, 20)))

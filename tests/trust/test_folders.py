@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import heptarm as ha
-from heptarm.io import folders, keys, plan_box, targets
+from heptarm.io import folders, keys, panel_box, targets
 from heptarm.record import black_box
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has other permissions")
@@ -36,7 +36,7 @@ def black_box_folder() -> Path:
 
 
 @pytest.mark.parametrize(
-    "folder", [folders.settings_folder, keys.key_folder, plan_box.folder, black_box_folder]
+    "folder", [folders.settings_folder, keys.key_folder, panel_box.folder, black_box_folder]
 )
 def test_folders_are_made_private_also_those_that_were_open(folder: Callable[[], Path]) -> None:
     place = folder()

@@ -9,6 +9,8 @@ import pytest
 
 import heptarm as ha
 from heptarm.errors import LimitError, ShapeError
+from heptarm.sim.lens import Lens
+from heptarm.values.camera import Picture, distorted, undistorted
 
 
 def seen(camera: ha.Camera, point: tuple[float, float, float]) -> np.ndarray:
@@ -70,3 +72,51 @@ def test_it_is_frozen_and_compared() -> None:
     assert one == other and hash(one) == hash(other) and one != ha.Camera(rate=5)
     with pytest.raises(AttributeError):
         one.rate = 3.0  # type: ignore[misc]
+
+
+BENT = (-0.2, 0.05, 0.002, -0.001, 0.01)
+
+
+def test_a_bent_picture_and_its_points() -> None:
+    camera = ha.Camera((2.0, 0.0, 0.0), (0.0, 0.0, 0.0), fov=0.9, size=(100, 80), distortion=BENT)
+    picture = Picture(
+        np.zeros((80, 100, 3), np.uint8),
+        stamp=1,
+        q=np.zeros(7),
+        flange=ha.Pose.of((0, 0, 0)),
+        pose=camera.pose,
+        matrix=camera.matrix,
+        distortion=camera.distortion,
+    )
+    for u, v in ((0.0, 0.0), (99.0, 20.0), (49.5, 39.5)):
+        point = picture.point(u, v, depth=1.5)
+        np.testing.assert_allclose(picture.pixel(point), (u, v), atol=1e-6)
+        x, y = undistorted((u, v), camera.matrix, BENT)
+        shown = distorted(x, y, BENT)
+        again = camera.matrix @ np.array([shown.x, shown.y, 1.0])
+        np.testing.assert_allclose(again[:2], np.array([u, v]), atol=1e-6)
+
+
+def test_the_lens_bends_a_straight_picture() -> None:
+    camera = ha.Camera(fov=0.9, size=(120, 90), principal=(55.0, 48.0), distortion=BENT)
+    lens = Lens(camera)
+    width, height = lens.straight.size
+    assert width > 120 and height > 90, "barrel distortion sees more"
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    drawn = np.stack([u, v, np.zeros_like(u)], axis=-1)  # each pixel shows where it is
+    across, down = np.meshgrid(np.arange(120), np.arange(90))
+    at = undistorted(np.stack([across, down], axis=-1), camera.matrix, BENT)
+    straight = np.column_stack([at.reshape(-1, 2), np.ones(at.size // 2)]) @ lens.straight.matrix.T
+    bent = lens.bent(drawn.astype(np.uint8)).reshape(-1, 3)
+    assert np.abs(bent[:, :2] - straight[:, :2]).max() <= 0.51
+    labels = lens.nearest(u.astype(np.int16)).ravel()
+    assert labels.dtype == np.int16 and np.abs(labels - straight[:, 0]).max() <= 0.5
+    plain = Lens(ha.Camera())
+    assert plain.straight == ha.Camera() and plain.bent(drawn) is drawn  # type: ignore[arg-type]
+
+
+def test_a_lens_that_folds_the_picture_is_refused() -> None:
+    with pytest.raises(LimitError, match="distortion must show each point once within the picture"):
+        ha.Camera(fov=1.2, distortion=(-1.5, 0.0, 0.0, 0.0, 0.0))
+    with pytest.raises(ShapeError, match="distortion must have five numbers"):
+        ha.Camera(distortion=(0.1, 0.0))  # type: ignore[arg-type]

@@ -1306,12 +1306,14 @@ struct ForceAbove {
     std::string frame;
     double threshold = unset;  ///< [N]
     double tolerance = unset;  ///< largest inaccuracy of the estimate [N]
+    std::optional<Pose> axes;  ///< a pose in the base whose axes count; absent: those of frame
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
         visit(self.frame, "frame", {-infinite, infinite, false, false, false, 0, 128});
         visit(self.threshold, "threshold", {0.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1321,6 +1323,7 @@ struct NormalForceAbove {
     Axis axis = Axis::x;
     double threshold = unset;  ///< [N]
     double tolerance = unset;  ///< [N]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1328,6 +1331,7 @@ struct NormalForceAbove {
         visit(self.axis, "axis");
         visit(self.threshold, "threshold", {0.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1337,6 +1341,7 @@ struct ShearForceAbove {
     Axis axis = Axis::x;
     double threshold = unset;  ///< [N]
     double tolerance = unset;  ///< [N]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1344,6 +1349,7 @@ struct ShearForceAbove {
         visit(self.axis, "axis");
         visit(self.threshold, "threshold", {0.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1354,6 +1360,7 @@ struct ForceOutside {
     double low = unset;  ///< [N]
     double high = unset;  ///< [N]
     double tolerance = unset;  ///< [N]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1362,6 +1369,7 @@ struct ForceOutside {
         visit(self.low, "low", {-1000.0, 1000.0});
         visit(self.high, "high", {-1000.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1372,6 +1380,7 @@ struct TorqueOutside {
     double low = unset;  ///< [Nm]
     double high = unset;  ///< [Nm]
     double tolerance = unset;  ///< [Nm]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1380,6 +1389,7 @@ struct TorqueOutside {
         visit(self.low, "low", {-1000.0, 1000.0});
         visit(self.high, "high", {-1000.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 

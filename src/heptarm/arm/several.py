@@ -34,7 +34,7 @@ from heptarm.errors import CollisionForeseen, CommandRejected, HeptarmError, Mod
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import Camera
 from heptarm.values.checks import choice, flag, instance, shown, within
-from heptarm.values.clearance import WorldOfArms
+from heptarm.values.clearance import CollisionWorld
 from heptarm.values.files import path_of
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
@@ -342,7 +342,7 @@ def start_together(
     mode: Mode | None = None,
     planning_time: float = _PLANNING,
     stop_others: bool = True,
-    collision_check: WorldOfArms | None = None,
+    collision_check: CollisionWorld | None = None,
 ) -> MotionOfArms:
     """Begin motions of several arms at the same moment, and return then.
 
@@ -421,7 +421,7 @@ def start_together(
 
 
 def _check_together(
-    world: WorldOfArms,
+    world: CollisionWorld,
     motions: Mapping[Arm, Motion | Sequence[Motion]],
     *,
     speed: float | None,
@@ -433,7 +433,7 @@ def _check_together(
         CollisionForeseen: they would.
         CommandRejected: a program cannot be planned, or the world has not all arms but one.
     """
-    if not isinstance(world, WorldOfArms):
+    if not isinstance(world, CollisionWorld):
         raise ShapeError(
             f"collision_check must be a world of several arms, got {shown(world)}",
             parameter="collision_check",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
@@ -62,10 +62,11 @@ from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.planning.search import STATES, TIMEOUT, Goal, Keep
 from heptarm.record.camera import CameraFeed, CameraSubject
+from heptarm.record.episodes import EpisodeSet, EpisodeTerms, NumberSource, named_cameras
 from heptarm.record.recorder import Recorder
-from heptarm.values.camera import Camera
+from heptarm.values.camera import NO_DISTORTION, Camera
 from heptarm.values.checks import array, callback, flag, instance, integer, shown, within, word
-from heptarm.values.clearance import CarriesTools, ChangingWorld, CollisionCheck, PlanningWorld
+from heptarm.values.clearance import CollisionCheck, CollisionWorld
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -439,6 +440,55 @@ class ArmVerbs(Sealed):
             {"": self._connection}, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite
         )
 
+    def episodes(
+        self,
+        folder: str | Path,
+        *,
+        rate: float = 20.0,
+        cameras: Mapping[str, Camera | PictureSource] | Sequence[Camera | PictureSource] = (),
+        streams: Mapping[str, NumberSource | None] | None = None,
+        task: str = "",
+        reset: Callable[[], object] | None = None,
+    ) -> EpisodeSet:
+        """Episodes of a task for learning: each a recording of its own, with a label, pictures and streams.
+
+        `heptarm.load_episodes` reads them in equal steps; `heptarm convert FOLDER OUT --to lerobot` makes a data set
+        for LeRobot.
+
+        Args:
+            folder: of the files; is made if it is not there, and gets more episodes if it has some.
+            rate: steps per second of the robot's clock, up to 500 [Hz].
+            cameras: simulated ones or functions, as `camera` takes them, by their names.
+            streams: functions that return numbers of a sensor, or None where there is nothing new, by their names; each
+                is called twice a step in a thread of its own. None instead of a function: the program pushes
+                the numbers, `EpisodeSet.push`.
+            task: what is done, in words.
+            reset: called before each episode, to bring arm and scene to the start. After an error of it there is no
+                episode.
+
+        Raises:
+            ShapeError: no such cameras, streams or function.
+            LimitError: a rate outside its range.
+            CommandRejected: a name that is taken, or has other characters than a to z, 0 to 9 and _.
+        """
+        check_states(self.state_rate, self.groups)
+        given = named_cameras(cameras)
+        for name, source in given.items():
+            if not isinstance(source, Camera) and not callable(source):
+                raise ShapeError(
+                    f"cameras[{name!r}] must be a Camera or a function that returns a picture, got {shown(source)}",
+                    parameter="cameras",
+                )
+        terms = EpisodeTerms(
+            rate=rate,
+            task=task,
+            cameras={name: partial(self.camera, source) for name, source in given.items()},
+            streams=dict(instance({} if streams is None else streams, Mapping, "streams")),
+            reset=reset,
+            factor=self.real_time_factor,
+        )
+        return EpisodeSet(self._connection, path_of(folder, "folder"), terms)
+
     def camera(
         self,
         source: Camera | PictureSource,
@@ -449,6 +499,7 @@ class ArmVerbs(Sealed):
         pose: Pose | None = None,
         frame: str = "flange",
         matrix: npt.ArrayLike | None = None,
+        distortion: npt.ArrayLike = NO_DISTORTION,
     ) -> CameraStream:
         """Live pictures, each with the arm at the moment when it was taken.
 
@@ -465,6 +516,7 @@ class ArmVerbs(Sealed):
             pose: pose of your own camera in `frame`, as `heptarm.calibration.hand_eye` measures it; None: not known.
             frame: frame of your own camera: "flange", which moves it with the arm, or "base".
             matrix: intrinsic matrix of your own camera, shape (3, 3) [pixels]; None: not known.
+            distortion: of your own camera's lens, k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
 
         Returns:
             The pictures: `read()` waits for the next one; close it, or use it as a `with` block.
@@ -481,14 +533,14 @@ class ArmVerbs(Sealed):
         layers = ["pixels"]
         layers += ["depth"] if flag(depth, "depth") else []
         layers += ["labels"] if flag(labels, "labels") else []
-        own = Mounting.of(self.robot, frame=frame, pose=pose, matrix=matrix)
+        own = Mounting.of(self.robot, frame=frame, pose=pose, matrix=matrix, distortion=distortion)
         link = self._connection
         link.check_open()
         if isinstance(source, Camera):
             own.refuse_for_simulated()
             feed = camera_feed(self, source, layers=layers)
             drawn = DrawnSource(feed, layers, late, link.real_time_factor)
-            place = Mounting(self.robot, source.frame, source.pose, source.matrix)
+            place = Mounting(self.robot, source.frame, source.pose, source.matrix, source.distortion)
             return CameraStream(link, drawn, place)
         called = CalledSource(source, layers, link.clock, late)
         return CameraStream(link, called, own)
@@ -613,7 +665,7 @@ class ArmVerbs(Sealed):
         self,
         goal: Goal,
         *,
-        avoid: PlanningWorld | None = None,
+        avoid: CollisionWorld | None = None,
         keep: Keep | None = None,
         speed: float | None = None,
         tcp_speed: float | None = None,
@@ -674,7 +726,7 @@ class ArmVerbs(Sealed):
         self,
         path: FoundPath,
         *,
-        watch: ChangingWorld | None = None,
+        watch: CollisionWorld | None = None,
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
@@ -713,7 +765,7 @@ class ArmVerbs(Sealed):
         """
         instance(path, FoundPath, "path", hint="find one: arm.find_path(goal, avoid=world)")
         world = path.world if watch is None else watch
-        if not isinstance(world, ChangingWorld):
+        if not isinstance(world, CollisionWorld):
             raise ShapeError(
                 f"watch must be a model of bodies, got {shown(world)}",
                 parameter="watch",
@@ -758,7 +810,7 @@ class ArmVerbs(Sealed):
         Raises:
             ShapeError: not a model that carries tools.
         """
-        if not isinstance(model, CarriesTools):
+        if not isinstance(model, CollisionWorld):
             raise ShapeError(
                 f"model must be a model of bodies that carries tools, got {shown(model)}",
                 parameter="model",
@@ -966,7 +1018,7 @@ class ArmVerbs(Sealed):
     def _send(self, motions: tuple[Motion, ...], terms: ProgramTerms) -> MotionHandle:
         made = program_request.checked(self._connection, self._tooling, motions, terms)
         self._foresight.examine(made)
-        load_check.warn_before(self.robot, terms.mode, self._connection.newest())
+        load_check.check_before(self.robot, terms.mode, self._connection.newest())
         return program_request.send(self._connection, made)
 
     @overload
@@ -999,6 +1051,7 @@ class ArmVerbs(Sealed):
         breaks = self._breaks
         settings["mode"] = self._mode if settings.get("mode") is None else settings["mode"]
         check_mode(settings["mode"])
+        load_check.check_before(self.robot, settings["mode"], self._connection.newest())
         request = ServoRequest(kind, **settings)
         message = request.message(self._speed)
         self._tooling.check_motion_frame(request.moving, "moving")
@@ -1078,6 +1131,7 @@ class ArmVerbs(Sealed):
         if settings.get("mode") is None:
             settings["mode"] = None if word(kind, "kind", fri_settings.KINDS) == "monitor" else self._mode
         check_mode(settings["mode"])
+        load_check.check_before(self.robot, settings["mode"], self._connection.newest())
         self._tooling.check_mode(settings["mode"])
         rule = guards_in_force.get(self) if settings.get("collision") is None else None
         if rule is not None:
@@ -1238,9 +1292,9 @@ class ArmVerbs(Sealed):
         """Check the load data of a resting arm that nothing touches: call it before impedance control.
 
         A compliant arm sinks under a weight that its load data lack. What the sensors' accuracy does not explain, 3 %
-        of the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion in an
-        impedance mode that begins in position control logs the same warning; none is refused, for it may begin in
-        contact.
+        of the highest torque of an axis, is logged as a warning; more than `refuse` is an error. Every motion, program,
+        stream and FRI session in an impedance mode that begins in position control is checked like this by itself. It
+        may begin in contact, so it is refused only where a missing weight explains the torques, from 8 % on.
 
         Args:
             refuse: fraction of the highest torque of an axis above which it is an error, (0, 1].

@@ -19,7 +19,7 @@ from heptarm.errors import CommandRejected, ShapeError
 from heptarm.model.dynamics import inverse_dynamics_rows
 from heptarm.record.recorded import FRI, RecordedData
 from heptarm.values.checks import Array, Value, finite_entries, frozen, instance, numbers
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import Body, RobotModel
 
 _AXES = 7
 #: Names of the arrays, here and in a recording.
@@ -29,7 +29,7 @@ _MEASURED = ("q", "tau", "tau_ext")
 #: Length of a window [s], and the fewest samples in one. Of the kernel's weight, half is within a sixth of it.
 _WINDOW, _FEWEST = 0.1, 15
 #: Least rate of a recording [Hz].
-_SLOWEST = 190.0
+SLOWEST = 190.0
 #: Least duration of the parts in which an axis moves [s], and the speed from which on it does [rad/s].
 _MOVED, MOVING = 3.0, 1e-3
 #: Shift by which the skew of the torques is found, and the largest skew [s].
@@ -198,7 +198,7 @@ def windows_of(samples: ArmSamples, *, delay: float = 0.0, skew: float = 0.0) ->
     Raises:
         CommandRejected: the recording is too slow, or has too few states in a row.
     """
-    if samples.rate < _SLOWEST:
+    if samples.rate < SLOWEST:
         raise CommandRejected(
             f"the recording must have at least 200 states per second, got {samples.rate:.0f}",
             parameter="run",
@@ -267,7 +267,12 @@ def _kernels(offsets: Array) -> tuple[Array, Array, Array]:
 
 
 def aligned_windows(
-    samples: ArmSamples, model: RobotModel, *, delay: float, acceleration: npt.ArrayLike
+    samples: ArmSamples,
+    model: RobotModel,
+    *,
+    delay: float = 0.0,
+    load: Body | None = None,
+    acceleration: npt.ArrayLike,
 ) -> Windows:
     """Reduce samples to windows, with the torques shifted to the positions that they belong to.
 
@@ -278,10 +283,12 @@ def aligned_windows(
         samples: what was recorded.
         model: the robot.
         delay: by which measured values come later than commanded ones [s].
+        load: load data that the cabinet used; None: none.
         acceleration: of gravity in the base frame, shape (3,) [m/s²].
     """
     first, later = windows_of(samples, delay=delay), windows_of(samples, delay=delay, skew=_SHIFT)
-    rigid = inverse_dynamics_rows(model, first.q, first.dq, first.ddq, acceleration=acceleration)
+    moments = (first.q, first.dq, first.ddq)
+    rigid = inverse_dynamics_rows(model, *moments, load=load, acceleration=acceleration)
     slope = (later.tau + later.tau_ext - first.tau - first.tau_ext) / _SHIFT
     missed = rigid - first.tau - first.tau_ext
     # masses that are not heptarm's leave torques, too, but these do not go along with the slope

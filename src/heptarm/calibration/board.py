@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.calibration.tag_edges import edge_corners
 from heptarm.errors import LimitError, ShapeError, require
 from heptarm.values.checks import Array, Value, frozen, integer, shown, within, word
 from heptarm.values.files import path_of, refuse_existing, unwritable
@@ -297,7 +298,9 @@ class Board:
             return np.zeros(0, np.int64), np.zeros((0, 2))
         known = [i for i, tag in enumerate(np.ravel(tags)) if tag < len(self._marked)]
         numbers = np.array([4 * int(np.ravel(tags)[i]) + k for i in known for k in range(4)], np.int64)
-        return numbers, np.array([corners[i] for i in known], float).reshape(-1, 2) - _TAG_ORIGIN
+        levels = gray.astype(np.float64)
+        edges = [edge_corners(levels, np.reshape(corners[i], (4, 2)) - _TAG_ORIGIN) for i in known]
+        return numbers, np.reshape(edges, (-1, 2))
 
 
 def _opencv() -> Any:

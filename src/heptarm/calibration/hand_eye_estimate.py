@@ -22,7 +22,7 @@ from heptarm.calibration.board import Sighting
 from heptarm.calibration.tip import student
 from heptarm.errors import CommandRejected, ShapeError, require
 from heptarm.io.targets import save_camera, saved_targets
-from heptarm.values.camera import MountedCamera, intrinsic, lens_distortion
+from heptarm.values.camera import NO_DISTORTION, MountedCamera, distorted, intrinsic, lens_distortion
 from heptarm.values.checks import Array, Value, flag, frozen, instance, shown, word
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.text import lines
@@ -41,9 +41,8 @@ _ROBUST = 1.0
 _SUSPECT = 4.0
 #: Standard deviation of an offset that a detector gives all corners of all views, which turns the camera [pixels].
 _DETECTOR = 0.05
-#: Parameters: camera and board, then focal lengths, centre, and two terms of radial distortion.
-_POSES, _LENS = 12, 6
-_NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+#: Parameters: camera and board, then focal lengths, centre, two terms of radial and two of tangential distortion.
+_POSES, _LENS = 12, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,20 +74,25 @@ class HandEyeGuess:
     Attributes:
         camera: in its frame.
         board: in the other one.
-        lens: focal lengths, centre, k1, k2, shape (6,).
-        rest: p1, p2, k3.
+        lens: focal lengths, centre, k1, k2, p1, p2, shape (8,).
+        k3: the last term of the distortion, which is not estimated.
     """
 
     camera: Pose
     board: Pose
     lens: Array
-    rest: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    k3: float = 0.0
+
+    @property
+    def distortion(self) -> tuple[float, ...]:
+        """Distortion k1 k2 p1 p2 k3."""
+        return (*self.lens[4:].tolist(), self.k3)
 
     def moved(self, step: Array) -> HandEyeGuess:
         """The parameters after a step: translations in the frame's axes, rotations about them, then the lens."""
         lens = self.lens.copy()
         lens[: len(step) - _POSES] += step[_POSES:]
-        return HandEyeGuess(_moved(self.camera, step[:6]), _moved(self.board, step[6:12]), lens, self.rest)
+        return HandEyeGuess(_moved(self.camera, step[:6]), _moved(self.board, step[6:12]), lens, self.k3)
 
 
 def _moved(pose: Pose, step: Array) -> Pose:
@@ -129,9 +133,8 @@ class HandEyeEstimate(Value):
     def guess(self) -> HandEyeGuess:
         """Its numbers as parameters of `HandEyeModel`."""
         (fx, _, cx), (_, fy, cy), _ = self.matrix.tolist()
-        k1, k2, p1, p2, k3 = self.distortion.tolist()
-        lens = np.array([fx, fy, cx, cy, k1, k2])
-        return HandEyeGuess(self.pose, self.board, lens, (p1, p2, k3))
+        lens = np.array([fx, fy, cx, cy, *self.distortion[:4]])
+        return HandEyeGuess(self.pose, self.board, lens, float(self.distortion[4]))
 
     @property
     def rms(self) -> float:
@@ -260,21 +263,12 @@ def _crossing(vectors: Array) -> Array:
 
 
 def _projected(at: Array, guess: HandEyeGuess) -> tuple[Array, Array, Array]:
-    """Pixels of points in the camera, shape (n, 2), and their derivatives by the points and by the lens.
-
-    The lens is OpenCV's: radial distortion k1 k2 k3 and tangential p1 p2 (Brown, 1966).
-    """
+    """Pixels of points in the camera, shape (n, 2), and their derivatives by the points and by the lens."""
     depth = at[:, 2]
     x, y = at[:, 0] / depth, at[:, 1] / depth
-    fx, fy, cx, cy, k1, k2 = guess.lens
-    p1, p2, k3 = guess.rest
+    fx, fy, cx, cy = guess.lens[:4]
+    u, v, du_dx, mixed, dv_dy = distorted(x, y, guess.distortion)
     r = x * x + y * y
-    radial, slope = 1.0 + r * (k1 + r * (k2 + r * k3)), k1 + r * (2.0 * k2 + r * 3.0 * k3)
-    u = x * radial + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x)
-    v = y * radial + p1 * (r + 2.0 * y * y) + 2.0 * p2 * x * y
-    du_dx = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
-    dv_dy = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
-    mixed = 2.0 * (x * y * slope + p1 * x + p2 * y)
     rows = [
         [fx * du_dx, fx * mixed, -fx * (du_dx * x + mixed * y)],
         [fy * mixed, fy * dv_dy, -fy * (mixed * x + dv_dy * y)],
@@ -282,8 +276,8 @@ def _projected(at: Array, guess: HandEyeGuess) -> tuple[Array, Array, Array]:
     by_point = np.moveaxis(np.array(rows) / depth, 2, 0)
     none, one = np.zeros_like(x), np.ones_like(x)
     of_lens = [
-        [u, none, one, none, fx * x * r, fx * x * r * r],
-        [none, v, none, one, fy * y * r, fy * y * r * r],
+        [u, none, one, none, fx * x * r, fx * x * r * r, 2.0 * fx * x * y, fx * (r + 2.0 * x * x)],
+        [none, v, none, one, fy * y * r, fy * y * r * r, fy * (r + 2.0 * y * y), 2.0 * fy * x * y],
     ]
     return np.column_stack([fx * u + cx, fy * v + cy]), by_point, np.moveaxis(np.array(of_lens), 2, 0)
 
@@ -293,7 +287,7 @@ def estimate_hand_eye(
     *,
     frame: Literal["flange", "base"] = "flange",
     matrix: npt.ArrayLike | None = None,
-    distortion: npt.ArrayLike = _NO_DISTORTION,
+    distortion: npt.ArrayLike = NO_DISTORTION,
     refine: bool | None = None,
 ) -> HandEyeEstimate:
     """Compute where a camera is from views of a board that stands still, or that the flange carries.
@@ -305,7 +299,7 @@ def estimate_hand_eye(
         frame: "flange": the camera moves with the arm; "base": it is beside the arm, and the board is on the flange.
         matrix: intrinsic matrix, shape (3, 3) [pixels]; None: from the views.
         distortion: k1 k2 p1 p2 k3 as in OpenCV, shape (5,).
-        refine: estimate focal lengths, centre, k1 and k2, too; None: if there is no matrix.
+        refine: estimate focal lengths, centre, k1, k2, p1 and p2, too; None: if there is no matrix.
 
     Raises:
         ShapeError: too few views, or wrong types.
@@ -327,8 +321,8 @@ def estimate_hand_eye(
     guess = HandEyeGuess(
         camera,
         first @ camera @ seen[0],
-        np.array([lens[0, 0], lens[1, 1], lens[0, 2], lens[1, 2], rest[0], rest[1]]),
-        (float(rest[2]), float(rest[3]), float(rest[4])),
+        np.array([lens[0, 0], lens[1, 1], lens[0, 2], lens[1, 2], *rest[:4]]),
+        float(rest[4]),
     )
     model = HandEyeModel([view.flange for view in given], [view.sighting.points for view in given], frame)
     pixels = np.concatenate([view.sighting.pixels for view in given])
@@ -392,7 +386,7 @@ def first_matrix(views: Sequence[HandEyeView]) -> Array:
     return np.asarray(cv.calibrateCamera(points, pixels, size, None, None, flags=flags)[1], float)
 
 
-def board_pose(sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = _NO_DISTORTION) -> Pose:
+def board_pose(sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = NO_DISTORTION) -> Pose:
     """Pose of a board in the camera, from one picture (perspective-n-point, by OpenCV).
 
     Raises:
@@ -435,7 +429,7 @@ def _solved(model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int,
     def slope(step: Array) -> Array:
         return model.jacobian(guess.moved(step), count).reshape(-1, count)
 
-    scale = np.array([*[0.01] * _POSES, *[10.0] * 4, *[0.1] * 2])[:count]
+    scale = np.array([*[0.01] * _POSES, *[10.0] * 4, *[0.1] * 2, *[0.01] * 2])[:count]
     found = optimize.least_squares(
         off, np.zeros(count), slope, x_scale=scale, loss=loss, f_scale=_ROBUST, max_nfev=40
     )
@@ -478,7 +472,7 @@ def _judged(
             allowed=f"at most {_LOST:g} m",
             hint="take more views, from more directions, with the board larger in the pictures",
         )
-    fx, fy, cx, cy, k1, k2 = guess.lens
+    fx, fy, cx, cy = guess.lens[:4]
     turned = guess.camera.rotation[:, :2] * _DETECTOR / np.array([fy, fx])
     sigma[3:6] = np.sqrt(np.square(sigma[3:6]) + np.square(turned).sum(axis=1))
     return HandEyeEstimate(
@@ -486,7 +480,7 @@ def _judged(
         frame,
         guess.board,
         frozen(np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])),
-        frozen((k1, k2, *guess.rest)),
+        frozen(guess.distortion),
         frozen(sigma[:3]),
         frozen(sigma[3:6]),
         frozen(residuals),

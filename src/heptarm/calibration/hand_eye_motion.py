@@ -33,7 +33,7 @@ from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
 from heptarm.values.camera import intrinsic
 from heptarm.values.checks import Array, Value, frozen, instance, integer, within
-from heptarm.values.clearance import PlanningWorld
+from heptarm.values.clearance import CollisionWorld
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.ptp import ptp
@@ -105,9 +105,9 @@ def hand_eye(
     *,
     views: int = VIEWS,
     speed: float = SPEED,
-    avoid: PlanningWorld | None = None,
+    avoid: CollisionWorld | None = None,
     matrix: npt.ArrayLike | None = None,
-    distortion: npt.ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0),
+    distortion: npt.ArrayLike | None = None,
     refine: bool | None = None,
     confirm: Callable[[HandEyePlan], bool] | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -128,7 +128,7 @@ def hand_eye(
         speed: ceiling, (0, 1]; the lower one of this and `arm.speed`.
         avoid: model of the bodies, around which paths are found; None: the motions are PTP.
         matrix: see `estimate_hand_eye`; None: that of the camera.
-        distortion: see `estimate_hand_eye`.
+        distortion: see `estimate_hand_eye`; None: that of the camera.
         refine: see `estimate_hand_eye`.
         confirm: called with each plan; nothing moves unless it returns true. None: it moves.
         progress: called after each picture with the board in it with their number and that of all.
@@ -170,7 +170,8 @@ def hand_eye(
         "Look at the board from about here", list(_reached(arm.robot, turned, start)), start, seen.look
     )
     rough_lens = first_matrix(seen.views) if known is None else intrinsic(known)
-    options = {"frame": camera.frame, "distortion": distortion}
+    lens = camera.distortion if distortion is None else distortion
+    options = {"frame": camera.frame, "distortion": lens}
     rough = estimate_hand_eye(seen.views, matrix=rough_lens, refine=False, **options)  # type: ignore[arg-type]
     chosen = _chosen(arm.robot, seen.views, rough, board, start, wanted - len(seen.views))
     mover.visit("Look at the board from all sides", chosen, start, seen.look)
@@ -215,7 +216,7 @@ class _Mover:
         self,
         arm: ArmVerbs,
         speed: float,
-        avoid: PlanningWorld | None,
+        avoid: CollisionWorld | None,
         confirm: Callable[[HandEyePlan], bool] | None,
     ) -> None:
         self._arm, self._speed, self._avoid = arm, speed, avoid

@@ -34,6 +34,9 @@ GAIN, OFFSET = 0.007, 0.005
 _ANY_INERTIA, _MEASURED_INERTIA = 1.0, 0.02
 #: Prior standard deviations of the mass [kg] and of the first moments [kg m], which mean nothing.
 _ANY_MASS, _ANY_MOMENT = 100.0, 100.0
+#: Noise of a torque reading that a moment of inertia has to exceed at the highest acceleration, so that it matters: a
+#: fraction of the highest torque of A7, which carries least.
+_FELT = 5e-4
 #: Least noise that is assumed, as a fraction of the highest torque: the sensors have a resolution.
 _LEAST_NOISE = 2e-5
 #: Standard deviations of mass [kg] and first moment [kg m] above which the postures do not differ enough.
@@ -114,6 +117,8 @@ class LoadSamples(Value):
         noise: standard deviation of `tau_ext`, shape (n, 7) [Nm].
         dq: joint velocities, shape (n, 7) [rad/s]; all 0 at rest.
         ddq: joint accelerations, shape (n, 7) [rad/s²]; all 0 at rest.
+        spread: standard deviation of the times over which a row is a weighted mean, shape (n,) [s]; 0: one moment, or
+            at rest.
 
     Raises:
         ShapeError: wrong shapes.
@@ -126,6 +131,7 @@ class LoadSamples(Value):
     noise: Array
     dq: Array = field(default_factory=lambda: np.zeros((0, _AXES)))
     ddq: Array = field(default_factory=lambda: np.zeros((0, _AXES)))
+    spread: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         count = len(numbers(self.q, "q"))
@@ -138,10 +144,17 @@ class LoadSamples(Value):
                     f"{name} must have shape (n, {_AXES}) with the n of q, got {given.shape}", parameter=name
                 )
             object.__setattr__(self, name, frozen(finite_entries(given, name)))
+        spread = numbers(self.spread, "spread")
+        spread = np.zeros(count) if spread.shape == (0,) else spread
+        if spread.shape != (count,):
+            raise ShapeError(
+                f"spread must have shape (n,) with the n of q, got {spread.shape}", parameter="spread"
+            )
+        object.__setattr__(self, "spread", frozen(finite_entries(spread, "spread")))
 
     def joined(self, other: LoadSamples) -> LoadSamples:
         """These samples and others."""
-        names = ("q", "tau", "tau_ext", "noise", "dq", "ddq")
+        names = ("q", "tau", "tau_ext", "noise", "dq", "ddq", "spread")
         return LoadSamples(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
 
 
@@ -182,6 +195,15 @@ class IdentifiedLoad(Value):
         return Body(self.mass, self.com, inertia=self.inertia)
 
     @property
+    def matters(self) -> tuple[bool, bool, bool]:
+        """Whether each moment of inertia, xx yy zz, can be felt: it is above the least one that any motion shows.
+
+        That makes as much torque at the highest acceleration of the arm as a torque sensor has noise: 0.002 kg m².
+        """
+        x, y, z = (self.inertia[:3] > _least_moment(self.robot)).tolist()
+        return x, y, z
+
+    @property
     def is_as_declared(self) -> bool:
         """Whether mass and centre of mass in use are within three standard deviations of the measured ones."""
         if abs(self.mass - self.declared.mass) > 3.0 * self.sigma_mass:
@@ -205,6 +227,14 @@ class IdentifiedLoad(Value):
             pairs = zip(self.inertia, self.sigma_inertia, strict=True)
             inertia = "  ".join(f"{value:.4f} ± {sigma:.4f}" for value, sigma in pairs)
             inertia += " kg m² (xx yy zz xy xz yz)"
+            small = [
+                axis for axis, is_felt in zip(("xx", "yy", "zz"), self.matters, strict=True) if not is_felt
+            ]
+            if small:
+                inertia += (
+                    f"; {', '.join(small)} does not matter: no motion of the arm shows less than "
+                    f"{_least_moment(self.robot):.3f}"
+                )
         declared = " ".join(f"{1e3 * value:.1f}" for value in self.declared.com)
         rows = {
             "mass": self.comparison,
@@ -293,6 +323,11 @@ def estimate_load(
     return _estimate(model, total, covariance, used, residual=residual, offset=found[10 : 10 + _AXES])
 
 
+def _least_moment(model: RobotModel) -> float:
+    """Moment of inertia that makes as much torque at the highest acceleration as a sensor has noise [kg m²]."""
+    return _FELT * float(model.tau_max[-1] / model.ddq_max[-1])
+
+
 def _model(given: RobotModel | str) -> RobotModel:
     return robot(given) if isinstance(given, str) else instance(given, RobotModel, "robot")
 
@@ -311,9 +346,23 @@ def _prior(torque: Array) -> Array:
 
 
 def _load_design(model: RobotModel, samples: LoadSamples, acceleration: npt.ArrayLike) -> Array:
-    """Torques by the parameters of the load, shape (7 n, 10)."""
-    found = load_regressors(model, samples.q, samples.dq, samples.ddq, acceleration=acceleration)
-    return found.reshape(-1, len(_BASIS))
+    """Torques by the parameters of the load, shape (7 n, 10).
+
+    A mean over a short time is that of two moments, before and after its middle by its standard deviation: the squares
+    of positions and velocities have a mean of their own.
+    """
+    after = samples.spread[:, None]
+    found = [
+        load_regressors(
+            model,
+            samples.q + off * samples.dq,
+            samples.dq + off * samples.ddq,
+            samples.ddq,
+            acceleration=acceleration,
+        )
+        for off in ((-after, after) if after.any() else (0.0,))
+    ]
+    return np.asarray(np.mean(found, axis=0).reshape(-1, len(_BASIS)))
 
 
 def _sensor_design(held: Array) -> Array:

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
+from heptarm.calibration.arm_samples import SLOWEST, ArmSamples, aligned_windows
 from heptarm.calibration.load_estimate import (
     IdentifiedLoad,
     LoadSamples,
@@ -21,6 +22,7 @@ from heptarm.calibration.load_estimate import (
 )
 from heptarm.calibration.proposal import agree, box_text, flange_box, swings
 from heptarm.errors import CollisionForeseen, CommandRejected, MissingExtra, StaleState
+from heptarm.model.dynamics import GRAVITY
 from heptarm.values.checks import Array, Value, frozen, instance, within, word
 from heptarm.values.mode.mode import Position
 from heptarm.values.motion.motion import Motion
@@ -30,9 +32,10 @@ from heptarm.values.robot import Body, RobotModel
 from heptarm.values.state import State
 from heptarm.values.text import lines
 
-#: What is measured: "rests" mass and centre of mass; "short" the inertia too, from the motions between the rests.
-Excitation = Literal["rests", "short"]
-EXCITATIONS = ("rests", "short")
+#: What is measured: "rests" mass and centre of mass; "short" the inertia too, from the motions between the rests;
+#: "full" better, since A4 to A7 swing at each rest.
+Excitation = Literal["rests", "short", "full"]
+EXCITATIONS = ("rests", "short", "full")
 #: By how much A4 to A7 move from the first posture in each rest [deg].
 _OFFSETS = np.array(
     [
@@ -49,10 +52,12 @@ SPEED, SECONDS = 0.1, 2.0
 _NOISE = 5e-5
 #: Time after a motion in which the arm still settles [s].
 _SETTLING = 0.1
-#: Time over which positions of a motion are smoothed, to have accelerations [s].
-_WINDOW = 0.06
+#: How far an axis swings to each side [rad]: so little that it accelerates or brakes all the time.
+_SWING = math.radians(8.0)
 #: Least acceleration of an axis at which a moment of a motion counts [rad/s²], and the most moments that are used.
-_EXCITING, _MOMENTS = 0.5, 600
+_EXCITING, _MOMENTS = 0.5, 2000
+#: Torque of a moment of a motion that the filtered model does not explain, as a fraction of the highest torque.
+_MODEL = 1e-4
 #: Standard deviations that are larger than this are refused before anything moves: mass [kg], moments [kg m].
 _MASS, _MOMENT = 0.15, 0.015
 
@@ -63,7 +68,7 @@ class LoadPlan(Value):
 
     Attributes:
         robot: the robot.
-        excitation: "rests" or "short".
+        excitation: "rests", "short" or "full".
         postures: commanded joint positions of the rests, the present ones first, shape (n, 7) [rad]; A1 to A3 do not
             move.
         speed: fraction of each axis' maximum.
@@ -83,15 +88,25 @@ class LoadPlan(Value):
     high: Array
 
     @property
+    def legs(self) -> tuple[tuple[Motion, ...], ...]:
+        """The motions after each rest, to the next one; back to the first posture at last."""
+        swings = [_swings(self.robot, q) if self.excitation == "full" else [] for q in self.postures]
+        pairs = zip(swings, np.roll(self.postures, -1, axis=0), strict=True)
+        return tuple(tuple(ptp(q) for q in (*swing, following)) for swing, following in pairs)
+
+    @property
     def motions(self) -> tuple[Motion, ...]:
-        """The motions, back to the first posture at last."""
-        return tuple(ptp(q) for q in (*self.postures[1:], self.postures[0]))
+        """All motions."""
+        return tuple(motion for leg in self.legs for motion in leg)
 
     def __str__(self) -> str:
         """What moves, how far, how fast, and for how long."""
         moves = swings(self.postures, self.postures[0], range(3, 7))
         rows = {
             "moves": f"{moves} deg; A1 to A3 stay",
+            "swings": f"by {math.degrees(_SWING):.0f} deg, A4 to A7 in turn at each rest"
+            if self.excitation == "full"
+            else "",
             "flange": f"in the rests {box_text(self.low, self.high)}; between them it moves on arcs",
             "speed": f"at most {self.speed:.0%} of each axis' maximum",
             "rests": f"{len(self.postures)} of {self.seconds:g} s",
@@ -110,7 +125,8 @@ def load_plan(
     Args:
         arm: connected, at rest, with A4 and A6 bent and room around the flange.
         excitation: "rests": mass and centre of mass, from nine rests; "short": the inertia too, from what is measured
-            during the motions between them, which need a higher speed: 0.3 or more.
+            during the motions between them, which need a higher speed: 0.3 or more; "full": A4 to A7 swing at each
+            rest as well, and the inertia is known better.
         speed: ceiling, (0, 1]; the lower one of this and `arm.speed`.
         seconds: time of each rest [s].
 
@@ -149,6 +165,20 @@ def _postures(model: RobotModel, start: Array) -> Array:
             fitting = [angle for angle in (offset, -offset) if down <= angle <= up]
             row[axis] += fitting[0] if fitting else np.clip(offset, min(down, 0.0), max(up, 0.0))
     return result
+
+
+def _swings(model: RobotModel, middle: Array) -> list[Array]:
+    """A swing of each of A4 to A7 to both sides of a posture, within the limits of the joints."""
+    low, high = model.q_min + _ROOM, model.q_max - _ROOM
+    found = []
+    for axis in range(3, 7):
+        for angle in (_SWING, -_SWING, 0.0):
+            there = middle.copy()
+            there[axis] = np.clip(
+                middle[axis] + angle, min(low[axis], middle[axis]), max(high[axis], middle[axis])
+            )
+            found.append(there)
+    return found
 
 
 def _timed(arm: ArmVerbs, plan: LoadPlan) -> LoadPlan:
@@ -194,9 +224,9 @@ def load(
         StaleState: the subscribed groups lack "joints" or "torques".
         MotionAborted: a stop or an error ended it. Others as `arm.move`.
     """
-    _check_groups(arm)
     arm.wait_for_rest()
     made = load_plan(arm) if plan is None else instance(plan, LoadPlan, "plan")
+    _check_states(arm, SLOWEST if made.excitation != "rests" else 0.0)
     if np.abs(arm.state.q_cmd - made.postures[0]).max() > math.radians(1.0):
         raise CommandRejected(
             "the plan begins where the arm does not rest any more",
@@ -204,35 +234,40 @@ def load(
             hint="make a new one with calibration.load_plan(arm)",
         )
     used = arm.load if declared is None else instance(declared, Body, "declared")
-    first, single = _rest(arm, made.seconds)
-    rests = [first]
+    rests = [_rest(arm, made.seconds)]
     check_rating(arm.robot, *_apparent(arm.robot, rests[0], used))
     agree(made, confirm, "measuring the load")
-    moments: list[LoadSamples] = []
-    for index, motion in enumerate(made.motions):
+    moving: list[State] = []
+    for index, leg in enumerate(made.legs):
         with recorded(arm) as states:
-            arm.move(motion, speed=made.speed, mode=Position())
+            arm.move(list(leg), speed=made.speed, mode=Position())
             arm.wait_for_rest()
-        if made.excitation == "short":
-            moments += _moments(states, single)
+        moving += states
         if index + 1 < len(made.postures):
-            rests.append(_rest(arm, made.seconds)[0])
+            rests.append(_rest(arm, made.seconds))
         if progress is not None:
             progress(len(rests), len(made.postures))
-    return estimate_load(_thinned(rests, moments), robot=arm.robot, declared=used)
+    samples = rests[0]
+    for rest in rests[1:]:
+        samples = samples.joined(rest)
+    if made.excitation != "rests":
+        samples = samples.joined(moving_samples(_samples_of(moving), arm.robot, declared=used))
+    return estimate_load(samples, robot=arm.robot, declared=used)
 
 
-def _check_groups(arm: ArmVerbs) -> None:
+def _check_states(arm: ArmVerbs, least: float) -> None:
+    """Refuse an arm whose states do not suffice; at least so many per second."""
     missing = {"joints", "torques"} - set(arm.groups)
-    if arm.state_rate <= 0 or missing:
+    if arm.state_rate <= least or missing:
         raise StaleState(
-            'measuring a load needs the state groups "joints" and "torques"',
-            hint='arm.subscribe(rate=200, groups=(..., "joints", "torques"))',
+            'measuring a load needs the state groups "joints" and "torques", and for its inertia at least 200 states '
+            f"per second, got {arm.state_rate:g} with {', '.join(arm.groups)}",
+            hint='arm.subscribe(rate=500, groups=(..., "joints", "torques"))',
         )
 
 
-def _rest(arm: ArmVerbs, seconds: float) -> tuple[LoadSamples, Array]:
-    """Mean of the states of a rest, and the noise of one state, shape (7,) [Nm]."""
+def _rest(arm: ArmVerbs, seconds: float) -> LoadSamples:
+    """Mean of the states of a rest."""
     first, rows = arm.state.stamp + round(_SETTLING * 1e9), dict[int, State]()
     pushed = arm.states()
     for state in pushed:
@@ -245,9 +280,9 @@ def _rest(arm: ArmVerbs, seconds: float) -> tuple[LoadSamples, Array]:
     q, tau, tau_ext = (
         np.array([getattr(state, name) for state in rows.values()]) for name in ("q", "tau", "tau_ext")
     )
-    single = tau_ext.std(axis=0)
-    means = (q.mean(axis=0), tau.mean(axis=0), tau_ext.mean(axis=0), single / math.sqrt(len(rows)))
-    return LoadSamples(*(mean[None] for mean in means)), single
+    noise = tau_ext.std(axis=0) / math.sqrt(len(rows))
+    means = (q.mean(axis=0), tau.mean(axis=0), tau_ext.mean(axis=0), noise)
+    return LoadSamples(*(mean[None] for mean in means))
 
 
 def _apparent(model: RobotModel, rest: LoadSamples, used: Body | None) -> tuple[float, float]:
@@ -277,34 +312,40 @@ def recorded(arm: ArmVerbs) -> Iterator[list[State]]:
     pushed.close()
 
 
-def _moments(states: list[State], single: Array) -> list[LoadSamples]:
-    """What a motion shows: positions smoothed over a short time by parabolas, torques by their means."""
-    rows = {s.torques.stamp: s for s in states if s.torques is not None and s.joints is not None}
-    kept = list(rows.values())
-    if len(kept) < 3:
-        return []
-    t_q = np.array([s.joints.stamp for s in kept if s.joints is not None]) * 1e-9
-    t = np.array(list(rows)) * 1e-9
-    q, tau, tau_ext = (np.array([getattr(s, name) for s in kept]) for name in ("q", "tau", "tau_ext"))
-    found = []
-    for middle in np.arange(t[0] + _WINDOW, t[-1] - _WINDOW, _WINDOW):
-        near = np.abs(t - middle) <= _WINDOW / 2.0
-        near_q = np.abs(t_q - middle) <= _WINDOW / 2.0
-        if near.sum() < 5 or near_q.sum() < 5:
-            continue
-        c = np.polynomial.polynomial.polyfit(t_q[near_q] - middle, q[near_q], 3)
-        if np.abs(2.0 * c[2]).max() < _EXCITING:
-            continue
-        noise = single / math.sqrt(near.sum())
-        row = (c[0], tau[near].mean(axis=0), tau_ext[near].mean(axis=0), noise, c[1], 2.0 * c[2])
-        found.append(LoadSamples(*(entry[None] for entry in row)))
-    return found
+def _samples_of(states: list[State]) -> ArmSamples:
+    """States as samples, each moment once."""
+    rows = {state.torques.stamp: state for state in states if state.torques is not None}
+    names = ("q", "q_cmd", "tau", "tau_ext")
+    columns = [np.array([getattr(rows[stamp], name) for stamp in sorted(rows)]) for name in names]
+    times = 1e-9 * (np.array(sorted(rows)) - min(rows))
+    q, q_cmd, tau, tau_ext = columns
+    return ArmSamples(times, q, q_cmd, tau, tau_ext, tau)  # what the motors are commanded does not count here
 
 
-def _thinned(rests: list[LoadSamples], moments: list[LoadSamples]) -> LoadSamples:
-    """All samples as one; of very many moments some."""
-    step = max(1, math.ceil(len(moments) / _MOMENTS))
-    result = rests[0]
-    for moment in (*rests[1:], *moments[::step]):
-        result = result.joined(moment)
-    return result
+def moving_samples(samples: ArmSamples, model: RobotModel, *, declared: Body | None) -> LoadSamples:
+    """What motions show of a load: the windows of a recording in which an axis accelerates.
+
+    Args:
+        samples: of the motions.
+        model: the robot.
+        declared: load data that the cabinet used; None: none.
+
+    Raises:
+        CommandRejected: the states are too few, or nothing accelerates.
+    """
+    windows = aligned_windows(samples, model, load=declared, acceleration=GRAVITY)
+    exciting = np.abs(windows.ddq).max(axis=1) > _EXCITING
+    if not exciting.any():
+        raise CommandRejected(
+            f"no axis accelerates by {_EXCITING:g} rad/s²: the inertia cannot be measured",
+            parameter="speed",
+            hint="a higher speed, 0.3 or more",
+        )
+    chosen = windows.some(exciting).thinned(_MOMENTS)
+    # windows overlap by half, so that the noise of neighbours is not independent
+    half, weights = len(chosen.centre) // 2, chosen.centre
+    shared = float(weights[half:] @ weights[: len(weights) - half])
+    noise = chosen.tau_noise * math.sqrt(float(weights @ weights) + 2.0 * shared)
+    rows = np.tile(np.hypot(noise, _MODEL * model.tau_max), (len(chosen.t), 1))
+    spread = np.full(len(chosen.t), math.sqrt(float(weights @ chosen.offsets**2)))
+    return LoadSamples(chosen.q, chosen.tau, chosen.tau_ext, rows, chosen.dq, chosen.ddq, spread)

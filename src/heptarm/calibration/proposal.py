@@ -1,14 +1,16 @@
-"""What a calibration is about to move, in words, and the consent to it: nothing moves before both."""
+"""What a calibration is about to move, in words, the consent to it, without which nothing moves, and its states."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
 
-from heptarm.errors import CommandRejected
+from heptarm.arm.verbs import ArmVerbs
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.model.kinematics import forward
 from heptarm.values.checks import Array, callback, frozen
 from heptarm.values.robot import RobotModel
@@ -16,6 +18,8 @@ from heptarm.values.robot import RobotModel
 _log = logging.getLogger("heptarm.calibration")
 
 PlanT = TypeVar("PlanT")
+#: Pushed states per second while something is measured: their means count [Hz].
+RATE = 500.0
 
 
 def swings(postures: Array, start: Array, axes: Iterable[int] = range(7)) -> str:
@@ -50,3 +54,15 @@ def agree(plan: PlanT, confirm: Callable[[PlanT], bool] | None, what: str) -> No
     _log.info("%s", plan)
     if confirm is not None and not callback(confirm, "confirm")(plan):
         raise CommandRejected(f"{what} was not confirmed: nothing moves", parameter="confirm")
+
+
+@contextlib.contextmanager
+def measuring(arm: ArmVerbs) -> Iterator[None]:
+    """A block in which the arm pushes as many states as a measurement needs; afterwards as many as before."""
+    before = arm.state_rate
+    arm.subscribe(rate=RATE, groups=arm.groups)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(HeptarmError):  # the connection is lost, which was reported
+            arm.subscribe(rate=before, groups=arm.groups)

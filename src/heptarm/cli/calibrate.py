@@ -17,6 +17,7 @@ from heptarm.calibration.excitation import REACH
 from heptarm.calibration.excitation import SECONDS as EXCITED
 from heptarm.calibration.excitation import SPEED as FASTEST
 from heptarm.calibration.load_motion import SECONDS, SPEED
+from heptarm.calibration.proposal import RATE
 from heptarm.calibration.tip import TOLERANCE
 from heptarm.calibration.touching import TOUCHES
 from heptarm.cli.options import Access, CommandTarget, Model
@@ -37,8 +38,6 @@ from heptarm.values.tool import KnownTool, Tool
 _ACCESS = Access()
 #: Longest time in which a person guides the arm to a pose [s].
 _GUIDED = 600.0
-#: Pushed states per second: many, for their mean is what counts [Hz].
-_RATE = 500.0
 
 Save = Annotated[
     str,
@@ -133,7 +132,7 @@ def tcp(
     old: Tool | KnownTool | str
     if surface:
         known = calibration.KnownSurface.parse(surface)
-        with target.connect(control=not dry_run, state_rate=_RATE) as arm:
+        with target.connect(control=not dry_run, state_rate=RATE) as arm:
             plan = calibration.touch_plan(arm, known, tip_radius=tip_radius, touches=touches)
             if dry_run:
                 print(plan)
@@ -173,9 +172,7 @@ def load(
     *,
     inertia: Annotated[
         bool,
-        Parameter(
-            negative="", help="Measure the inertia, too, during the motions: give a --speed of 0.3 or more."
-        ),
+        Parameter(negative="", help="Measure the inertia, too: A4 to A7 swing by 8 degrees at each rest."),
     ] = False,
     speed: Annotated[float, Parameter(help="Fraction of the full speed, (0, 1].")] = SPEED,
     seconds: Annotated[float, Parameter(help="Time of each rest [s].")] = SECONDS,
@@ -193,12 +190,12 @@ def load(
 
         heptarm calibrate load --target lab1
 
-        heptarm calibrate load --inertia --speed 0.4 --save gripper --target lab1
+        heptarm calibrate load --inertia --save gripper --target lab1
     """
     place = saved_as(save, access.target)
-    with access.target.connect(control=not dry_run, state_rate=_RATE) as arm:
+    with access.target.connect(control=not dry_run, state_rate=RATE) as arm:
         plan = calibration.load_plan(
-            arm, excitation="short" if inertia else "rests", speed=speed, seconds=seconds
+            arm, excitation="full" if inertia else "rests", speed=speed, seconds=seconds
         )
         if dry_run:
             print(plan)
@@ -267,7 +264,7 @@ def arm(
     if save is not None:
         refuse_existing(save, overwrite=overwrite, name="save")
     if run is None:
-        with access.target.connect(control=not dry_run, state_rate=_RATE) as one:
+        with access.target.connect(control=not dry_run, state_rate=RATE) as one:
             world = CollisionModel(one.robot.name)
             plan = calibration.excitation(
                 one, seconds=seconds, speed=speed, reach=reach, collision_check=world

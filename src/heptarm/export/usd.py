@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import degrees, isfinite
+from math import degrees, isfinite, radians
 
 import numpy as np
 
-from heptarm.export.tree import BASE, TreeBody, TreeShape, poses_in_base
+from heptarm.export.tree import BASE, TreeBody, TreeJoint, TreeShape, poses_in_base
 from heptarm.export.xml_formats import number
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
@@ -156,7 +156,10 @@ def _joint(root: str, body: TreeBody, frames: Mapping[str, TreeBody]) -> list[st
         kind = "PhysicsPrismaticJoint" if joint.kind == "slide" else "PhysicsRevoluteJoint"
         name, own = joint.name, _along(joint.axis, joint.anchor)
     in_parent = pose @ own
-    lines = [f'def {kind} "{prim(name if joint is None else f"joint_{name}")}"', "{"]
+    drive = "linear" if joint is not None and joint.kind == "slide" else "angular"
+    schemas = f'"PhysicsDriveAPI:{drive}", "PhysxJointAPI"'
+    head = f'def {kind} "{prim(name if joint is None else f"joint_{name}")}"'
+    lines = [head, "{"] if joint is None else [f"{head} (", f"    prepend apiSchemas = [{schemas}]", ")", "{"]
     inner = [
         f"rel physics:body0 = </{root}/{prim(parent)}>",
         f"rel physics:body1 = </{root}/{prim(body.name)}>",
@@ -173,7 +176,22 @@ def _joint(root: str, body: TreeBody, frames: Mapping[str, TreeBody]) -> list[st
                 f"float physics:lowerLimit = {number(unit(joint.low))}",
                 f"float physics:upperLimit = {number(unit(joint.high))}",
             ]
+        inner += _resistance(joint)
     return [*lines, *_lines(inner), "}"]
+
+
+def _resistance(joint: TreeJoint) -> list[str]:
+    """Damping by UsdPhysics, Coulomb friction and the drive's inertia by PhysX; angles are in degrees."""
+    kind, per = ("angular", radians(1.0)) if joint.kind == "hinge" else ("linear", 1.0)
+    lines = [
+        f"float drive:{kind}:physics:damping = {number(joint.damping * per)}",
+        f"float drive:{kind}:physics:stiffness = 0",
+        f"float physxJoint:armature = {number(joint.armature)}",
+        f"float physxJoint:jointFriction = {number(joint.friction)}",
+    ]
+    if isfinite(joint.effort):
+        lines.append(f"float drive:{kind}:physics:maxForce = {number(joint.effort)}")
+    return lines
 
 
 def _along(axis: Array, anchor: Array) -> Pose:

@@ -1,15 +1,16 @@
-"""What is drawn in three dimensions: arm and scene, a plan, the path driven, the force of a contact, frames, points."""
+"""What is drawn in three dimensions: arm, scene, a program's world, a plan, the path driven, forces, frames, points."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.carried import GEOMS, mujoco_size
 from heptarm.sim.plant.scene import PREFIX, Scene, is_mounted, plain
@@ -17,8 +18,10 @@ from heptarm.sim.plant.shapes import DrawnShape, drawn_shapes, solid
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.checks import Array
+from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
 from heptarm.values.shape import Shape
+from heptarm.values.world import WorldArm, WorldBody, WorldOutline
 
 _GHOST, _TOUCH = (90, 170, 255), (224, 49, 49)
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
@@ -43,7 +46,7 @@ class DrawnWorld:
         server: a viser server.
         model: "iiwa7", "iiwa14", "med7" or "med14".
         scene: what is around the arm and on its flange; None: nothing.
-        positions: file in which the simulator writes all positions; None: only the arm moves.
+        positions: file in which the simulator writes all positions; None: only the arm moves, and what a program says.
         meshes: of the arm; None: heptarm's own.
         root: node of viser's scene that is the base of the arm; empty: the world.
     """
@@ -58,24 +61,73 @@ class DrawnWorld:
         *,
         root: str = "",
     ) -> None:
-        self._model = compiled(model, (), scene, meshes or ArmMeshes())
+        self._server, self._robot, self._meshes, self._root = server, model, meshes or ArmMeshes(), root
+        self._is_own = scene is not None
+        self._positions = positions
+        self._scene = server.scene
+        self._handles: list[tuple[int, Any]] = []
+        self._names: list[tuple[int, Any]] = []
+        self._held: dict[int, Pose] = {}  # by address of a free body: its pose in the flange frame
+        self._base = self._scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
+        self._flange = self._scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
+        self._carried: tuple[tuple[Shape, Pose], ...] = ()
+        self._carried_handles: list[Any] = []
+        self._text, self._has_tool = "", False
+        self._draw(scene)
+
+    def _draw(self, scene: Scene | None) -> None:
+        """Draw arm and scene, in place of those before."""
+        self.erase()
+        self._model = compiled(self._robot, (), scene, self._meshes)
         self._data = mujoco.MjData(self._model)
-        self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
+        self._read = None if self._positions is None else PositionsFile(self._positions, self._model.nq)
+        self._has_tool = is_mounted(self._model)
         self._handles = [
             (
                 shape.index,
-                server.scene.add_mesh_simple(
-                    f"{root}/world/{shape.index}", shape.vertices, shape.faces, color=shape.colour
+                self._scene.add_mesh_simple(
+                    f"{self._root}/world/{shape.index}", shape.vertices, shape.faces, color=shape.colour
                 ),
             )
             for shape in drawn_shapes(self._model)
         ]
-        server.scene.add_frame(f"{root}/base", axes_length=0.15, axes_radius=0.004)
-        self._flange = server.scene.add_frame(f"{root}/flange", axes_length=0.06, axes_radius=0.002)
-        self._scene, self._root, self._has_tool = server.scene, root, is_mounted(self._model)
-        self._carried: tuple[tuple[Shape, Pose], ...] = ()
-        self._carried_handles: list[Any] = []
-        self._names: list[tuple[int, Any]] = []
+
+    def erase(self) -> None:
+        """Draw arm and scene no more."""
+        for _, handle in (*self._handles, *self._names):
+            handle.remove()
+        self._handles, self._names, self._held = [], [], {}
+        self.carry(())
+
+    def have(self, scene: str, placed: tuple[WorldBody, ...]) -> None:
+        """Draw the scene of a program, if there is none of its own, and put its free bodies where the program has them.
+
+        Nothing is put where a simulator reports where it is.
+
+        Args:
+            scene: its file; "": none.
+            placed: free bodies of that scene.
+        """
+        if not self._is_own and scene != self._text:
+            self._text = scene
+            is_named = bool(self._names)
+            self._draw(Scene.of(scene) if scene else None)
+            self.name_bodies(visible=is_named)
+        self._held = {}
+        names = {plain(str(self._model.body(body).name)): body for body in self._standing}
+        for body in placed:
+            joint = int(self._model.body_jntadr[names[body.name]]) if body.name in names else -1
+            if joint < 0 or self._model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+                continue
+            address = int(self._model.jnt_qposadr[joint])
+            if body.is_held:
+                self._held[address] = body.pose
+            else:
+                self._put(address, body.pose)
+
+    def _put(self, address: int, pose: Pose) -> None:
+        self._data.qpos[address : address + 3] = pose.xyz
+        self._data.qpos[address + 3 : address + 7] = wxyz(pose)
 
     def carry(self, shapes: tuple[tuple[Shape, Pose], ...]) -> None:
         """Draw shapes on the flange, each at its pose in the flange frame, in place of those before.
@@ -100,12 +152,19 @@ class DrawnWorld:
 
     def show(self, q: Array) -> None:
         """Move the shapes to joint positions, shape (7,) [rad]; those of the scene to the simulator's."""
-        everything = None if self._positions is None else self._positions.read()
+        everything = None if self._read is None else self._read.read()
         if everything is not None:
             self._data.qpos[:] = everything
         self._data.qpos[:7] = q
         mujoco.mj_kinematics(self._model, self._data)
         quat = np.zeros(4)
+        if self._held and everything is None:
+            at = self.flange
+            mujoco.mju_mat2Quat(quat, at.xmat)
+            carrier = Pose.of(at.xpos.copy(), np.roll(quat, -1))
+            for address, pose in self._held.items():
+                self._put(address, carrier @ pose)
+            mujoco.mj_kinematics(self._model, self._data)
         for index, handle in self._handles:
             mujoco.mju_mat2Quat(quat, self._data.geom_xmat[index])
             handle.position, handle.wxyz = self._data.geom_xpos[index].copy(), quat.copy()
@@ -155,6 +214,104 @@ class DrawnWorld:
     def flange(self) -> Any:
         """MuJoCo's view of the flange, as it was shown last: `xpos` is its position in the base, shape (3,) [m]."""
         return self._data.site("flange")
+
+
+class DrawnBodies:
+    """What a program shows of its world, besides the scene: bodies with their names, and other arms.
+
+    Args:
+        server: a viser server.
+        meshes: of the arms.
+        root: node of viser's scene that is the base of the arm; it has a node `flange`.
+    """
+
+    def __init__(self, server: Any, meshes: ArmMeshes, root: str) -> None:
+        self._server, self._meshes, self._root = server, meshes, root
+        self._shown: WorldOutline | None = None
+        self._bodies: dict[str, tuple[WorldBody, list[Any]]] = {}
+        self._arms: dict[str, tuple[WorldArm, Any, DrawnWorld]] = {}
+        self._drawn = 0
+
+    def show(self, outline: WorldOutline | None) -> None:
+        """Draw a world, in place of the one before; None: nothing."""
+        if outline is self._shown:
+            return
+        self._shown = outline
+        bodies = {} if outline is None else {body.name: body for body in outline.bodies}
+        arms = {} if outline is None else {arm.name: arm for arm in outline.arms}
+        for name in [
+            name for name, (body, _) in self._bodies.items() if not _is_same(body, bodies.get(name))
+        ]:
+            for handle in reversed(self._bodies.pop(name)[1]):  # viser removes what is below a node with it
+                handle.remove()
+        for name, body in bodies.items():
+            handles = self._bodies[name][1] if name in self._bodies else self._draw(body)
+            handles[0].position, handles[0].wxyz = body.pose.xyz, wxyz(body.pose)
+            self._bodies[name] = body, handles
+        for name in [name for name, (arm, _, _) in self._arms.items() if not _is_same(arm, arms.get(name))]:
+            _, node, drawn = self._arms.pop(name)
+            drawn.erase()
+            node.remove()
+        for name, arm in arms.items():
+            node, drawn = self._arms[name][1:] if name in self._arms else self._draw_arm(arm)
+            node.position, node.wxyz = arm.pose.xyz, wxyz(arm.pose)
+            drawn.show(arm.q)
+            self._arms[name] = arm, node, drawn
+
+    def _node(self, kind: str) -> str:
+        self._drawn += 1  # a name may have characters that viser's paths have not
+        return f"{self._root}/{kind}/{self._drawn}"
+
+    def _draw(self, body: WorldBody) -> list[Any]:
+        """The handles of a body, its frame first."""
+        scene, node = self._server.scene, self._node("flange/held" if body.is_held else "added")
+        red, green, blue, opacity = body.color
+        colour = (round(255 * red), round(255 * green), round(255 * blue))
+        handles = [scene.add_frame(node, show_axes=False)]
+        for number, shape in enumerate(body.shapes):
+            if isinstance(shape, Mesh):
+                vertices, faces = shape.vertices, shape.faces
+            else:
+                vertices, faces = solid(int(GEOMS[shape.kind]), mujoco_size(shape.kind, shape.size))
+            handles.append(
+                scene.add_mesh_simple(
+                    f"{node}/{number}",
+                    vertices,
+                    faces,
+                    color=colour,
+                    opacity=None if opacity == 1.0 else opacity,
+                    position=shape.pose.xyz,
+                    wxyz=wxyz(shape.pose),
+                )
+            )
+        if len(body.points):
+            handles.append(
+                scene.add_point_cloud(
+                    f"{node}/points",
+                    body.points.astype(np.float32),
+                    colour,
+                    point_size=2.0 * body.radius,
+                    point_shape="circle",
+                )
+            )
+        middle = body.points.mean(axis=0) if len(body.points) else (0.0, 0.0, 0.0)
+        handles.append(scene.add_label(f"{node}/name", body.name, position=middle))
+        return handles
+
+    def _draw_arm(self, arm: WorldArm) -> tuple[Any, DrawnWorld]:
+        root = self._node("arm")
+        node = self._server.scene.add_frame(root, show_axes=False)
+        drawn = DrawnWorld(self._server, arm.robot, meshes=self._meshes, root=root)
+        drawn.carry(tuple((shape, shape.pose) for shape in arm.shapes))
+        self._server.scene.add_label(f"{root}/name", arm.name)
+        return node, drawn
+
+
+def _is_same(before: WorldBody | WorldArm, now: WorldBody | WorldArm | None) -> bool:
+    """Whether something is what it was, but for its place."""
+    if isinstance(before, WorldArm):
+        return isinstance(now, WorldArm) and replace(now, pose=before.pose, q=before.q) == before
+    return isinstance(now, WorldBody) and replace(now, pose=before.pose) == before
 
 
 class DrawnGhost:

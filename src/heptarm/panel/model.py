@@ -11,14 +11,14 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionError
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
 from heptarm.panel.wizard import Wizard, WizardSettings
@@ -29,6 +29,7 @@ from heptarm.values.io import SignalValue
 from heptarm.values.motion.planned_path import Path as PlannedPath
 from heptarm.values.pose import Pose
 from heptarm.values.state import GROUP_NAMES, Safety, State
+from heptarm.values.world import WorldOutline
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
@@ -139,6 +140,7 @@ class PanelArm:
     Attributes:
         wizard: measures tool, load and camera.
         plan: that a ghost of the arm shows; None: there is none.
+        world: that a program shows; None: none does.
     """
 
     def __init__(
@@ -156,7 +158,8 @@ class PanelArm:
         self.arm = arm
         self._scene = scene
         self._planning = threading.Lock()
-        self._world: CollisionModel | None = None
+        self.world: WorldOutline | None = None
+        self._model: CollisionModel | None = None
         self._found: tuple[PlannedPath, float] | None = None
         self.gripper = gripper
         self.wizard = Wizard(arm, target, show=self.show_plan, report=self.report)
@@ -471,12 +474,17 @@ class PanelArm:
         self.hide_plan()
 
     def _placed(self, places: Mapping[str, Pose]) -> CollisionModel:
-        """The bodies of the scene where they are now."""
-        if self._world is None:
-            self._world = CollisionModel(self.arm.robot.name, scene=self._scene)
+        """The bodies of the scene where they are now, and those that a program shows; always the same model."""
+        shown = self.world or WorldOutline(self.arm.robot.name)
+        made = CollisionModel.of(replace(shown, scene=self._scene or shown.scene))
         for name, pose in places.items():
-            self._world.place(name, pose)
-        return self._world
+            if made.held(name) is None:
+                made.place(name, pose)
+        if self._model is None:
+            self._model = made
+        else:
+            self._model.become(made)
+        return self._model
 
     def measure(self, kind: str, settings: WizardSettings) -> None:
         """Begin to measure tool, load or camera; see `Wizard.begin`."""

@@ -6,6 +6,7 @@ callbacks of held buttons run in viser's event loop, in the order in which the b
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from heptarm import calibration
 from heptarm.calibration.board import KINDS as BOARDS
 from heptarm.errors import HeptarmError
 from heptarm.panel import texts
-from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld, wxyz
+from heptarm.panel.drawing import DrawnBodies, DrawnGhost, DrawnMarks, DrawnWorld, wxyz
 from heptarm.panel.jog import JOINT_SPEED, LINE_SPEED, TURN_SPEED, Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import HISTORY, PanelArm, Readout
 from heptarm.panel.wizard import KINDS, WizardSettings
@@ -26,6 +27,9 @@ from heptarm.values.camera import FRAMES
 from heptarm.values.frames import BASE, FLANGE, TOOL
 from heptarm.values.motion.planned_path import OnPlane, PathConstraint, Upright
 from heptarm.values.pose import Pose
+from heptarm.values.world import WorldOutline
+
+log = logging.getLogger("heptarm.panel")
 
 #: How often a held button asks again [Hz].
 _HOLD_RATE = 10.0
@@ -57,6 +61,7 @@ class ArmPage:
         server: a viser server.
         model: the arm.
         world: its bodies.
+        bodies: those of the world that a program shows.
         marks: what else is drawn of it.
         ghost: shows its plan.
         root: node of viser's scene that is the base of the arm; empty: the world.
@@ -68,6 +73,7 @@ class ArmPage:
         server: Any,
         model: PanelArm,
         world: DrawnWorld,
+        bodies: DrawnBodies,
         marks: DrawnMarks,
         ghost: DrawnGhost,
         *,
@@ -76,7 +82,8 @@ class ArmPage:
     ) -> None:
         self.model = model
         self._server, self._gui = server, server.gui
-        self._world, self._marks, self._ghost, self._root = world, marks, ghost, root
+        self._world, self._bodies, self._marks, self._ghost, self._root = world, bodies, marks, ghost, root
+        self._outline: WorldOutline | None = None
         self._points: tuple[Any, ...] = ()
         self._client: int | None = None
         self._trail: tuple[int, ...] = ()
@@ -133,6 +140,8 @@ class ArmPage:
         state, tcp = readout.state, readout.tcp
         if state is None or state.groups.joints is None:
             return
+        if self.model.world is not self._outline:
+            self._show_world(self.model.world)
         self._world.show(state.q)
         self._world.carry(self.model.arm.shapes)
         if tcp is not None:
@@ -140,6 +149,14 @@ class ArmPage:
             self._marks.show(tcp, np.array(self._world.flange.xpos), force)
         self._marks.show_target(readout.target)
         self._ghost.show(self.model.plan, self.model.plan_time)
+
+    def _show_world(self, outline: WorldOutline | None) -> None:
+        self._outline = outline
+        self._bodies.show(outline)
+        try:
+            self._world.have(*("", ()) if outline is None else (outline.scene, outline.placed))
+        except (ValueError, HeptarmError) as error:
+            log.warning("the scene that a program shows cannot be drawn: %s", error)
 
     def write(self, readout: Readout) -> None:
         """Write the texts."""

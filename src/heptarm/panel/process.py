@@ -29,7 +29,7 @@ from heptarm.arm.link.halt import halt
 from heptarm.errors import CommandRejected, HeptarmError, require
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
-from heptarm.io.plan_box import PlanBox
+from heptarm.io.panel_box import PanelBox
 from heptarm.panel import frame, texts
 from heptarm.panel.guard import Page, PageGuard, free_port, is_local
 from heptarm.panel.model import PanelArm, groups_for
@@ -142,7 +142,7 @@ class Panel:
 
     def __init__(self, arms: Sequence[PanelArm], options: PanelOptions) -> None:
         require("viser", extra="viz")
-        from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld
+        from heptarm.panel.drawing import DrawnBodies, DrawnGhost, DrawnMarks, DrawnWorld
         from heptarm.panel.page import ArmPage
         from heptarm.sim.plant.appearance import ArmMeshes
         from heptarm.sim.plant.scene import Scene
@@ -184,6 +184,7 @@ class Panel:
                         meshes,
                         root=root,
                     ),
+                    DrawnBodies(server, meshes, root),
                     DrawnMarks(server, root),
                     DrawnGhost(server, model.arm.robot.name, meshes, root),
                     root=root,
@@ -197,7 +198,7 @@ class Panel:
         server.on_client_disconnect(self._forget)
         guard.port = server.get_port()  # from now on it lets in who has the token
         self.url = guard.url
-        self._box = PlanBox([model.arm.robot.name for model in self._arms])
+        self._box = PanelBox([model.arm.robot.name for model in self._arms])
 
     def _frame(self) -> tuple[http.HTTPStatus, str, str]:
         """The page around viser's."""
@@ -238,6 +239,8 @@ class Panel:
             return  # nobody looks
         if count % _PLANS == 0:
             self._take_plan()
+        if count % _TEXTS == 0:
+            self._look_at_world()
         with self.server.atomic():
             for page, readout in zip(self._pages, readouts, strict=True):
                 page.draw(readout)
@@ -261,6 +264,14 @@ class Panel:
         fitting = [model for model in self._arms if model.arm.robot.name == plan.robot]
         if fitting:
             min(fitting, key=distance).show_plan(plan)
+
+    def _look_at_world(self) -> None:
+        """Show the world of a program with the first arm of its robot."""
+        world = self._box.world()
+        for model in self._arms:
+            is_its = world is not None and model.arm.robot.name == world.robot
+            model.world = world if is_its else None
+            world = None if is_its else world
 
     def run(self) -> None:
         """Draw until `close` is called."""

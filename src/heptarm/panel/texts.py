@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.panel.model import Advice, Readout
 from heptarm.panel.points import PointList
 from heptarm.panel.wizard import WizardStep

@@ -18,8 +18,9 @@ import numpy.typing as npt
 
 from heptarm import calibration
 from heptarm.arm.devices.camera import opened_camera
+from heptarm.calibration.proposal import measuring
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict
-from heptarm.io.plan_box import PlanOutline
+from heptarm.io.panel_box import PlanOutline
 from heptarm.io.targets import saved_target
 from heptarm.values.camera import Camera
 from heptarm.values.checks import Value, word
@@ -34,8 +35,6 @@ KINDS = {
     "load": "Load",
     "camera": "Camera",
 }
-#: States per second while something is measured: many, for their mean counts [Hz].
-_RATE = 500.0
 #: The camera of a virtual arm: beside the flange, looking along its axis.
 _SIMULATED = Camera((0.06, 0.0, 0.04), (0.05, 0.0, 0.4), frame="flange", rate=10.0, shadows=False)
 #: Side of the mark of a corner in a picture [pixels].
@@ -205,18 +204,15 @@ class Wizard:
         self._put(done=done, count=count)
 
     def _run(self, work: Callable[[], Any]) -> None:
-        before = self._arm.state_rate
         try:
-            self._arm.subscribe(rate=_RATE, groups=self._arm.groups)
-            found = work()
+            with measuring(self._arm):
+                found = work()
         except HeptarmError as error:
             self._report(error)
         else:
             self._save = self._saver(found)
             self._put(result=str(found))
         finally:
-            with contextlib.suppress(HeptarmError):  # the connection is lost, which was reported
-                self._arm.subscribe(rate=before, groups=self._arm.groups)
             self._put(is_running=False, asks="")
 
     def _saver(self, found: Any) -> Callable[[str, str], object]:
@@ -253,7 +249,7 @@ class Wizard:
         def work() -> calibration.IdentifiedLoad:
             plan = calibration.load_plan(
                 self._arm,
-                excitation="short" if settings.inertia else "rests",
+                excitation="full" if settings.inertia else "rests",
                 speed=settings.speed,
                 seconds=settings.seconds,
             )

@@ -24,7 +24,7 @@ from heptarm.errors import NoPath, ShapeError, require
 from heptarm.model.batch import solve_batch
 from heptarm.planning.constraints import Constraints, constraints_of
 from heptarm.values.checks import Array, array, frozen, instance, integer, shown, within
-from heptarm.values.clearance import Clearance, PlanningWorld
+from heptarm.values.clearance import Clearance, CollisionWorld
 from heptarm.values.motion.dynamics import Dynamics
 from heptarm.values.motion.planned_path import Path, PathConstraint, Region, SearchStats
 from heptarm.values.motion.ptp import Ptp
@@ -66,7 +66,7 @@ Keep = PathConstraint | Sequence[PathConstraint]
 
 
 def find_path(
-    world: PlanningWorld,
+    world: CollisionWorld,
     *,
     start: npt.ArrayLike,
     goal: Goal,
@@ -116,7 +116,7 @@ def find_path(
         LimitError: a value outside its range.
         MissingExtra: the planner is not installed.
     """
-    if not isinstance(world, PlanningWorld):
+    if not isinstance(world, CollisionWorld):
         raise ShapeError(
             f"world must be a model of bodies, got {shown(world)}",
             parameter="world",
@@ -249,6 +249,8 @@ class _Tree:
 
     def __init__(self, roots: Array) -> None:
         self._parents: list[int] = []
+        self._asked, self._drawn = np.empty(7), np.empty((_DRAWN, 7))
+        self._given = self._asked.ctypes.data, self._drawn.ctypes.data
         self._keep(np.empty((max(256, 2 * len(roots)), 7)), np.full(max(256, 2 * len(roots)), inf))
         for root in roots:
             self.add(root, -1)
@@ -269,7 +271,8 @@ class _Tree:
 
     def nearest(self, q: Array) -> int:
         """Index of the nearest joint positions."""
-        found: int = _functions().hn_nearest(len(self._parents), self._addresses[0], q.ctypes.data)
+        self._asked[:] = q
+        found: int = _functions().hn_nearest(len(self._parents), self._addresses[0], self._given[0])
         return found
 
     def target(self, random: np.random.Generator, low: Array, high: Array, *, near: float) -> Array:
@@ -279,10 +282,10 @@ class _Tree:
         [rad].
         """
         count = len(self._parents)
-        drawn: Array = low + (high - low) * random.random((_DRAWN, 7))
-        first: int = _functions().hn_within(count, *self._addresses, _DRAWN, drawn.ctypes.data)
+        self._drawn[:] = low + (high - low) * random.random((_DRAWN, 7))
+        first: int = _functions().hn_within(count, *self._addresses, _DRAWN, self._given[1])
         if first >= 0:
-            chosen: Array = drawn[first]
+            chosen: Array = self._drawn[first].copy()
             return chosen
         middle = random.integers(count)
         found: Array = self._q[middle] + min(self._reach[middle], near) * _in_ball(random)
@@ -328,7 +331,7 @@ class _Search:
 
     def __init__(
         self,
-        world: PlanningWorld,
+        world: CollisionWorld,
         start: Array,
         tcp: Pose,
         keep: Sequence[PathConstraint],
@@ -488,7 +491,8 @@ class _Search:
                 near = other.nearest(one.at(new))
                 reached = self._extend(other, one.at(new), steps=1000)
                 near = near if reached is None else reached
-                gap = float(np.linalg.norm(other.at(near) - one.at(new)))
+                between = other.at(near) - one.at(new)
+                gap = sqrt(between @ between)
                 nearest = min(nearest, gap)
                 if gap < 1e-9:
                     first, last = (other, near), (one, new)
@@ -689,7 +693,7 @@ class _Search:
 def _in_ball(random: np.random.Generator) -> Array:
     """A random place in the ball of radius 1 around the origin, shape (7,)."""
     direction = random.normal(size=7)
-    found: Array = direction * (random.uniform() ** (1.0 / 7.0) / np.linalg.norm(direction))
+    found: Array = direction * (random.uniform() ** (1.0 / 7.0) / sqrt(direction @ direction))
     return found
 
 

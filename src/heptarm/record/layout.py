@@ -350,14 +350,16 @@ def image_data(message: bytes) -> bytes:
     return next((value for tag, _, value in fields(message) if tag == 2 and isinstance(value, bytes)), b"")
 
 
-def encode_calibration(nanos: int, frame: str, size: tuple[int, int], matrix: Array) -> bytes:
-    """How a camera without distortion projects; `nanos` since 1970, its intrinsic matrix, shape (3, 3) [pixels]."""
+def encode_calibration(
+    nanos: int, frame: str, size: tuple[int, int], matrix: Array, distortion: Sequence[float]
+) -> bytes:
+    """How a camera projects; `nanos` since 1970, its intrinsic matrix, shape (3, 3) [pixels], k1 k2 p1 p2 k3."""
     content = put_bytes(1, _timestamp(nanos)) + put_bytes(9, frame.encode())
     for number, length in enumerate(size, 2):
         content += key(number, FIXED32) + struct.pack("<I", length)
     content += put_bytes(4, b"plumb_bob")
     projection = np.column_stack([matrix, np.zeros(3)])
-    for number, values in enumerate((np.zeros(5), matrix, np.eye(3), projection), 5):
+    for number, values in enumerate((np.array(distortion), matrix, np.eye(3), projection), 5):
         content += put_bytes(number, values.astype("<f8").tobytes())
     return content
 

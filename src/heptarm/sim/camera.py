@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageFilter
 
+from heptarm.sim.lens import Lens
 from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.carried import COLOUR, GEOMS, mujoco_size
 from heptarm.sim.plant.scene import Scene, is_mounted, plain
@@ -50,7 +51,8 @@ class ArmCamera:
     """Draws an arm in its scene as a camera sees it.
 
     Args:
-        model: MuJoCo's model of arm and scene with the camera, see `heptarm.sim.plant.world.compiled`.
+        model: MuJoCo's model of arm and scene with the camera `Lens(camera).straight`, see
+            `heptarm.sim.plant.world.compiled`.
         camera: how its pictures are.
         positions: file in which the simulator writes all positions; None: what is not the arm stands still.
 
@@ -60,7 +62,8 @@ class ArmCamera:
 
     def __init__(self, model: mujoco.MjModel, camera: Camera, positions: Path | None = None) -> None:
         self._model, self._data, self._camera = model, mujoco.MjData(model), camera
-        width, height = camera.size
+        self._lens = Lens(camera)
+        width, height = self._lens.straight.size
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         model.vis.quality.shadowsize = _SHADOW_SIZE
         self._positions = None if positions is None else PositionsFile(positions, model.nq)
@@ -89,7 +92,7 @@ class ArmCamera:
 
     def draw(self) -> npt.NDArray[np.uint8]:
         """A picture: red, green, blue, shape (height, width, 3)."""
-        pixels = np.asarray(self._renderer.render())
+        pixels = self._lens.bent(np.asarray(self._renderer.render()))
         if self._camera.blur:
             blurred = Image.fromarray(pixels).filter(ImageFilter.GaussianBlur(self._camera.blur))
             pixels = np.asarray(blurred)
@@ -101,7 +104,7 @@ class ArmCamera:
     def depth(self) -> npt.NDArray[np.float32]:
         """Distance along the optical axis [m], shape (height, width); infinite where there is nothing."""
         self._renderer.enable_depth_rendering()
-        found = np.array(self._renderer.render(), np.float32)
+        found = self._lens.nearest(np.array(self._renderer.render(), np.float32))
         self._renderer.disable_depth_rendering()
         farthest = self._model.vis.map.zfar * self._model.stat.extent
         found[found > _NOTHING * farthest] = np.inf
@@ -117,7 +120,7 @@ class ArmCamera:
         )  # what was added to the scene; nothing
         is_geom, is_added = kinds == int(mujoco.mjtObj.mjOBJ_GEOM), kinds == int(mujoco.mjtObj.mjOBJ_UNKNOWN)
         chosen = np.where(is_geom, geoms, np.where(is_added & (geoms >= 0), -2, -1))
-        return np.asarray(bodies[chosen], np.int16)
+        return self._lens.nearest(np.asarray(bodies[chosen], np.int16))
 
     def _add_shapes(self) -> None:
         """Add what is on the flange to what is drawn."""
@@ -202,7 +205,8 @@ def _opened(settings: Mapping[str, Any]) -> ArmCamera:
     camera = Camera(**settings["camera"])
     try:
         scene = Scene.of(settings["scene"]) if settings["scene"] else None
-        model = compiled(settings["robot"], scene=scene, meshes=ArmMeshes(), camera=camera)
+        straight = Lens(camera).straight
+        model = compiled(settings["robot"], scene=scene, meshes=ArmMeshes(), camera=straight)
     except ValueError as error:
         raise SceneError(str(error)) from error
     found = ArmCamera(model, camera, Path(settings["positions"]) if settings["positions"] else None)

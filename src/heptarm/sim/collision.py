@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import wraps
 from math import isfinite
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -36,14 +37,15 @@ from heptarm.values.robot import robot as known
 from heptarm.values.sealed import Sealed
 from heptarm.values.shape import ORIGIN, Shape
 from heptarm.values.tool import KnownTool, Tool, Workpiece
+from heptarm.values.world import Color, WorldArm, WorldBody, WorldOutline, checked_color
 
 if TYPE_CHECKING:
     from heptarm.sim.distances import Distances
     from heptarm.sim.plant.carried import CarriedShapes
-    from heptarm.sim.plant.obstacles import Obstacle
     from heptarm.sim.plant.other_arm import OtherArm
     from heptarm.sim.plant.scene import Scene
     from heptarm.sim.plant.world import Box
+    from heptarm.sim.shown_world import ShownWorld
 
 #: Default of the distance below which two bodies count as touching [m].
 MARGIN = 0.005
@@ -135,9 +137,10 @@ class CollisionModel(Sealed):
         self._lock = threading.Condition(threading.RLock())
         self._revision = 0
         self._held: dict[str, Pose] = {}  # by body: its pose in the flange frame
-        self._added: dict[str, Obstacle] = {}
+        self._added: dict[str, WorldBody] = {}
         self._carried: tuple[CarriedShapes, ...] = ()
         self._arms: tuple[OtherArm, ...] = ()
+        self._shown: ShownWorld | None = None
         try:
             made = [Box.of(text) for text in texts]
             self._models = _Models(robot, made, Scene.of(scene) if scene else None)
@@ -220,7 +223,14 @@ class CollisionModel(Sealed):
             return self._revision
 
     @_changes
-    def add(self, name: str, shape: Shape | Mesh | Sequence[Shape | Mesh], *, at: Pose = ORIGIN) -> None:
+    def add(
+        self,
+        name: str,
+        shape: Shape | Mesh | Sequence[Shape | Mesh],
+        *,
+        at: Pose = ORIGIN,
+        color: Sequence[float] | None = None,
+    ) -> None:
         """Add a body to the world. It can be placed, held and removed.
 
         Args:
@@ -228,20 +238,29 @@ class CollisionModel(Sealed):
             shape: one of `heptarm.shapes`, or several that are one body: `box`, `sphere`, `cylinder`, `capsule`,
                 `mesh`, `height_map`.
             at: pose of its frame in the base.
+            color: in which a panel draws it, see `show`: red, green, blue and perhaps opacity, 0 to 1; None: that of
+                wood.
 
         Raises:
             ShapeError: wrong types.
+            LimitError: a colour outside its range.
             CommandRejected: there is a body of that name, or it would be inside the base of the arm, which never moves.
         """
         given = (shape,) if isinstance(shape, Shape | Mesh) else _listed(shape, "shape")
         if not given:
             raise ShapeError("shape must have at least one shape, got none", parameter="shape", value=shape)
         parts: tuple[Shape | Mesh, ...] = tuple(instance(part, (Shape, Mesh), "shape") for part in given)
-        self._add(name, parts, np.zeros((0, 3)), 0.0, at)
+        self._add(WorldBody(name, parts, at, color=checked_color(color)))
 
     @_changes
     def add_points(
-        self, cloud: npt.ArrayLike, *, radius: float = POINT_RADIUS, name: str = "points", at: Pose = ORIGIN
+        self,
+        cloud: npt.ArrayLike,
+        *,
+        radius: float = POINT_RADIUS,
+        name: str = "points",
+        at: Pose = ORIGIN,
+        color: Sequence[float] | None = None,
     ) -> None:
         """Add a cloud of points, such as of a depth camera, as one body. Points nearer than `radius` become one sphere.
 
@@ -250,10 +269,11 @@ class CollisionModel(Sealed):
             radius: distance from each point that counts as occupied [m], 0.001 to 0.5.
             name: of the body, of which there is none yet.
             at: pose of the cloud's frame, such as of the camera, in the base.
+            color: as of `add`.
 
         Raises:
             ShapeError: not points of shape (n, 3), or none.
-            LimitError: a point that is not finite, a radius outside its range, or more than 5000 spheres.
+            LimitError: a point that is not finite, a radius or a colour outside its range, or more than 5000 spheres.
             CommandRejected: as in `add`.
         """
         from heptarm.sim.plant.obstacles import merged
@@ -273,16 +293,13 @@ class CollisionModel(Sealed):
                 value=len(centres),
                 hint="give a larger radius, or leave out what the arm cannot reach",
             )
-        self._add(name, (), centres, covering, at)
+        self._add(WorldBody(name, (), at, frozen(centres), covering, checked_color(color)))
 
-    def _add(
-        self, name: str, parts: tuple[Shape | Mesh, ...], points: Array, radius: float, at: Pose
-    ) -> None:
-        from heptarm.sim.plant.obstacles import Obstacle
-
+    def _add(self, body: WorldBody) -> None:
+        name = body.name
         self._check_new(name)
-        check_pose(at, "at")
-        self._added[name] = Obstacle(name, parts, at, points, radius)
+        check_pose(body.pose, "at")
+        self._added[name] = body
         try:
             made = self._compiled(self._distances)
             self._check_base(made, name)
@@ -328,9 +345,7 @@ class CollisionModel(Sealed):
         Raises:
             CommandRejected: no body of that name was added.
         """
-        instance(body, str, "body")
-        if body not in self._added:
-            raise _unknown(body, tuple(self._added), "a body that was added")
+        self._added_body(body)
         del self._added[body]
         self._held.pop(body, None)
         self._distances = self._compiled(self._distances)
@@ -374,6 +389,127 @@ class CollisionModel(Sealed):
         self._check_free(body)
         self._held.pop(body, None)
         self._distances.hold(self._held)
+
+    @_changes
+    def set_color(self, body: str, color: Sequence[float] | None) -> None:
+        """Give a body that was added another colour, in which a panel draws it.
+
+        Args:
+            body: its name.
+            color: red, green, blue and perhaps opacity, 0 to 1; None: that of wood.
+
+        Raises:
+            CommandRejected: no body of that name was added.
+            ShapeError: no colour.
+            LimitError: a number outside its range.
+        """
+        self._added[body] = replace(self._added_body(body), color=checked_color(color))
+
+    @_alone
+    def color(self, body: str) -> Color:
+        """Colour of a body that was added: red, green, blue and opacity, 0 to 1.
+
+        Raises:
+            CommandRejected: no body of that name was added.
+        """
+        return self._added_body(body).color
+
+    def _added_body(self, body: str) -> WorldBody:
+        instance(body, str, "body")
+        if body not in self._added:
+            raise _unknown(body, tuple(self._added), "a body that was added")
+        return self._added[body]
+
+    def show(self) -> bool:
+        """Let the open panels of this user that show this robot draw the world, and each change, from now on.
+
+        Bodies that were added are drawn in their colours with their names, others where the scene is; so are the other
+        arms. A panel plans around what it draws. A panel that is opened later draws it, too. It ends with `hide`, with
+        the program, and when the model is not used any more. Of several worlds the one is drawn that was shown last.
+
+        Returns:
+            Whether a panel is open.
+        """
+        from heptarm.sim.shown_world import ShownWorld
+
+        with self._lock:
+            if self._shown is None:
+                self._shown = ShownWorld(self)
+            return self._shown.is_seen
+
+    def hide(self) -> None:
+        """Let no panel draw the world any more."""
+        with self._lock:
+            ended, self._shown = self._shown, None
+        if ended is not None:
+            ended.end()
+
+    @_alone
+    def outline(self) -> WorldOutline:
+        """What a panel shows of the world."""
+        fixed = self._models.boxes()
+        bodies = tuple(self._outline_of(body) for body in self._added.values())
+        nothing = {
+            name: WorldBody(name, (), ORIGIN) for name in self._distances.free if name not in self._added
+        }
+        return WorldOutline(
+            self._robot.name,
+            self._models.scene_text,
+            (*fixed, *bodies),
+            tuple(map(self._outline_of, nothing.values())),
+            tuple(self._arm_outline(arm) for arm in self._arms),
+        )
+
+    @classmethod
+    def of(cls, outline: WorldOutline) -> CollisionModel:
+        """The world of an outline, such as one that another program shows: the reverse of `outline`.
+
+        Args:
+            outline: its bodies, arms and scene.
+
+        Raises:
+            ShapeError: no outline.
+            CommandRejected: no such robot or scene, or what it has is no body.
+        """
+        from heptarm.sim.plant.carried import CarriedShapes
+        from heptarm.sim.plant.other_arm import OtherArm
+
+        given = instance(outline, WorldOutline, "outline")
+        made = cls(given.robot, scene=given.scene)
+        made._added = {body.name: replace(body, is_held=False) for body in given.bodies}
+        made._arms = tuple(
+            OtherArm(
+                arm.name, arm.robot, arm.pose, (CarriedShapes("tool", arm.shapes, ORIGIN, is_tool=True),)
+            )
+            for arm in given.arms
+        )
+        try:
+            made._distances = made._compiled()
+        except ValueError as error:
+            raise CommandRejected(f"outline has what is no body: {error}", parameter="outline") from None
+        for arm in given.arms:
+            made._distances.set_arm(arm.name, arm.q)
+        for body in (*given.bodies, *given.placed):
+            if body.is_held and body.name in made._distances.free:
+                made._held[body.name] = body.pose
+            elif body.name in made._distances.free:
+                made._distances.put(body.name, body.pose)
+        made._distances.hold(made._held)
+        return made
+
+    def _outline_of(self, body: WorldBody) -> WorldBody:
+        held = self._held.get(body.name)
+        if held is not None:
+            return replace(body, pose=held, is_held=True)
+        return replace(body, pose=self._distances.place_of(body.name))
+
+    def _arm_outline(self, arm: OtherArm) -> WorldArm:
+        shapes = tuple(
+            replace(shape, pose=mounted.pose @ shape.pose)
+            for mounted in arm.carried
+            for shape in mounted.shapes
+        )
+        return WorldArm(arm.name, arm.robot, arm.pose, frozen(self._distances.posture_of(arm.name)), shapes)
 
     @_alone
     def pose(self, body: str) -> Pose:
@@ -478,7 +614,7 @@ class CollisionModel(Sealed):
     def _copy(self) -> CollisionModel:
         """A model whose later changes do not reach this one."""
         view = copy(self)
-        view._lock = threading.Condition(threading.RLock())
+        view._lock, view._shown = threading.Condition(threading.RLock()), None
         view._held, view._added = dict(self._held), dict(self._added)
         return view
 
@@ -767,10 +903,13 @@ class CollisionModel(Sealed):
         Raises:
             ShapeError: not seven numbers.
         """
-        line = np.array([_joints(first, "first"), _joints(last, "last")])
-        free = self._distances.is_free(line, **self._steps)
+        if _are_joints(first, last):
+            ends = cast(Array, first), cast(Array, last)
+        else:
+            ends = array(first, 7, "first"), array(last, 7, "last")
+        free = self._distances.is_free(ends[0], ends[1], **self._steps)
         # a pair that touches at the beginning may be left
-        return self.first_on(line) is None if free is None else free
+        return self.first_on(np.array(ends)) is None if free is None else free
 
     def _leave(
         self, first: Array, last: Array, known: dict[tuple[str, str], float]
@@ -841,6 +980,18 @@ class _Models:
         self._origin, self._tool_of = origin, tool_of
         self._made: dict[tuple[object, ...], Any] = {}
 
+    def boxes(self) -> tuple[WorldBody, ...]:
+        """The fixed boxes, in the base of the arm."""
+        return tuple(
+            WorldBody(f"box {number}", (Shape("box", frozen(box.size)),), self._origin @ Pose.of(box.centre))
+            for number, box in enumerate(self._boxes)
+        )
+
+    @property
+    def scene_text(self) -> str:
+        """The file of the scene; "": there is none, or it is another arm's."""
+        return "" if self._scene is None or self._origin != ORIGIN else str(self._scene.path.resolve())
+
     def site(self, name: str) -> Pose | None:
         """Where the scene has a site of that name, in the base of the arm; None: it has none."""
         found = None if self._scene is None else self._scene.place_of(name)
@@ -861,7 +1012,7 @@ class _Models:
     def compiled(
         self,
         carried: tuple[CarriedShapes, ...],
-        obstacles: tuple[Obstacle, ...] = (),
+        obstacles: tuple[WorldBody, ...] = (),
         arms: tuple[OtherArm, ...] = (),
     ) -> Any:
         """The model of an arm that carries shapes, among added bodies and other arms; the last ones are kept."""
@@ -921,20 +1072,19 @@ def _unknown(name: str, known: tuple[str, ...], what: str, parameter: str = "bod
     )
 
 
+_DOUBLE = np.dtype(float)
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].
 _NEARER = 1e-4
 
 
-def _joints(values: npt.ArrayLike, name: str) -> Array:
-    """Joint positions of shape (7,); those of a search, which asks often, need no more than a look."""
-    if (
-        type(values) is np.ndarray
-        and values.dtype == float
-        and values.shape == (7,)
-        and isfinite(values.sum())
-    ):
-        return values
-    return array(values, 7, name)
+def _are_joints(first: npt.ArrayLike, last: npt.ArrayLike) -> bool:
+    """Whether both are joint positions as a search has them, which asks often and needs no more than a look."""
+    return (
+        type(first) is type(last) is np.ndarray
+        and first.dtype is last.dtype is _DOUBLE
+        and first.shape == last.shape == (7,)
+        and isfinite(first @ last)  # which it is not with an entry that is not, or with huge ones
+    )
 
 
 def _place(points: Array, piece: int, at: float) -> float:

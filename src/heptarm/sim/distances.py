@@ -138,6 +138,9 @@ class Distances:
         self._boxes = _Boxes(model, _hulls(model))
         self._flange = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange"))
         self._measure()
+        # a search asks for many lines: nothing is made for each of them
+        self._line, self._line_checks = np.empty((2, _JOINTS)), _WORD(0)
+        self._line_address, self._checks_pointer = self._line.ctypes.data, ctypes.byref(self._line_checks)
         self._held: dict[str, Pose] = {}
         self._group = np.zeros(0, int)
         self.hold({})
@@ -237,7 +240,7 @@ class Distances:
         memory.levers, memory.moves, memory.levels = levers.ctypes.data, self._moves.ctypes.data, len(levers)
         memory.grips, memory.held = grips.ctypes.data, len(grips)
         self._grips = grips
-        self._memory = memory
+        self._memory, self._memory_pointer = memory, ctypes.byref(memory)
 
     def _in_flange(self, geom: int) -> Array:
         """Where a shape of a held body is in the base at the posture of the levers, shape (3,) [m]."""
@@ -301,16 +304,17 @@ class Distances:
         self.checks += checks.value
         return None if piece < 0 else (piece, float(place[0]), place[1:])
 
-    def is_free(self, line: Array, *, margin: float, least: float, far: float) -> bool | None:
-        """Whether `first` finds nothing on a straight joint path, shape (2, 7) [rad]; faster where it does.
+    def is_free(self, first: Array, last: Array, *, margin: float, least: float, far: float) -> bool | None:
+        """Whether `first` finds nothing on a straight joint path between two rows, shape (7,) [rad]; faster if it does.
 
         None: bodies touch at its beginning.
         """
-        checks = _WORD(0)
+        self._line[0], self._line[1] = first, last
+        self._line_checks.value = 0
         free: int = _functions().hc_is_free(
-            ctypes.byref(self._memory), line.ctypes.data, margin, least, far, ctypes.byref(checks)
+            self._memory_pointer, self._line_address, margin, least, far, self._checks_pointer
         )
-        self.checks += checks.value
+        self.checks += self._line_checks.value
         return None if free < 0 else free > 0
 
     def nearest_of_arms(self, q: Array, below: float) -> tuple[tuple[str, str], float] | None:

@@ -16,9 +16,9 @@ import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import CommandRejected, GraspFailed, NoPath, ShapeError
-from heptarm.skills.gripper import Gripper
+from heptarm.skills.gripper import Gripper, check_gripper
 from heptarm.values.checks import Array, Value, instance, shown, within
-from heptarm.values.clearance import GraspWorld, TouchOnPath
+from heptarm.values.clearance import CollisionWorld, TouchOnPath
 from heptarm.values.frames import BASE, FLANGE, TOOL
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.planned_path import Path
@@ -136,7 +136,7 @@ def pick(
     gripper: Gripper,
     body: str,
     *,
-    world: GraspWorld,
+    world: CollisionWorld,
     candidates: Sequence[Grasp] | None = None,
     opening: float = OPENING,
     approach: float = APPROACH,
@@ -166,12 +166,13 @@ def pick(
         The grasp that was used.
 
     Raises:
-        NoPath: no grasp can be reached; the text has the reason of the first one. The arm has not moved.
+        NoPath: no grasp can be reached; the text has the reason of the first one. Nothing has moved.
         GraspFailed: the gripper holds nothing; it is open again, and the arm is before the body.
         CommandRejected: there is no such body, or it cannot be grasped by its shape; LimitError: a value outside its
             range.
         MotionAborted: a motion ended early.
     """
+    check_gripper(gripper)
     task = _Task(arm, world, instance(body, str, "body"), approach, speed_mps, timeout, seed)
     where = task.world.pose(body)
     if candidates is None:
@@ -179,8 +180,10 @@ def pick(
             grasps(world.shapes(body), opening=opening),
             key=lambda pose: round(float((where @ pose.pose).rotation[2, 2]), 3),  # -1: from above
         )
-    gripper.open()
+    for index, candidate in enumerate(candidates):
+        instance(candidate, Grasp, f"candidates[{index}]")
     number, path = task.first_path([where @ pose.pose for pose in candidates], _before(task.approach))
+    gripper.open()
     grasp = where @ candidates[number].pose
     arm.move(path)
     with task.contact():
@@ -206,7 +209,7 @@ def place(
     body: str,
     at: Pose | Sequence[Pose],
     *,
-    world: GraspWorld,
+    world: CollisionWorld,
     approach: float = APPROACH,
     speed_mps: float = LINE_SPEED,
     timeout: float = PATIENCE,
@@ -234,6 +237,7 @@ def place(
         CommandRejected: the arm does not hold the body in the world; LimitError: a value outside its range.
         MotionAborted: a motion ended early.
     """
+    check_gripper(gripper)
     task = _Task(arm, world, instance(body, str, "body"), approach, speed_mps, timeout, seed)
     poses = [at] if isinstance(at, Pose) else list(at)
     for index, pose in enumerate(poses):
@@ -280,7 +284,7 @@ class _Task:
     """
 
     arm: ArmVerbs
-    world: GraspWorld
+    world: CollisionWorld
     body: str
     approach: float
     speed_mps: float
@@ -288,7 +292,7 @@ class _Task:
     seed: int
 
     def __post_init__(self) -> None:
-        if not isinstance(self.world, GraspWorld):
+        if not isinstance(self.world, CollisionWorld):
             raise ShapeError(
                 f"world must be a model of bodies, got {shown(self.world)}",
                 parameter="world",
@@ -379,8 +383,8 @@ class _LineCheck:
     """
 
     body: str
-    world: GraspWorld
-    contact: GraspWorld
+    world: CollisionWorld
+    contact: CollisionWorld
 
     def carrying(
         self,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from inspect import getattr_static
 from math import inf
 from typing import Protocol
 
 from heptarm.arm.verbs import ArmVerbs
-from heptarm.errors import CommandRejected, Timeout
-from heptarm.values.checks import within
+from heptarm.errors import CommandRejected, ShapeError, Timeout
+from heptarm.values.checks import shown, within
 from heptarm.values.io import SignalValues, find_signal
 from heptarm.values.sealed import Sealed
 
@@ -36,6 +37,23 @@ class Gripper(Protocol):
     @property
     def holds_something(self) -> bool:
         """Whether something is between its closed fingers."""
+
+
+def check_gripper(gripper: Gripper) -> None:
+    """Refuse what is no gripper, before anything moves.
+
+    Raises:
+        ShapeError: it lacks what `Gripper` names.
+    """
+    needed = ("open", "close", "is_open", "holds_something")
+    missing = [name for name in needed if getattr_static(gripper, name, None) is None]
+    if missing:
+        raise ShapeError(
+            f"gripper must have {', '.join(missing)}, got {shown(gripper)}",
+            parameter="gripper",
+            value=gripper,
+            hint='for example heptarm.TwoSignalGripper(arm, open="OutputX3Pin1", close="OutputX3Pin2")',
+        )
 
 
 def _wired(arm: ArmVerbs, role: str, name: str, others: Mapping[str, str]) -> str:

@@ -12,7 +12,7 @@ from heptarm.arm.verbs import ArmVerbs
 from heptarm.errors import InsertionFailed, MotionAborted, ShapeError, Timeout
 from heptarm.skills.grasping import PATIENCE
 from heptarm.values.checks import Array, Value, instance, within
-from heptarm.values.clearance import PlanningWorld
+from heptarm.values.clearance import CollisionWorld
 from heptarm.values.condition.contact import axis_of
 from heptarm.values.condition.force import force as force_signal
 from heptarm.values.frames import TOOL, check_name
@@ -92,7 +92,7 @@ def insert(
     frame: str = TOOL,
     timeout: float = 60.0,
     before: Pose | None = None,
-    world: PlanningWorld | None = None,
+    world: CollisionWorld | None = None,
 ) -> Insertion:
     """Insert a part: approach the surface, search the hole with a spiral under force, push the part in.
 

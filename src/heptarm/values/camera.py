@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +34,10 @@ FARTHEST, NEAREST = 20.0, 0.001
 FIELDS, SIZES, FASTEST = (0.02, 2.8), (16, 4096), 60.0
 #: Most noise of a picture [gray levels], and most blur [pixels].
 NOISIEST, BLURREST = 100.0, 20.0
+#: Distortion of a straight lens.
+NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+#: Steps of Newton's method by which distortion is undone, and what may be left of it.
+_STEPS, _LEFT = 20, 1e-9
 #: Frames that a camera may be attached to.
 FRAMES = ("base", "flange")
 
@@ -51,6 +57,67 @@ def lens_distortion(distortion: npt.ArrayLike, name: str = "distortion") -> Arra
             value=distortion,
         )
     return frozen(found)
+
+
+class BentPoint(NamedTuple):
+    """Where a lens shows points, and how this changes with them; arrays of one shape.
+
+    Attributes:
+        x: to the right, at distance 1.
+        y: down.
+        dx_dx: derivative of `x` by the straight one.
+        mixed: of `x` by the straight y, and of `y` by the straight x.
+        dy_dy: of `y` by the straight one.
+    """
+
+    x: Array
+    y: Array
+    dx_dx: Array
+    mixed: Array
+    dy_dy: Array
+
+
+def distorted(x: Array, y: Array, distortion: Sequence[float]) -> BentPoint:
+    """Where a lens shows points at distance 1: radial distortion k1 k2 k3 and tangential p1 p2 (Brown, 1966)."""
+    k1, k2, p1, p2, k3 = distortion
+    r = x * x + y * y
+    radial, slope = 1.0 + r * (k1 + r * (k2 + r * k3)), k1 + r * (2.0 * k2 + r * 3.0 * k3)
+    return BentPoint(
+        x * radial + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x),
+        y * radial + p1 * (r + 2.0 * y * y) + 2.0 * p2 * x * y,
+        radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x,
+        2.0 * (x * y * slope + p1 * x + p2 * y),
+        radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x,
+    )
+
+
+def undistorted(pixels: npt.ArrayLike, matrix: Array, distortion: Sequence[float]) -> Array:
+    """Points at distance 1 that a lens shows at pixels, by Newton's method; shape (..., 2) as the pixels.
+
+    Raises:
+        LimitError: the lens shows nothing there, or two points: its distortion folds the picture.
+    """
+    given = (np.asarray(pixels, np.float64) - matrix[:2, 2]) / np.diagonal(matrix)[:2]
+    u, v = given[..., 0], given[..., 1]
+    x, y = u, v
+    with np.errstate(all="ignore"):  # what does not converge is refused
+        for _ in range(_STEPS):
+            at = distorted(x, y, distortion)
+            off_x, off_y, turn = at.x - u, at.y - v, at.dx_dx * at.dy_dy - at.mixed**2
+            x = x - (at.dy_dy * off_x - at.mixed * off_y) / turn
+            y = y - (at.dx_dx * off_y - at.mixed * off_x) / turn
+        at = distorted(x, y, distortion)
+        left = np.maximum(np.abs(at.x - u), np.abs(at.y - v))
+        is_good = (left < _LEFT) & (at.dx_dx * at.dy_dy > at.mixed**2) & (at.dx_dx > 0.0)
+    if not is_good.all():
+        raise LimitError(
+            "distortion must show each point once within the picture: it folds it",
+            code=2,
+            parameter="distortion",
+            value=tuple(distortion),
+            hint="smaller numbers, or a smaller field of view",
+        )
+    return np.stack([x, y], axis=-1)
 
 
 def intrinsic(matrix: npt.ArrayLike, name: str = "matrix") -> Array:
@@ -129,6 +196,7 @@ class Camera:
         scene: what is around the arm, as in `heptarm sim --scene`; "": nothing. A private simulator's own scene is
             drawn by itself, with its bodies where they are.
         principal: where the optical axis meets the pictures, u v [pixels]; None: in their middle.
+        distortion: of the lens, k1 k2 p1 p2 k3 as in OpenCV.
         noise: standard deviation of each pixel's colours [gray levels of 255].
         blur: standard deviation of a Gaussian blur [pixels].
         shadows: whether there are shadows; without them a picture takes half the time where there is no graphics card.
@@ -146,6 +214,7 @@ class Camera:
     frame: str = "base"
     scene: str = ""
     principal: tuple[float, float] | None = field(default=None, kw_only=True)
+    distortion: tuple[float, float, float, float, float] = field(default=NO_DISTORTION, kw_only=True)
     noise: float = field(default=0.0, kw_only=True)
     blur: float = field(default=0.0, kw_only=True)
     shadows: bool = field(default=True, kw_only=True)
@@ -181,6 +250,11 @@ class Camera:
             for index, value in enumerate(axis):
                 within(value, f"principal[{index}]", 0.0, self.size[index] - 1.0, unit="pixels")
             object.__setattr__(self, "principal", tuple(axis))
+        object.__setattr__(self, "distortion", tuple(lens_distortion(self.distortion).tolist()))
+        if self.distortion != NO_DISTORTION:
+            width, height = self.size
+            across, down = np.linspace(-0.5, width - 0.5, 33), np.linspace(-0.5, height - 0.5, 33)
+            undistorted(np.stack(np.meshgrid(across, down), axis=-1), self.matrix, self.distortion)
         object.__setattr__(self, "noise", within(self.noise, "noise", 0.0, NOISIEST))
         object.__setattr__(self, "blur", within(self.blur, "blur", 0.0, BLURREST, unit="pixels"))
         flag(self.shadows, "shadows")
@@ -202,6 +276,7 @@ class Camera:
     def matrix(self) -> Array:
         """Its intrinsic matrix: a point x y z of `pose` is in the picture at (u/w, v/w) [pixels], shape (3, 3).
 
+        That is where a lens without `distortion` shows it.
         The middle of the first pixel is at (0, 0), as in OpenCV and ROS.
         """
         width, height = self.size
@@ -221,6 +296,7 @@ class Picture(Value):
         flange: pose of the flange in the base then.
         pose: pose of the camera in the base then; None: nobody said where the camera is.
         matrix: intrinsic matrix, shape (3, 3) [pixels]; None: nobody said.
+        distortion: of the lens, k1 k2 p1 p2 k3 as in OpenCV.
         depth: distance of what each pixel shows along the optical axis, shape (height, width) [m], infinite where
             there is nothing; None: not asked for.
         labels: what each pixel shows, an index of `names`, shape (height, width), -1 where there is nothing; None: not
@@ -234,6 +310,7 @@ class Picture(Value):
     flange: Pose
     pose: Pose | None = None
     matrix: Array | None = None
+    distortion: tuple[float, ...] = NO_DISTORTION
     depth: npt.NDArray[np.float32] | None = None
     labels: npt.NDArray[np.int16] | None = None
     names: tuple[str, ...] = ()
@@ -294,7 +371,8 @@ class Picture(Value):
                 parameter="u",
                 value=column,
             )
-        return pose.xyz + far * pose.rotation @ np.linalg.solve(matrix, (column, row, 1.0))
+        x, y = undistorted((column, row), matrix, self.distortion)
+        return pose.xyz + far * pose.rotation @ (x, y, 1.0)
 
     def pixel(self, point: npt.ArrayLike) -> Array:
         """Where a point of the base would be in the picture, u v, shape (2,) [pixels]; it may be outside.
@@ -313,8 +391,8 @@ class Picture(Value):
                 value=float(seen[2]),
                 allowed=f"at least {NEAREST:g} m",
             )
-        u, v, w = matrix @ seen
-        return np.array([u / w, v / w])
+        at = distorted(seen[0] / seen[2], seen[1] / seen[2], self.distortion)
+        return np.asarray((matrix @ np.array([at.x, at.y, 1.0]))[:2])
 
     def _placed(self) -> tuple[Pose, Array]:
         if self.pose is None or self.matrix is None:

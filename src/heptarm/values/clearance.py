@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from heptarm.values.checks import Array, Value
 from heptarm.values.pose import Pose
@@ -12,7 +12,8 @@ from heptarm.values.robot import RobotModel
 from heptarm.values.shape import Shape
 from heptarm.values.tool import KnownTool, Workpiece
 
-_Model_co = TypeVar("_Model_co", covariant=True)
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,20 +52,6 @@ class TouchOnPath(Value):
     q: Array
 
 
-@runtime_checkable
-class CarriesTools(Protocol[_Model_co]):
-    """What a model of collisions may offer: then an arm gives it what is attached; `heptarm.CollisionModel` does."""
-
-    def carrying(
-        self,
-        tool: KnownTool | None,
-        workpiece: Workpiece | KnownTool | None = None,
-        *,
-        at: Pose | None = None,
-    ) -> _Model_co:
-        """The same model, of an arm that carries a tool, and a workpiece at a frame in the flange frame."""
-
-
 class CollisionCheck(Protocol):
     """What `Arm.collision_check` needs; `heptarm.CollisionModel` is one."""
 
@@ -88,16 +75,16 @@ class ClearanceModel(Protocol):
 
 
 @runtime_checkable
-class PlanningWorld(Protocol):
-    """What a search for a path needs; `heptarm.CollisionModel` is one."""
+class CollisionWorld(CollisionCheck, ClearanceModel, Protocol):
+    """What a client of an arm asks of a `heptarm.CollisionModel`, without MuJoCo, which its module imports."""
 
     @property
     def robot(self) -> RobotModel:
         """The robot and its limits."""
 
     @property
-    def margin(self) -> float:
-        """Bodies nearer than this count as touching [m]."""
+    def bodies(self) -> tuple[str, ...]:
+        """Names of all bodies."""
 
     @property
     def checks(self) -> int:
@@ -106,46 +93,13 @@ class PlanningWorld(Protocol):
     def distances(self, q: Array, *, below: float) -> Array:
         """Distance of the nearest two bodies at n joint positions, shape (n, 7) [rad]; shape (n,) [m]."""
 
-    def clearances(self, q: Array, *, below: float) -> tuple[Clearance, ...]:
-        """Pairs of bodies nearer than a distance [m] at joint positions, the nearest first."""
-
     def touching(self, q: Array) -> tuple[Clearance, ...]:
         """Pairs of bodies that touch at joint positions, shape (7,) [rad]."""
 
     def is_free(self, first: Array, last: Array) -> bool:
         """Whether nothing touches on a straight joint path, both shape (7,) [rad]."""
 
-    def first_on(self, path: Array) -> TouchOnPath | None:
-        """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
-
-
-@runtime_checkable
-class WorldOfArms(Protocol):
-    """What a check of programs of several arms needs; `heptarm.CollisionModel` is one."""
-
-    @property
-    def arms(self) -> tuple[str, ...]:
-        """Names of the other arms in the world."""
-
-    def carrying(
-        self,
-        tool: KnownTool | None,
-        workpiece: Workpiece | KnownTool | None = None,
-        *,
-        at: Pose | None = None,
-    ) -> WorldOfArms:
-        """The same world, of an arm that carries a tool and a workpiece."""
-
-    def seen_by(self, name: str, *, own: str) -> WorldOfArms:
-        """The same world for another arm in it, where this one has the name `own`."""
-
-    def first_together(self, t: Array, q: Array, others: Mapping[str, Array]) -> ForeseenCollision | None:
-        """The first time at which this arm and another one touch, when they move; None: nothing touches."""
-
-
-@runtime_checkable
-class ChangingWorld(PlanningWorld, Protocol):
-    """What `Arm.follow` needs; `heptarm.CollisionModel` is one."""
+    # What changes.
 
     @property
     def revision(self) -> int:
@@ -154,14 +108,7 @@ class ChangingWorld(PlanningWorld, Protocol):
     def wait_for_change(self, revision: int, *, timeout: float) -> int:
         """Wait up to `timeout` [s] until the world has changed since a revision; the revision now."""
 
-
-@runtime_checkable
-class GraspWorld(PlanningWorld, Protocol):
-    """What picking and placing need; `heptarm.CollisionModel` is one."""
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Names of all bodies."""
+    # What an arm grasps and carries.
 
     def pose(self, body: str) -> Pose:
         """Pose of a free body in the base."""
@@ -178,8 +125,8 @@ class GraspWorld(PlanningWorld, Protocol):
     def hold(self, body: str, pose: Pose) -> None:
         """Let the flange carry a free body; its pose in the flange frame."""
 
-    def allowing(self, pairs: Iterable[tuple[str, str]]) -> GraspWorld:
-        """The same model, in which more pairs of bodies may touch."""
+    def allowing(self, pairs: Iterable[tuple[str, str]]) -> Self:
+        """The same world, in which more pairs of bodies may touch."""
 
     def carrying(
         self,
@@ -187,8 +134,20 @@ class GraspWorld(PlanningWorld, Protocol):
         workpiece: Workpiece | KnownTool | None = None,
         *,
         at: Pose | None = None,
-    ) -> GraspWorld:
-        """The same model, of an arm that carries a tool and a workpiece; see `CarriesTools`."""
+    ) -> Self:
+        """The same world, of an arm that carries a tool, and a workpiece at a frame in the flange frame."""
+
+    # Other arms.
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the other arms in the world."""
+
+    def seen_by(self, name: str, *, own: str) -> Self:
+        """The same world for another arm in it, where this one has the name `own`."""
+
+    def first_together(self, t: Array, q: Array, others: Mapping[str, Array]) -> ForeseenCollision | None:
+        """The first time at which this arm and another one touch, when they move; None: nothing touches."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

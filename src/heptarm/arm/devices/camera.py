@@ -17,7 +17,7 @@ from heptarm.io.clock import Clock
 from heptarm.model.kinematics import forward
 from heptarm.record.camera import CameraFeed
 from heptarm.record.samples import SampleQueue, state_rows
-from heptarm.values.camera import FASTEST, FRAMES, Picture, intrinsic
+from heptarm.values.camera import FASTEST, FRAMES, NO_DISTORTION, Picture, intrinsic, lens_distortion
 from heptarm.values.checks import Array, frozen, integer, shown, within, word
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import RobotModel
@@ -285,15 +285,24 @@ class Mounting:
         frame: "base" or "flange".
         pose: of the camera in that frame; None: not known.
         matrix: intrinsic matrix, shape (3, 3) [pixels]; None: not known.
+        distortion: of the lens, k1 k2 p1 p2 k3 as in OpenCV.
     """
 
     robot: RobotModel
     frame: str
     pose: Pose | None
     matrix: Array | None
+    distortion: tuple[float, ...] = NO_DISTORTION
 
     @staticmethod
-    def of(robot: RobotModel, *, frame: str, pose: Pose | None, matrix: npt.ArrayLike | None) -> Mounting:
+    def of(
+        robot: RobotModel,
+        *,
+        frame: str,
+        pose: Pose | None,
+        matrix: npt.ArrayLike | None,
+        distortion: npt.ArrayLike,
+    ) -> Mounting:
         """The mounting of a camera of your own.
 
         Raises:
@@ -303,7 +312,8 @@ class Mounting:
         word(frame, "frame", FRAMES)
         if pose is not None:
             check_pose(pose)
-        return Mounting(robot, frame, pose, None if matrix is None else intrinsic(matrix))
+        lens = tuple(lens_distortion(distortion).tolist())
+        return Mounting(robot, frame, pose, None if matrix is None else intrinsic(matrix), lens)
 
     def refuse_for_simulated(self) -> None:
         """Refuse what was said of a camera that knows it itself.
@@ -314,20 +324,30 @@ class Mounting:
         said = {
             "pose": self.pose is not None,
             "matrix": self.matrix is not None,
+            "distortion": self.distortion != NO_DISTORTION,
             "frame": self.frame != "flange",
         }
         if any(said.values()):
             raise CommandRejected(
-                "pose, frame and matrix are of your own camera: a simulated one has them",
+                "pose, frame, matrix and distortion are of your own camera: a simulated one has them",
                 parameter=next(name for name, is_said in said.items() if is_said),
-                hint="leave them out, or set place, target, frame and fov of the Camera",
+                hint="leave them out, or set place, target, frame, fov and distortion of the Camera",
             )
 
     def picture(self, layers: dict[str, Any], stamp: int, q: Array, names: tuple[str, ...]) -> Picture:
         """A picture taken at joint positions."""
         flange = Pose.from_matrix(forward(self.robot, q))
         pose = self.pose if self.pose is None or self.frame == "base" else flange @ self.pose
-        return Picture(stamp=stamp, q=q, flange=flange, pose=pose, matrix=self.matrix, names=names, **layers)
+        return Picture(
+            stamp=stamp,
+            q=q,
+            flange=flange,
+            pose=pose,
+            matrix=self.matrix,
+            distortion=self.distortion,
+            names=names,
+            **layers,
+        )
 
 
 class CameraStream(Sealed, Iterator[Picture]):
@@ -354,6 +374,11 @@ class CameraStream(Sealed, Iterator[Picture]):
     def matrix(self) -> Array | None:
         """Intrinsic matrix, shape (3, 3) [pixels]; None: not known."""
         return self._mounting.matrix
+
+    @property
+    def distortion(self) -> tuple[float, ...]:
+        """Distortion of the lens, k1 k2 p1 p2 k3 as in OpenCV; zeros where it is not known."""
+        return self._mounting.distortion
 
     @property
     def frame(self) -> str:

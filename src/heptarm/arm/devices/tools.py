@@ -15,7 +15,7 @@ from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError, Timeout
 from heptarm.model.kinematics import forward
 from heptarm.values.checks import instance
-from heptarm.values.clearance import CarriesTools
+from heptarm.values.clearance import CollisionWorld
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.mode.impedance import CartesianImpedance
@@ -127,7 +127,7 @@ class Tooling:
 
     def loaded(self, model: _Model) -> _Model:
         """A model of collisions with the shapes of what is attached, if it has a place for them."""
-        if not isinstance(model, CarriesTools):
+        if not isinstance(model, CollisionWorld):
             return model
         tool, held, at = self._carried()
         loaded: _Model = model.carrying(tool, held, at=at)
@@ -294,7 +294,7 @@ class Tooling:
         """Refuse conditions that name unknown frames; raises CommandRejected."""
         for index, part in enumerate(parts):
             axes = getattr(part, "frame", TOOL)
-            if axes != TOOL:
+            if isinstance(axes, str) and axes != TOOL:
                 self.check_reference(axes, f"until[{index}].frame")
 
     def check_mode(self, mode: Mode | None) -> None:

@@ -6,7 +6,6 @@ the arm holds its position: a stop, a break condition or a safety function ends 
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -21,7 +20,7 @@ from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.motion.rest import settle
 from heptarm.errors import CollisionForeseen, NoPath, Timeout
 from heptarm.values.checks import Array, Value
-from heptarm.values.clearance import ChangingWorld, Clearance, TouchOnPath
+from heptarm.values.clearance import Clearance, CollisionWorld, TouchOnPath
 from heptarm.values.motion.motion import Motion, hold
 from heptarm.values.motion.planned_path import Path
 from heptarm.values.result import Cause, Result
@@ -109,7 +108,7 @@ class FollowTerms:
         on_progress: called with the completed fraction of the present path.
     """
 
-    world: ChangingWorld
+    world: CollisionWorld
     search: PathSearch
     send: Sender
     timeout: float
@@ -206,11 +205,16 @@ class PathFollower:
         def is_over() -> bool:
             return held.done or self._is_over()
 
-        known = None
-        with contextlib.suppress(NoPath):  # while the arm brakes, from about where it will rest
+        known = none = None
+        self._seen = world.revision
+        try:  # while the arm brakes, from about where it will rest
             known = self.terms.search(start=blocked.stop, known=None, stop=is_over)
+        except NoPath as error:
+            none = error
         start = self._held(held)
         rests = time.monotonic()
+        if none is not None and start is not None and none.reason != "start" and world.revision == self._seen:
+            raise none  # from where the arm rests there is none, either
         while start is not None:
             self._seen = world.revision
             try:

@@ -30,7 +30,7 @@ from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
 from heptarm.planning.search import Goal, Keep, find_path
 from heptarm.values.checks import Array, frozen, shown
-from heptarm.values.clearance import CollisionCheck, ForeseenCollision, PlanningWorld, TouchOnPath
+from heptarm.values.clearance import CollisionCheck, CollisionWorld, ForeseenCollision, TouchOnPath
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.motion import Motion
 from heptarm.values.motion.planned_path import Path
@@ -146,7 +146,7 @@ class Foresight:
         goal: Goal,
         *,
         start: Array | None = None,
-        avoid: PlanningWorld | None,
+        avoid: CollisionWorld | None,
         keep: Keep | None,
         speed: float,
         tcp_speed: float | None,
@@ -160,7 +160,7 @@ class Foresight:
     ) -> Path:
         """Find a path; see `Arm.find_path`. It begins at `start`, shape (7,) [rad]; None: where the arm rests."""
         world = self.check if avoid is None else avoid
-        if not isinstance(world, PlanningWorld):
+        if not isinstance(world, CollisionWorld):
             raise ShapeError(
                 f"avoid must be a model of bodies, got {shown(world)}",
                 parameter="avoid",

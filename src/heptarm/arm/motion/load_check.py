@@ -20,6 +20,8 @@ _log = logging.getLogger("heptarm.arm")
 #: Torque that load data may leave, as a fraction of the highest torque of the axis: a torque sensor has an accuracy of
 #: 2 % (KUKA's brochure). Above the first a warning is logged, above the second impedance control is refused.
 WARN, REFUSE = 0.03, 0.08
+#: Part of the torques, by their squares, that a weight has to explain, so that they are no contact.
+_EXPLAINED = 0.75
 #: Robot time over which `Arm.verify_load` averages [s].
 SECONDS = 0.2
 
@@ -35,6 +37,8 @@ class LoadCheck(Value):
         fraction: that part.
         mass: mass at the flange that would explain the torques [kg]: what the load data lack, if nothing touches the
             arm; negative: they have too much.
+        weight: that part of the highest torque that this mass makes; 0: the torques are not those of a weight that the
+            load data lack, but perhaps of a contact.
     """
 
     robot: RobotModel
@@ -42,15 +46,19 @@ class LoadCheck(Value):
     axis: int
     fraction: float
     mass: float
+    weight: float = 0.0
 
     @classmethod
     def of(cls, robot: RobotModel, q: Array, tau_ext: Array) -> LoadCheck:
         """Of joint positions [rad] and external torques [Nm], shape (7,) each."""
         parts = np.abs(tau_ext) / robot.tau_max
         axis = int(parts.argmax())
-        weight = jacobian(robot, q)[:3].T @ GRAVITY / robot.tau_max
-        mass = float(weight @ (tau_ext / robot.tau_max)) / max(float(weight @ weight), 1e-9)
-        return cls(robot, frozen(tau_ext), axis + 1, float(parts[axis]), mass)
+        by_mass = jacobian(robot, q)[:3].T @ GRAVITY / robot.tau_max
+        mass = float(by_mass @ (tau_ext / robot.tau_max)) / max(float(by_mass @ by_mass), 1e-9)
+        torques = mass * by_mass
+        is_weight = mass > 0.0 and float(torques @ torques) > _EXPLAINED * float(parts @ parts)
+        weight = float(np.abs(torques).max()) if is_weight else 0.0
+        return cls(robot, frozen(tau_ext), axis + 1, float(parts[axis]), mass, weight)
 
     @property
     def is_fine(self) -> bool:
@@ -74,29 +82,43 @@ def verify(robot: RobotModel, states: list[State], *, refuse: float) -> LoadChec
     """
     q, tau_ext = (np.mean([getattr(state, name) for state in states], axis=0) for name in ("q", "tau_ext"))
     found = LoadCheck.of(robot, q, tau_ext)
-    if found.fraction > refuse:
+    return _judged(found, found.fraction, refuse)
+
+
+def _judged(found: LoadCheck, fraction: float, refuse: float) -> LoadCheck:
+    """Log a warning where the load data do not fit.
+
+    Raises:
+        NotReady: what counts is more than a fraction of the highest torque of an axis.
+    """
+    if fraction > refuse:
         raise NotReady(
             f"{found}; at most {refuse:.1%} are allowed before impedance control",
             parameter="load",
-            value=found.fraction,
+            value=fraction,
             allowed=f"[0, {refuse:g}]",
             hint=_ADVICE,
         )
     if not found.is_fine:
-        _log.warning("%s: %s", found, _ADVICE)
+        _log.warning("a compliant arm sinks under a load that it does not know: %s: %s", found, _ADVICE)
     return found
 
 
 _ADVICE = "measure the load (heptarm calibrate load), attach its tool, and check that nothing touches the arm"
 
 
-def warn_before(robot: RobotModel, mode: Mode | None, state: State | None) -> None:
-    """Log a warning if an arm in position control is to become compliant while its load data do not fit.
+def check_before(robot: RobotModel, mode: Mode | None, state: State | None) -> None:
+    """Check the load data before an arm in position control becomes compliant.
+
+    It may begin in contact, so that torques are refused only where a weight that the load data lack explains them.
 
     Args:
         robot: the robot.
         mode: of the motion that is to begin; None: position control.
         state: the newest one; None: there is none.
+
+    Raises:
+        NotReady: such a weight makes more than `REFUSE` of the highest torque of an axis.
     """
     if mode is None or isinstance(mode, Position) or state is None:
         return
@@ -106,5 +128,4 @@ def warn_before(robot: RobotModel, mode: Mode | None, state: State | None) -> No
     if not isinstance(groups.mode.mode, Position):
         return  # it is compliant already, and may lean on something
     found = LoadCheck.of(robot, groups.joints.q, groups.torques.tau_ext)
-    if not found.is_fine:
-        _log.warning("a compliant arm sinks under a load that it does not know: %s: %s", found, _ADVICE)
+    _judged(found, found.weight, REFUSE)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heptarm.io.plan_box import PlanOutline, hand_over
+from heptarm.io.panel_box import PlanOutline, hand_over
 from heptarm.record.plot.chart import Chart
 from heptarm.record.plot.content import Band, ChartRow, Line, Mark, Style
 from heptarm.record.plot.signals import path_line, path_row

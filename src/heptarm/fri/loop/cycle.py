@@ -27,6 +27,7 @@ from heptarm.fri.loop.native import (
     LAW_FRACTION,
     LAW_PATIENCE,
     MISSING,
+    SETTINGS,
     LawStatus,
     Seam,
     library,
@@ -80,7 +81,8 @@ class Cycle:
         seam.history = settings.history
         wire, policy = settings.wire, settings.policy or Policy()
         seam.version = at.ABSENT if wire is None else list(Version).index(wire)
-        seam.busy_poll = round(settings.busy_poll * 1e9)
+        for name in SETTINGS:
+            setattr(seam, name, getattr(settings, name))
         _fill(seam.joint_limits, settings.limits or Limits.of(arm))
         _fill(seam.pose_limits, settings.pose_limits or PoseLimits())
         seam.lowest[:], seam.highest[:], seam.fastest[:] = arm.q_min, arm.q_max, arm.dq_max

@@ -69,6 +69,8 @@ def _limits(kind: type[Limits] | type[PoseLimits]) -> Rows:
     )
 
 
+#: Numbers of `LoopSettings` that the loop in C reads.
+SETTINGS = ("busy_poll",)
 #: The structures of the loop that Python fills, by name.
 STRUCTURES: dict[str, Rows] = {
     "joint_limits": _limits(Limits),
@@ -77,8 +79,9 @@ STRUCTURES: dict[str, Rows] = {
         # the shared memory; the loop sets the last one: where an answer is
         ("pointer", 1, "header states commands events trouble offered outputs reply"),
         ("word", 1, "history"),
-        # settings; addresses are as in a socket's, 0: any; times in ns, those of the policy in s
-        ("word", 1, "version sock remote parent busy_poll"),
+        # settings; addresses are as in a socket's, 0: any; times in s
+        ("word", 1, "version sock remote parent"),
+        ("real", 1, " ".join(SETTINGS)),
         ("struct joint_limits", 1, "joint_limits"),
         ("struct pose_limits", 1, "pose_limits"),
         ("real", AXES, "lowest highest fastest"),

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from heptarm import calibration
+from heptarm.calibration.proposal import measuring
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError
 from heptarm.io.targets import saved_target
 from heptarm.ros.interface.action import (
@@ -124,8 +125,9 @@ def _load(context: NodeContext, goal: Any) -> _Work:
 
     def measure(confirm: Confirm, progress: Progress) -> _Measured:
         arm = context.arm
-        plan = calibration.load_plan(arm, excitation="short" if goal.inertia else "rests", **how)
-        found = calibration.load(arm, plan=plan, confirm=confirm, progress=progress)
+        plan = calibration.load_plan(arm, excitation="full" if goal.inertia else "rests", **how)
+        with measuring(arm):
+            found = calibration.load(arm, plan=plan, confirm=confirm, progress=progress)
         fields = {
             "mass": found.mass,
             "com": dict(zip("xyz", found.com.tolist())),

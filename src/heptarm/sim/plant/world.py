@@ -12,13 +12,14 @@ import numpy as np
 
 from heptarm.sim.plant.appearance import DRAWN_GROUP, HIDDEN_GROUP, ArmMeshes, undress
 from heptarm.sim.plant.carried import NO_TREES, CarriedShapes, make_room, plain
-from heptarm.sim.plant.obstacles import Obstacle
+from heptarm.sim.plant.obstacles import add_body
 from heptarm.sim.plant.other_arm import OtherArm
 from heptarm.sim.plant.scene import PREFIX, TOOL, Scene, adopt
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
 from heptarm.values.robot import FLANGE_RADIUS, RobotModel, robot
 from heptarm.values.shape import ORIGIN
+from heptarm.values.world import WorldBody
 
 MODELS = Path(__file__).parents[1] / "models"
 #: Name of the camera of a model.
@@ -124,7 +125,7 @@ def compiled(
     meshes: ArmMeshes | None = None,
     carried: Sequence[CarriedShapes] = (),
     *,
-    obstacles: Sequence[Obstacle] = (),
+    obstacles: Sequence[WorldBody] = (),
     arms: Sequence[OtherArm] = (),
     room: bool = False,
     camera: Camera | None = None,
@@ -176,7 +177,7 @@ def compiled(
             rgba=[0.7, 0.6, 0.45, 1.0],
         )
     for body in obstacles:
-        body.add_to(spec)
+        add_body(spec, body)
     if scene is None and not (boxes or obstacles or arms):
         # each link has two shapes: a search by trees takes longer than none
         spec.option.disableflags |= NO_TREES

@@ -24,6 +24,7 @@ from heptarm.values.checks import Array, frozen
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
 from heptarm.values.shape import ORIGIN
+from heptarm.values.world import Color, checked_color
 
 #: Operations of moveit_msgs/CollisionObject.
 ADD, REMOVE, APPEND, MOVE = range(4)
@@ -81,6 +82,7 @@ def replace_scene(context: NodeContext, draft: WorldDraft, message: Any) -> None
     if not message.is_diff:
         for name in tuple(draft.bodies):
             draft.remove(name)
+        draft.colors.clear()
     change_scene(context, draft, message)
 
 
@@ -102,6 +104,11 @@ def change_scene(context: NodeContext, draft: WorldDraft, message: Any) -> None:
         change_body(context, draft, body)
     for body in message.robot_state.attached_collision_objects:
         change_attached(context, draft, body)
+    for colored in message.object_colors:
+        color = colored.color
+        draft.paint(
+            colored.id, checked_color((color.r, color.g, color.b, color.a), f"color of {colored.id!r}")
+        )
 
 
 def change_body(context: NodeContext, draft: WorldDraft, message: Any) -> None:
@@ -350,6 +357,7 @@ def scene_fields(context: NodeContext) -> dict[str, Any]:
             "attached_collision_objects": held,
         },
         "world": {"collision_objects": loose},
+        "object_colors": [_color(*entry) for entry in context.world.colors.items() if entry[0] in bodies],
     }
 
 
@@ -364,6 +372,13 @@ def _object(context: NodeContext, name: str, body: SceneBody, frame: str) -> Any
         else:
             message.primitives.append(_primitive_message(part))
             message.primitive_poses.append(pose)
+    return message
+
+
+def _color(name: str, color: Color) -> Any:
+    message = class_of("moveit_msgs/ObjectColor", "msg")()
+    message.id = name
+    message.color.r, message.color.g, message.color.b, message.color.a = color
     return message
 
 

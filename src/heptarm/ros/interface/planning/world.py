@@ -20,6 +20,7 @@ from heptarm.values.checks import Array
 from heptarm.values.mesh import Mesh
 from heptarm.values.pose import Pose
 from heptarm.values.shape import ORIGIN, Shape
+from heptarm.values.world import Color
 
 Part: TypeAlias = Shape | Mesh
 
@@ -47,14 +48,18 @@ class WorldDraft:
     Args:
         model: of collisions; it is changed.
         bodies: those that were added.
+        colors: of bodies, also of those that will be added.
 
     Attributes:
         model: see above.
         bodies: see above.
+        colors: see above.
     """
 
-    def __init__(self, model: CollisionModel, bodies: Mapping[str, SceneBody]) -> None:
-        self.model, self.bodies = model, dict(bodies)
+    def __init__(
+        self, model: CollisionModel, bodies: Mapping[str, SceneBody], colors: Mapping[str, Color]
+    ) -> None:
+        self.model, self.bodies, self.colors = model, dict(bodies), dict(colors)
 
     def add(self, name: str, body: SceneBody) -> None:
         """Add a body, in place of the one of that name.
@@ -64,11 +69,11 @@ class WorldDraft:
         """
         if name in self.bodies:
             self.model.remove(name)
-        place = ORIGIN if body.is_held else body.pose
+        place, color = ORIGIN if body.is_held else body.pose, self.colors.get(name)
         if body.cloud is None:
-            self.model.add(name, body.parts, at=place)
+            self.model.add(name, body.parts, at=place, color=color)
         else:
-            self.model.add_points(body.cloud, name=name, at=place)
+            self.model.add_points(body.cloud, name=name, at=place, color=color)
         self._put(name, body)
 
     def remove(self, name: str) -> None:
@@ -88,6 +93,12 @@ class WorldDraft:
     def hold(self, name: str, pose: Pose) -> None:
         """Let the arm hold a body at a pose in the flange frame."""
         self._put(name, replace(self.body(name), pose=pose, is_held=True))
+
+    def paint(self, name: str, color: Color) -> None:
+        """Give a body a colour, or one that will be added."""
+        self.colors[name] = color
+        if name in self.bodies:
+            self.model.set_color(name, color)
 
     def body(self, name: str) -> SceneBody:
         """Look up a body.
@@ -122,6 +133,7 @@ class NodeWorld:
         self._lock = threading.RLock()
         self._model: CollisionModel | None = None
         self._bodies: Mapping[str, SceneBody] = MappingProxyType({})
+        self._colors: Mapping[str, Color] = MappingProxyType({})
 
     @property
     def model(self) -> CollisionModel:
@@ -139,12 +151,18 @@ class NodeWorld:
                     scene=values["planning.scene"],
                     margin=values["planning.margin"],
                 )
+                self._model.show()
             return self._model
 
     @property
     def bodies(self) -> Mapping[str, SceneBody]:
         """Bodies that were added, by name."""
         return self._bodies
+
+    @property
+    def colors(self) -> Mapping[str, Color]:
+        """Colours that were chosen for bodies, by name."""
+        return self._colors
 
     def draft(self) -> WorldDraft:
         """A copy, to be changed; see `changing` for one that becomes the world.
@@ -153,7 +171,7 @@ class NodeWorld:
             HeptarmError: as `model`.
         """
         with self._lock:
-            return WorldDraft(self.model.carrying(None), self._bodies)
+            return WorldDraft(self.model.carrying(None), self._bodies, self._colors)
 
     @contextlib.contextmanager
     def changing(self) -> Iterator[WorldDraft]:
@@ -166,4 +184,4 @@ class NodeWorld:
             draft = self.draft()
             yield draft
             self.model.become(draft.model)
-            self._bodies = MappingProxyType(draft.bodies)
+            self._bodies, self._colors = MappingProxyType(draft.bodies), MappingProxyType(draft.colors)
