@@ -2,10 +2,13 @@
 
     python cabinet/build.py            compile what has changed, write the jars
     python cabinet/build.py --force    compile everything
+    python cabinet/build.py --sunrise2 compile the preview for Sunrise 2.x and its doubles as well
 
-core knows nothing of KUKA; the doubles stand in for KUKA's classes and use core; app uses both. After the
-Eclipse compiler has run, every class of core and app is looked at: class version 50, no member that Java 6
-lacks, no forbidden package. Python's standard library is enough, so that the wheel's build hook can call it.
+core knows nothing of KUKA; the doubles stand in for KUKA's classes and use core; app uses both. app2 is the
+preview for Sunrise 2.x, with doubles of its own that stand on those of 1.x under another package; it is compiled
+for tests only, and no jar of it is packed into the wheel. After the Eclipse compiler has run, every class of core
+and app is looked at: class version 50, no member that Java 6 lacks, no forbidden package. Python's standard
+library is enough, so that the wheel's build hook can call it.
 """
 
 from __future__ import annotations
@@ -40,13 +43,34 @@ class BuildFailed(RuntimeError):
 
 @dataclass(frozen=True)
 class Part:
-    """One of the three parts of the cabinet."""
+    """A part of the cabinet.
+
+    Attributes:
+        name: of its classes' folder.
+        jar: file name.
+        needs: parts whose classes it uses.
+        forbidden: packages that it may not name.
+        for_robot: for a cabinet of 1.x: Java 6, checked class by class.
+        release: Java release of the others.
+        folders: of the sources; none: those of its name.
+        moved: folder of sources in which KUKA's packages are renamed to `_MOVED` before they are compiled.
+        shipped: part of the wheel.
+    """
 
     name: str
     jar: str
     needs: tuple[str, ...] = ()
     forbidden: tuple[str, ...] = ()
     for_robot: bool = True
+    release: str = "17"
+    folders: tuple[str, ...] = ()
+    moved: str = ""
+    shipped: bool = True
+
+    @property
+    def file(self) -> Path:
+        """Path of its jar."""
+        return (JARS if self.shipped else OUT / "sunrise2") / self.jar
 
 
 PARTS = (
@@ -54,14 +78,37 @@ PARTS = (
     Part("doubles", "heptarm-doubles-not-for-robots.jar", needs=("core",), for_robot=False),
     Part("app", "heptarm-app.jar", needs=("core", "doubles"), forbidden=("heptarm/doubles/",)),
     Part("samples", "heptarm-samples.jar", needs=("core", "doubles", "app"), forbidden=("heptarm/doubles/",)),
+    Part(
+        "doubles2",
+        "heptarm-doubles2-not-for-robots.jar",
+        needs=("core",),
+        for_robot=False,
+        moved="doubles/src",
+        shipped=False,
+    ),
+    *(
+        Part(
+            f"app2-fri-{version}",
+            f"heptarm-app2-fri-{version}.jar",
+            needs=("core", "doubles2"),
+            for_robot=False,
+            release="8",
+            folders=("app2/src", f"app2/fri/{version}"),
+            shipped=False,
+        )
+        for version in ("none", "2.5", "3.0")
+    ),
 )
+#: Where KUKA's packages of 1.x are in the doubles of 2.x, which have other classes of the same names.
+_MOVED = "heptarm.sunrise1."
 
 
-def build(*, force: bool = False) -> list[Path]:
+def build(*, force: bool = False, sunrise2: bool = False) -> list[Path]:
     """Compiles every part whose sources, or whose needs, have changed since the last time.
 
     Args:
         force: compile everything.
+        sunrise2: also the preview for Sunrise 2.x, which is not shipped compiled.
 
     Returns:
         The paths of the jars.
@@ -72,31 +119,54 @@ def build(*, force: bool = False) -> list[Path]:
     """
     with _lock():
         digests: dict[str, str] = {}
-        for part in PARTS:
+        parts = [part for part in PARTS if part.shipped or sunrise2]
+        for part in parts:
             digests[part.name] = _digest(part, [digests[name] for name in part.needs])
             stamp = OUT / f"{part.name}.stamp"
-            fresh = (JARS / part.jar).exists() and stamp.exists() and stamp.read_text() == digests[part.name]
+            fresh = part.file.exists() and stamp.exists() and stamp.read_text() == digests[part.name]
             if force or not fresh:
                 stamp.unlink(missing_ok=True)
                 _compile(part)
                 _check(part)
                 _pack(part)
                 stamp.write_text(digests[part.name])
-    return [JARS / part.jar for part in PARTS]
+    return [part.file for part in parts]
 
 
 def _sources(part: Part) -> list[Path]:
-    return sorted((HERE / part.name / "src").rglob("*.java"))
+    return [
+        path
+        for folder in (part.folders or (f"{part.name}/src",))
+        for path in sorted((HERE / folder).rglob("*.java"))
+    ]
 
 
 def _resources(part: Part) -> list[Path]:
-    return sorted(path for path in (HERE / part.name / "resources").rglob("*") if path.is_file())
+    folder = (HERE / part.moved).parent if part.moved else HERE / part.name
+    return sorted(path for path in (folder / "resources").rglob("*") if path.is_file())
+
+
+def _moved(part: Part) -> list[Path]:
+    """Copies of the sources whose packages are renamed."""
+    copies = OUT / f"{part.name}-moved"
+    shutil.rmtree(copies, ignore_errors=True)
+    made = []
+    for path in _originals(part):
+        copy = copies / path.relative_to(HERE / part.moved)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(path.read_text(encoding="utf-8").replace("com.kuka.", _MOVED), encoding="utf-8")
+        made.append(copy)
+    return made
+
+
+def _originals(part: Part) -> list[Path]:
+    return sorted((HERE / part.moved).rglob("*.java")) if part.moved else []
 
 
 def _digest(part: Part, needs: list[str]) -> str:
     digest = hashlib.sha256("".join(needs).encode())
     tools = [HERE / name for name in ("build.py", "toolchain.py", "classfile.py", "java7.txt")]
-    for path in (*tools, *_sources(part), *_resources(part)):
+    for path in (*tools, *_sources(part), *_originals(part), *_resources(part)):
         digest.update(f"{path.relative_to(HERE)}\0".encode() + path.read_bytes())
     return digest.hexdigest()
 
@@ -108,6 +178,7 @@ def _compile(part: Part) -> None:
     classes = OUT / part.name
     shutil.rmtree(classes, ignore_errors=True)
     classes.mkdir(parents=True)
+    sources += _moved(part)
     listing = OUT / f"{part.name}.sources"
     listing.write_text("".join(f'"{path.as_posix()}"\n' for path in sources), encoding="utf-8")
     path = os.pathsep.join(str(OUT / name) for name in part.needs)
@@ -117,7 +188,7 @@ def _compile(part: Part) -> None:
         command = [*toolchain.find_ecj(jdk), "-bootclasspath", str(library)]
         command += ["-source", "1.6", "-target", "1.6", "-nowarn"]
     else:
-        command = [jdk.javac, "--release", "17", "-Xlint:-options"]
+        command = [jdk.javac, "--release", part.release, "-Xlint:-options"]
     command += ["-proc:none", "-g", "-encoding", "UTF-8", "-d", str(classes)]
     command += ["-classpath", path or str(classes), f"@{listing}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -137,20 +208,21 @@ def _check(part: Part) -> None:
 
 
 def _pack(part: Part) -> None:
-    JARS.mkdir(parents=True, exist_ok=True)
-    classes, resources = OUT / part.name, HERE / part.name / "resources"
+    part.file.parent.mkdir(parents=True, exist_ok=True)
+    classes = OUT / part.name
     files = {path.relative_to(classes).as_posix(): path.read_bytes() for path in classes.rglob("*.class")}
-    files |= {path.relative_to(resources).as_posix(): path.read_bytes() for path in _resources(part)}
+    for path in _resources(part):
+        files[path.as_posix().rpartition("/resources/")[2]] = path.read_bytes()
     manifest = f"Manifest-Version: 1.0\r\nImplementation-Title: heptarm-{part.name}\r\n"
     if not part.for_robot:
         manifest += _fold(f"Heptarm-Warning: {_WARNING}")
         files["NEVER-DEPLOY-TO-A-ROBOT.txt"] = f"{_WARNING}\n".encode()
-    temporary = JARS / f"{part.jar}.{os.getpid()}"
+    temporary = part.file.with_name(f"{part.jar}.{os.getpid()}")
     with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as jar:
         _add(jar, "META-INF/MANIFEST.MF", f"{manifest}\r\n".encode())
         for name, data in sorted(files.items()):
             _add(jar, name, data)
-    temporary.replace(JARS / part.jar)
+    temporary.replace(part.file)
 
 
 def _add(jar: zipfile.ZipFile, name: str, data: bytes) -> None:
@@ -182,7 +254,7 @@ def _lock() -> Iterator[None]:
 def main() -> int:
     """Runs the build and lists the jars."""
     try:
-        jars = build(force="--force" in sys.argv[1:])
+        jars = build(force="--force" in sys.argv[1:], sunrise2="--sunrise2" in sys.argv[1:])
     except (BuildFailed, toolchain.ToolMissing) as error:
         print(f"cabinet: {error}", file=sys.stderr)
         return 1

@@ -27,7 +27,7 @@ def jars() -> list[Path]:
 
 
 def cabinet_sources() -> Path:
-    """Returns the folder that holds ``core/src``, ``app/src``, ``without`` and ``project`` of the cabinet application.
+    """Returns the folder that holds ``core/src``, ``app/src``, ``without``, ``app2``, ``project`` and ``project2``.
 
     Raises:
         HeptarmError: the installation is incomplete.

@@ -44,6 +44,28 @@ def compiled(source: Path, loop: list[str], folder: Path) -> Path:
     return program
 
 
+def driven(program: Path, version: str, command: str, *more: str) -> str:
+    """What a client prints that a bare FRI controller sends to."""
+    with subprocess.Popen([str(program), "0", *more], stdout=subprocess.PIPE, text=True) as client:
+        try:
+            assert client.stdout is not None
+            port = client.stdout.readline().split()[-1]
+            words = ["sim", "fri", version, "--fri-command", command, "--fri-client", f"127.0.0.1:{port}"]
+            with ctrl_c_interrupts():
+                controller = subprocess.Popen(
+                    [*HEPTARM, *words, "--fri-port", "0", "--speed", "0.5"],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                )
+            try:
+                return client.communicate(timeout=PATIENCE)[0]
+            finally:
+                controller.send_signal(signal.SIGINT)
+                controller.wait(timeout=PATIENCE)
+        finally:
+            client.kill()
+
+
 @pytest.mark.parametrize(
     ("version", "command"),
     [
@@ -57,24 +79,7 @@ def test_an_application_of_the_shape_of_the_sdk(
     program = compiled(ROOT / "examples/fri_cpp/sdk_sine.cpp", loop, tmp_path)
 
     def drive() -> str:
-        with subprocess.Popen([str(program), "0", str(CYCLES)], stdout=subprocess.PIPE, text=True) as client:
-            try:
-                assert client.stdout is not None
-                port = client.stdout.readline().split()[-1]
-                words = ["sim", "fri", version, "--fri-command", command, "--fri-client", f"127.0.0.1:{port}"]
-                with ctrl_c_interrupts():
-                    controller = subprocess.Popen(
-                        [*HEPTARM, *words, "--fri-port", "0", "--speed", "0.5"],
-                        stdin=subprocess.DEVNULL,
-                        stdout=subprocess.DEVNULL,
-                    )
-                try:
-                    return client.communicate(timeout=PATIENCE)[0]
-                finally:
-                    controller.send_signal(signal.SIGINT)
-                    controller.wait(timeout=PATIENCE)
-            finally:
-                client.kill()
+        return driven(program, version, command, str(CYCLES))
 
     def late(said: str | Exception) -> str:
         # a machine that answers too late ends the session: the client has counted fewer cycles
@@ -107,3 +112,29 @@ def test_sessions_of_an_arm(loop: list[str], tmp_path: Path) -> None:
     moved = [float(one) for one in re.findall(r"moved (\S+) rad", done.stdout)]
     assert abs(moved[0] - 0.1) < 1e-3, "the positions are followed"
     assert 0.04 < moved[1] < 0.07, "10 Nm by 200 Nm/rad"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("version", ["2.5", "2.7"])
+def test_poses_of_an_application_of_the_shape_of_the_sdk(
+    loop: list[str], tmp_path: Path, version: str
+) -> None:
+    program = compiled(ROOT / "examples/fri_cpp/sdk_pose.cpp", loop, tmp_path)
+    said = retry(
+        lambda: driven(program, version, "pose"),
+        lambda said: "answers came late" if isinstance(said, str) and "ends at" not in said else "",
+    )
+    found = re.search(r"lifted (\S+) mm, ends at (\S+) mm", said)
+    assert found is not None, said
+    assert abs(float(found[1]) - 30.0) < 1.0 and abs(float(found[2])) < 1.0
+
+
+@pytest.mark.long
+def test_signals_of_a_session_of_an_arm(loop: list[str], tmp_path: Path) -> None:
+    program = compiled(ROOT / "tests/cpp/fri_signals.cpp", loop, tmp_path)
+    with sim() as ready:
+        command = [str(program), f"127.0.0.1:{ready['port']}"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    refusal, on, off = done.stdout.splitlines()
+    assert refusal.startswith("no output of the session has the name MediaFlange.InputX3Pin3; it has "), done
+    assert on.endswith("OutputX3Pin1 shows 1") and off.endswith("OutputX3Pin1 shows 0")

@@ -18,6 +18,7 @@ struct FriOptions {
     wire::FriCommandMode command = wire::FriCommandMode::position;
     double period = 0.005;           ///< from message to message, whole milliseconds from 1 to 100 [s]
     std::string host;                ///< address of this computer as the cabinet reaches it; needed
+    std::vector<std::string> io;     ///< signals of the cabinet that the session carries
     std::optional<wire::Mode> mode;  ///< of the position hold under the overlay: needed for torques and wrenches
     double timeout = 10.0;           ///< for the session to open [s]
     FriGuard guard;
@@ -34,6 +35,7 @@ public:
         message.port = loop_.port();
         message.period = options.period;
         message.command = options.command;
+        message.io = options.io;
         message.mode = options.mode;
         message.timeout = options.timeout;
         is_monitor_ = options.command == wire::FriCommandMode::monitor;
@@ -83,6 +85,15 @@ public:
     void position(const Joints& q) { loop_.command(&q); }
     void torque(const Joints& q, const Joints& tau) { loop_.command(&q, &tau); }
     void wrench(const Joints& q, const std::array<double, 6>& wrench) { loop_.command(&q, nullptr, &wrench); }
+    /// A pose x y z [m] and quaternion x y z w, on cabinets whose FRI takes poses (2.x); without e1 it is the interpolator's.
+    void pose(const std::array<double, 7>& pose, double e1 = std::numeric_limits<double>::quiet_NaN()) {
+        loop_.command_pose(pose, e1);
+    }
+
+    /// The session's signals with their values in the newest message.
+    std::vector<FriSignal> signals() const { return loop_.signals(); }
+    /// Writes an output of the session; throws std::invalid_argument if it has none of that name.
+    void write(const std::string& name, double value) { loop_.write(name, value); }
 
     /// Messages, losses, and what the guard limited.
     std::string report() const { return loop_.report(); }

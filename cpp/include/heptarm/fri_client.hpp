@@ -49,9 +49,34 @@ public:
     const double* getIpoJointPosition() const { return state_.q_ipo.data(); }
     double getTrackingPerformance() const { return state_.tracking; }
 
+    /// Poses x y z [mm], quaternion w x y z.
+    const double* getMeasuredCartesianPose() const { return wire(state_.pose, 0); }
+    const double* getIpoCartesianPose() const { return wire(state_.pose_ipo, 1); }
+    double getMeasuredRedundancyValue() const { return state_.e1; }
+    double getIpoRedundancyValue() const { return state_.e1_ipo; }
+
+    /// Signals of the session by name; a name that it does not have throws std::invalid_argument.
+    bool getBooleanIOValue(const char* name) const { return value(name) != 0; }
+    unsigned long long getDigitalIOValue(const char* name) const { return static_cast<unsigned long long>(value(name)); }
+    double getAnalogIOValue(const char* name) const { return value(name); }
+
 private:
     friend class ClientApplication;
+
+    const double* wire(const std::array<double, 7>& pose, int place) const {
+        poses_[place] = {1e3 * pose[0], 1e3 * pose[1], 1e3 * pose[2], pose[6], pose[3], pose[4], pose[5]};
+        return poses_[place].data();
+    }
+
+    double value(const std::string& name) const {
+        for (const heptarm::FriSignal& signal : signals_)
+            if (signal.name == name || signal.name.substr(signal.name.rfind('.') + 1) == name) return signal.value;
+        throw std::invalid_argument("the session carries no signal " + name);
+    }
+
     heptarm::FriState state_;
+    std::vector<heptarm::FriSignal> signals_;
+    mutable std::array<double, 7> poses_[2]{};
 };
 
 /// What the answer to the newest message commands.
@@ -60,8 +85,17 @@ public:
     void setJointPosition(const double* values) { std::memcpy(command_.q.data(), values, sizeof command_.q); }
     void setTorque(const double* values) { std::memcpy(command_.tau.data(), values, sizeof command_.tau); }
     void setWrench(const double* values) { std::memcpy(command_.wrench.data(), values, sizeof command_.wrench); }
+    /// A pose x y z [mm], quaternion w x y z, and its redundancy angle [rad]; without one it is the interpolator's.
+    void setCartesianPose(const double* pose, const double* redundancy = nullptr) {
+        command_.pose = {1e-3 * pose[0], 1e-3 * pose[1], 1e-3 * pose[2], pose[4], pose[5], pose[6], pose[3]};
+        if (redundancy != nullptr) command_.e1 = *redundancy;
+    }
+    void setBooleanIOValue(const char* name, bool value) { outputs_[name] = value ? 1 : 0; }
+    void setDigitalIOValue(const char* name, unsigned long long value) { outputs_[name] = static_cast<double>(value); }
+    void setAnalogIOValue(const char* name, double value) { outputs_[name] = value; }
 
 private:
+    std::map<std::string, double> outputs_;
     friend class LBRClient;
     friend class ClientApplication;
     heptarm::FriCommand command_;
@@ -154,6 +188,7 @@ private:
     void take(const heptarm::FriState& now) {
         const ESessionState before = client_.state_.getSessionState();
         client_.state_.state_ = now;
+        client_.state_.signals_ = loop_->signals();
         if (client_.state_.getSessionState() != before) client_.onStateChange(before, client_.state_.getSessionState());
     }
 
@@ -163,6 +198,18 @@ private:
         client_.command_.command_ = command;
         client_.command();
         command = client_.command_.command_;
+        write();
+    }
+
+    /// Writes the outputs that were set; a name without its group is completed.
+    void write() {
+        for (const auto& [name, value] : client_.command_.outputs_) {
+            std::string full = name;
+            for (const heptarm::FriSignal& signal : client_.state_.signals_)
+                if (signal.is_output && signal.name.substr(signal.name.rfind('.') + 1) == name) full = signal.name;
+            loop_->write(full, value);
+        }
+        client_.command_.outputs_.clear();
     }
 
     void observe(const heptarm::FriState& now) {
@@ -171,6 +218,7 @@ private:
             client_.waitForCommand();
         else if (now.session < heptarm::FriSessionState::commanding_wait)
             client_.monitor();
+        write();
     }
 
     UdpConnection& connection_;

@@ -12,12 +12,14 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
 #include <functional>
 #include <limits>
+#include <map>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -58,6 +60,8 @@ struct FriState {
     Joints q{}, tau{}, q_cmd{}, tau_cmd{}, tau_ext{}, q_ipo{};  ///< [rad], [Nm]
     Joints q_sent{}, tau_sent{};                                ///< in the answer
     std::array<double, 6> wrench{};                             ///< external, on the flange; estimated before FRI 2.7 [N, Nm]
+    std::array<double, 7> pose{}, pose_ipo{}, pose_sent{};      ///< x y z [m], quaternion x y z w; FRI 2.x, the others in pose sessions
+    double e1 = 0, e1_ipo = 0, e1_sent = 0;                     ///< redundancy angle [rad]
 
     bool is_commanding() const { return session == FriSessionState::commanding_active; }
 };
@@ -66,6 +70,17 @@ struct FriState {
 struct FriCommand {
     std::array<double, 7> q{}, tau{};  ///< [rad], superposed [Nm]
     std::array<double, 6> wrench{};    ///< superposed [N, Nm]
+    std::array<double, 7> pose{};      ///< x y z [m], quaternion x y z w; initially the interpolator's
+    double e1 = 0;                     ///< redundancy angle of the pose [rad]; initially the interpolator's
+};
+
+/// A signal of the session: an input or output of the cabinet.
+struct FriSignal {
+    enum class Kind { boolean, digital, analog };
+    std::string name;  ///< with its group, as the cabinet sends it
+    Kind kind = Kind::boolean;
+    bool is_output = false;
+    double value = 0;  ///< in the newest message; 0 or 1 of a boolean one
 };
 
 /// What the guard lets through.
@@ -157,20 +172,62 @@ public:
     /// new command for 50 ms the arm brakes.
     void command(const std::array<double, 7>* q, const std::array<double, 7>* tau = nullptr,
                  const std::array<double, 6>* wrench = nullptr) {
-        word* ring = commands_.data();
         const word tick = header()[native::H_COMMANDS];
-        word* slot = ring + tick % native::COMMAND_SLOTS * native::COMMAND_WORDS;
-        __atomic_store_n(slot, 2 * tick + 1, __ATOMIC_RELAXED);
-        __atomic_thread_fence(__ATOMIC_RELEASE);
-        slot[native::C_AT] = monotonic();
-        slot[native::C_GIVEN] =
-            (q ? native::GIVEN_Q : 0) | (tau ? native::GIVEN_TAU : 0) | (wrench ? native::GIVEN_WRENCH : 0);
-        slot[native::C_EPOCH] = __atomic_load_n(&header()[native::H_EPOCH], __ATOMIC_ACQUIRE);
+        word* const slot = begin(
+            tick, (q ? native::GIVEN_Q : 0) | (tau ? native::GIVEN_TAU : 0) | (wrench ? native::GIVEN_WRENCH : 0));
         if (q) std::memcpy(slot + native::C_Q, q->data(), sizeof *q);
         if (tau) std::memcpy(slot + native::C_TAU, tau->data(), sizeof *tau);
         if (wrench) std::memcpy(slot + native::C_WRENCH, wrench->data(), sizeof *wrench);
-        __atomic_store_n(slot, 2 * tick + 2, __ATOMIC_RELEASE);
-        __atomic_store_n(&header()[native::H_COMMANDS], tick + 1, __ATOMIC_RELEASE);
+        finish(slot, tick);
+    }
+
+    /// Commands a pose x y z [m] and quaternion x y z w, and a redundancy angle [rad] unless it is NaN; see `command`.
+    void command_pose(const std::array<double, 7>& pose, double e1 = std::numeric_limits<double>::quiet_NaN()) {
+        const word tick = header()[native::H_COMMANDS];
+        word* const slot = begin(tick, native::GIVEN_POSE | (std::isnan(e1) ? 0 : native::GIVEN_E1));
+        std::memcpy(slot + native::C_POSE, pose.data(), sizeof pose);
+        std::memcpy(slot + native::C_E1, &e1, sizeof e1);
+        finish(slot, tick);
+    }
+
+    /// The session's signals with their values in the newest message; empty before the first one.
+    std::vector<FriSignal> signals() const {
+        std::vector<FriSignal> found;
+        const word* const note = offered_.data();
+        for (;;) {
+            const word tick = __atomic_load_n(note, __ATOMIC_ACQUIRE);
+            found.clear();
+            if (tick == 0) return found;
+            if (tick & 1) continue;
+            const word* at = note + 3;
+            for (word i = 0; i < note[1] && i < native::MAX_IO; ++i, at += 2 + native::NAME_WORDS) {
+                const std::size_t size = std::size_t(std::min<word>(at[2], native::NAME_BYTES));
+                found.push_back({std::string(reinterpret_cast<const char*>(at + 3), size), FriSignal::Kind(at[0]),
+                                 at[1] == native::OUTPUT, 0});
+            }
+            __atomic_thread_fence(__ATOMIC_ACQUIRE);
+            if (__atomic_load_n(note, __ATOMIC_RELAXED) == tick) break;
+        }
+        const word newest = messages() - 1;
+        for (std::size_t i = 0; newest >= 0 && i < found.size(); ++i)
+            std::memcpy(&found[i].value, states_.data() + newest % HISTORY * native::STATE_WORDS + native::S_IO + i, sizeof(double));
+        return found;
+    }
+
+    /// Writes an output until the cabinet shows it. Throws std::invalid_argument if the session has no output of that name.
+    void write(const std::string& name, double value) {
+        std::string known;
+        for (const FriSignal& signal : signals()) {
+            if (signal.name == name && signal.is_output) {
+                if (signal.kind != FriSignal::Kind::analog && !(value >= 0 && value == std::floor(value)))
+                    throw std::invalid_argument(name + " must be a whole number from 0 on, got " + text(value));
+                written_[name] = {++writes_, signal.kind == FriSignal::Kind::analog, value};
+                publish();
+                return;
+            }
+            if (signal.is_output) known += (known.empty() ? "" : ", ") + signal.name;
+        }
+        throw std::invalid_argument("no output of the session has the name " + name + "; it has " + (known.empty() ? "none" : known));
     }
 
     /// What the guard has limited so far, a line each.
@@ -206,6 +263,51 @@ public:
 private:
     using word = native::word;
     static constexpr int HISTORY = 64;
+
+    struct Written {
+        word count = 0;
+        bool is_analog = false;
+        double value = 0;
+    };
+
+    word* begin(word tick, int given) {
+        word* const slot = commands_.data() + tick % native::COMMAND_SLOTS * native::COMMAND_WORDS;
+        __atomic_store_n(slot, 2 * tick + 1, __ATOMIC_RELAXED);
+        __atomic_thread_fence(__ATOMIC_RELEASE);
+        slot[native::C_AT] = monotonic();
+        slot[native::C_GIVEN] = given;
+        slot[native::C_EPOCH] = __atomic_load_n(&header()[native::H_EPOCH], __ATOMIC_ACQUIRE);
+        return slot;
+    }
+
+    void finish(word* slot, word tick) {
+        __atomic_store_n(slot, 2 * tick + 2, __ATOMIC_RELEASE);
+        __atomic_store_n(&header()[native::H_COMMANDS], tick + 1, __ATOMIC_RELEASE);
+    }
+
+    /// Hands all written outputs to the loop.
+    void publish() {
+        word* const note = outputs_.data();
+        __atomic_store_n(note, note[0] | 1, __ATOMIC_RELAXED);
+        __atomic_thread_fence(__ATOMIC_RELEASE);
+        word* at = note + 3;
+        for (const auto& [name, output] : written_) {
+            const word number = static_cast<word>(output.value);
+            at[0] = output.count;
+            at[1] = output.is_analog;
+            if (output.is_analog)
+                std::memcpy(at + 2, &output.value, sizeof output.value);
+            else
+                at[2] = number;
+            std::memset(at + 3, 0, native::NAME_WORDS * sizeof(word));
+            at[3] = static_cast<word>(name.size());
+            std::memcpy(at + 4, name.data(), name.size());
+            at += 3 + native::NAME_WORDS;
+        }
+        note[1] = static_cast<word>(written_.size());
+        note[2] = 0;
+        __atomic_store_n(note, note[0] + 1, __ATOMIC_RELEASE);
+    }
 
     void open(const FriLoopOptions& options) {
         const int file = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -324,6 +426,17 @@ private:
         copy(found.q_sent, native::S_Q_SENT);
         copy(found.tau_sent, native::S_TAU_SENT);
         copy(found.wrench, native::S_WRENCH);
+        const auto pose = [slot](std::array<double, 7>& into, int at) {  // mm and w x y z before
+            std::array<double, 7> wire;
+            std::memcpy(wire.data(), slot + at, sizeof wire);
+            into = {1e-3 * wire[0], 1e-3 * wire[1], 1e-3 * wire[2], wire[4], wire[5], wire[6], wire[3]};
+        };
+        pose(found.pose, native::S_POSE);
+        pose(found.pose_ipo, native::S_POSE_IPO);
+        pose(found.pose_sent, native::S_POSE_SENT);
+        std::memcpy(&found.e1, slot + native::S_E1, sizeof found.e1);
+        std::memcpy(&found.e1_ipo, slot + native::S_E1_IPO, sizeof found.e1_ipo);
+        std::memcpy(&found.e1_sent, slot + native::S_E1_SENT, sizeof found.e1_sent);
         return found;
     }
 
@@ -333,10 +446,14 @@ private:
         now.number = tick;
         FriCommand command;
         std::memcpy(command.q.data(), seam_.out.q, sizeof command.q);
+        std::memcpy(command.pose.data(), seam_.out.pose, sizeof command.pose);
+        command.e1 = seam_.out.e1;
         law_(now, command);
         std::memcpy(seam_.out.q, command.q.data(), sizeof command.q);
         std::memcpy(seam_.out.tau, command.tau.data(), sizeof command.tau);
         std::memcpy(seam_.out.wrench, command.wrench.data(), sizeof command.wrench);
+        std::memcpy(seam_.out.pose, command.pose.data(), sizeof command.pose);
+        seam_.out.e1 = command.e1;
     }
 
     static std::int64_t monotonic() {
@@ -364,6 +481,8 @@ private:
     native::fri_loop* loop_ = nullptr;
     std::uint16_t port_ = 0;
     std::vector<word> header_, states_, commands_, events_, trouble_, offered_, outputs_;
+    std::map<std::string, Written> written_;
+    word writes_ = 0;
     std::array<word, 256> torques_{};  // its state needs less
 };
 

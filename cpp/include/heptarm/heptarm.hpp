@@ -568,6 +568,7 @@ enum class OperationMode : std::uint8_t {
     t1 = 0,  ///< reduced speed, enabling switch held
     t2 = 1,  ///< full speed, enabling switch held
     aut = 2,  ///< automatic
+    unknown = 3,  ///< the cabinet does not report it
 };
 
 inline const char* name(OperationMode value) {
@@ -575,6 +576,7 @@ inline const char* name(OperationMode value) {
         case OperationMode::t1: return "t1";
         case OperationMode::t2: return "t2";
         case OperationMode::aut: return "aut";
+        case OperationMode::unknown: return "unknown";
     }
     return "";
 }
@@ -872,6 +874,7 @@ struct SafetyBits {
     static constexpr std::uint16_t position_referenced = 1024;
     static constexpr std::uint16_t recovery_required = 2048;
     static constexpr std::uint16_t hand_guiding_switch = 4096;  ///< the enabling switch of the hand guiding device is held
+    static constexpr std::uint16_t unknown = 8192;  ///< the cabinet does not report its safety state: of the other bits only moving has a meaning
 };
 
 /// Pose of a frame.
@@ -1713,7 +1716,7 @@ struct PoseState {
     std::int64_t stamp = 0;  ///< [ns]
     std::array<double, 3> xyz = filled<3>(unset);  ///< measured [m]
     std::array<double, 4> quat = filled<4>(unset);
-    std::array<double, 3> xyz_cmd = filled<3>(unset);  ///< commanded [m]
+    std::array<double, 3> xyz_cmd = filled<3>(unset);  ///< commanded; NaN: the cabinet does not report it [m]
     std::array<double, 4> quat_cmd = filled<4>(unset);
     Redundancy redundancy;
 

@@ -173,7 +173,7 @@ class LibiiwaBridge:
             *self._measured[1],
             float(self._error),
             float(fired),
-            float(safety is not None and safety.ready_to_move),
+            float(safety is not None and bool(safety.ready_to_move)),
             float(self._bridged.moves(state)),
         ]
 

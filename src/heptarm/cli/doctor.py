@@ -287,6 +287,13 @@ def _target(target: CommandTarget, text: str) -> Iterator[CheckResult]:
 
 
 def _options(arm: Arm) -> CheckResult:
+    if "sunrise2_preview" in arm.capabilities:
+        return CheckResult(
+            "options",
+            "note",
+            f"a preview for Sunrise 2.x, never run on such a cabinet; it can: {', '.join(arm.capabilities)}",
+            "everything else is refused; run the probe of the guide on the cabinet and report its output",
+        )
     missing = [text for name, text in _OPTIONS.items() if name not in arm.capabilities]
     if not missing:
         return CheckResult("options", "ok", f"installed: {', '.join(_OPTIONS.values())}")
@@ -380,6 +387,13 @@ def datagram_check(arm: Arm) -> CheckResult:
 
 def _safety(arm: Arm) -> CheckResult:
     safety = arm.state.safety
+    if not safety.is_known:
+        return CheckResult(
+            "safety",
+            "note",
+            "unknown: this cabinet reports neither safety state nor readiness nor operation mode",
+            "look at the smartPAD before each motion",
+        )
     found = f"{safety.mode.value.upper()}, {'ready' if safety.ready_to_move else 'not ready'} to move"
     if safety.ready_to_move:
         return CheckResult("safety", "ok", found)

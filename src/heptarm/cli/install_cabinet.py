@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import shutil
 import sys
@@ -28,6 +29,9 @@ OPTIONS = {"servoing": "arm.servo", "fri": "arm.fri", "hand-guiding": "ha.hand_g
 ARCHIVE = "heptarm-sources.zip"
 _SETTINGS, _SUM = "heptarm/core/session/ServerSettings.java", 'SOURCES = ""'
 _KEY = re.compile(r'(id="heptarm\.key" [^>]*? value=)""')
+#: The same for Sunrise 2.x, where settings are constants, and the releases of FRI whose names are known there.
+_PROJECT_2, _KEY_2 = "src/heptarm/app2/Settings.java", re.compile(r'({"heptarm\.key", )""')
+FRI_2 = ("2.5", "3.0")
 
 
 def install_cabinet(
@@ -56,6 +60,19 @@ def install_cabinet(
             "The sources compile without them, and what needs them is refused."
         ),
     ] = "",
+    sunrise: Annotated[
+        int,
+        Parameter(
+            help="Generation of Sunrise.OS: 1, or 2 for a preview that was never run on such a cabinet: see "
+            "the guide, 'Sunrise 2.x and LBR Med'."
+        ),
+    ] = 1,
+    fri: Annotated[
+        str,
+        Parameter(
+            help="With --sunrise 2: release of FRI on the cabinet, 2.5 or 3.0 (FRI Med 3.0); empty: without FRI."
+        ),
+    ] = "",
     as_json: Json = False,
 ) -> int:
     """Write the cabinet application for a Sunrise project, with a key and the steps.
@@ -65,8 +82,11 @@ def install_cabinet(
         heptarm install-cabinet --out cabinet --target 172.31.1.147
 
         heptarm install-cabinet --out cabinet --without fri,hand-guiding
+
+        heptarm install-cabinet --out cabinet --sunrise 2 --fri 2.5
     """
     left_out = _options(without)
+    _check_generation(sunrise, fri, without)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise CommandRejected(
             f"--out must be a new or empty folder, got {out}",
@@ -80,14 +100,19 @@ def install_cabinet(
     stored = locate(target).file if target else None
     key = "" if no_key else new_key() if stored is None or not stored.exists() else read_key_file(stored)
     sources = _resources.cabinet_sources()
-    for part in ("core", "app"):
-        shutil.copytree(sources / part / "src", out / "src", dirs_exist_ok=True)
-    for option in left_out:
-        shutil.copytree(sources / "without" / option / "src", out / "src", dirs_exist_ok=True)
-    shutil.copytree(sources / "project", out, dirs_exist_ok=True)
+    if sunrise == 2:
+        folders: tuple[str, ...] = ("core/src", "app2/src", f"app2/fri/{fri or 'none'}")
+        project, settings, pattern, quoted = "project2", out / _PROJECT_2, _KEY_2, json.dumps(key)
+    else:
+        folders = ("core/src", "app/src", *(f"without/{option}/src" for option in left_out))
+        project, settings, pattern = "project", out / _PROJECT, _KEY
+        quoted = '"' + escape(key, {'"': "&quot;"}) + '"'
+    for folder in folders:
+        shutil.copytree(sources / folder, out / "src", dirs_exist_ok=True)
+    shutil.copytree(sources / project, out, dirs_exist_ok=True)
     file = out / "heptarm.key" if stored is None else stored
     if key:
-        _set_key(out / _PROJECT, key)
+        _set_key(settings, pattern, quoted)
         if not file.exists():
             write_key_file(file, key)
     files = sorted(path.relative_to(out / "src").as_posix() for path in out.rglob("*.java"))
@@ -96,11 +121,13 @@ def install_cabinet(
     if as_json:
         data = {"out": str(out), "files": len(files), "protocol": protocol, "version": __version__}
         data |= {"archive": str(out / ARCHIVE), "sources": check_sum}
-        data |= {"without": list(left_out)}
+        data |= {"without": list(left_out), "sunrise": sunrise}
         emit(data | {"key_file": str(file) if key else ""})
         return 0
     print(f"{len(files)} Java sources and the project's data are in {out}.")
     print(f"{out / ARCHIVE} has all sources in one file; their check sum is {check_sum}.")
+    if sunrise == 2:
+        print("They are a preview for Sunrise 2.x: written from facts, never run on such a cabinet.")
     print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
     if left_out:
         refused = " and ".join(f"{OPTIONS[option]} (option {option})" for option in left_out)
@@ -112,7 +139,7 @@ def install_cabinet(
             file=sys.stderr,
         )
     else:
-        print(f"A key is in {out / _PROJECT}; this machine's copy is {file}.")
+        print(f"A key is in {settings}; this machine's copy is {file}.")
         if stored is None:
             print(f"Store it for the cabinet: heptarm key set --target ADDRESS --key-file {file}")
     print(f"Continue with the steps in {out / 'INSTALL.md'}.")
@@ -155,12 +182,36 @@ def _options(text: str) -> tuple[str, ...]:
     return tuple(option for option in OPTIONS if option in names)
 
 
-def _set_key(project: Path, key: str) -> None:
-    """Write the key into the process data, which only their owner can read from then on."""
-    value = escape(key, {'"': "&quot;"})
-    text, count = _KEY.subn(lambda found: f'{found[1]}"{value}"', project.read_text(encoding="utf-8"))
+def _check_generation(sunrise: int, fri: str, without: str) -> None:
+    """Refuse a generation of Sunrise that is not known, and options of the other one.
+
+    Raises:
+        CommandRejected: the combination cannot be written.
+    """
+    if sunrise not in (1, 2):
+        raise CommandRejected(f"--sunrise must be 1 or 2, got {sunrise}", parameter="sunrise", allowed="1, 2")
+    if sunrise == 2 and without:
+        raise CommandRejected(
+            "--without is for --sunrise 1: the sources for 2.x need only FRI chosen, with --fri",
+            parameter="without",
+        )
+    if fri and sunrise == 1:
+        raise CommandRejected(
+            "--fri is for --sunrise 2: on 1.x the sources fit each release; leave FRI out with --without fri",
+            parameter="fri",
+        )
+    if fri and fri not in FRI_2:
+        allowed = ", ".join(FRI_2)
+        raise CommandRejected(
+            f"--fri must be one of {allowed}, got {fri!r}", parameter="fri", value=fri, allowed=allowed
+        )
+
+
+def _set_key(settings: Path, pattern: re.Pattern[str], quoted: str) -> None:
+    """Write the key into the settings, which only their owner can read from then on."""
+    text, count = pattern.subn(lambda found: f"{found[1]}{quoted}", settings.read_text(encoding="utf-8"))
     if count != 1:
-        raise HeptarmError(f"{project} has no empty process data heptarm.key", hint="reinstall heptarm")
-    project.unlink()
-    project.touch(mode=0o600)
-    project.write_text(text, encoding="utf-8")
+        raise HeptarmError(f"{settings} has no empty setting heptarm.key", hint="reinstall heptarm")
+    settings.unlink()
+    settings.touch(mode=0o600)
+    settings.write_text(text, encoding="utf-8")

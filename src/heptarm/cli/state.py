@@ -97,7 +97,12 @@ def table(arm: Arm, state: State) -> Group:
     a, b, c = np.degrees(state.pose.abc)
     force = " ".join(f"{v:.1f}" for v in state.wrench.force)
     running = f"motion {state.motion.id}" if state.motion is not None and state.motion.active else "at rest"
-    ready = "ready to move" if state.safety.ready_to_move else f"not ready ({', '.join(state.safety.stops)})"
+    if not state.safety.is_known:
+        ready = "readiness and stops unknown"
+    elif state.safety.ready_to_move:
+        ready = "ready to move"
+    else:
+        ready = f"not ready ({', '.join(state.safety.stops)})"
     lines = (
         f"flange  x {x:.1f}  y {y:.1f}  z {z:.1f} mm   a {a:.2f}  b {b:.2f}  c {c:.2f} deg",
         f"force   {force} N",

@@ -246,6 +246,14 @@ class PanelArm:
         """Why the arm cannot move, with what to do about it."""
         if safety is None:
             return ()
+        if not safety.is_known:
+            return (
+                Advice(
+                    "The safety state is unknown",
+                    "Look at the smartPAD: this cabinet reports none.",
+                    "warning",
+                ),
+            )
         found = []
         for reason in safety.stops:
             remedy, button = _REMEDIES.get(reason, ("", ""))

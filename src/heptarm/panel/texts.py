@@ -67,8 +67,9 @@ def head(readout: Readout) -> str:
         chips.append(_chip("no connection", "bad"))
     elif state is not None and state.groups.safety is not None:
         safety = state.groups.safety
-        chips.append(_chip(safety.mode.value.upper()))
-        chips.append(_chip("ready", "good") if safety.ready_to_move else _chip("stands", "warn"))
+        chips.append(_chip(safety.mode.value.upper()) if safety.is_known else _chip("safety unknown", "warn"))
+        if safety.is_known:
+            chips.append(_chip("ready", "good") if safety.ready_to_move else _chip("stands", "warn"))
     if readout.in_control:
         chips.append(_chip("in control: this panel", "good"))
     else:

@@ -116,7 +116,7 @@ def run(
 def _unfit(scenario: Scenario, arm: Arm, *, contact: bool, faults: bool) -> str:
     """Why a scenario cannot play here; empty: it can."""
     lacks = [name for name in scenario.needs if name not in arm.capabilities]
-    lacks += [name for name in scenario.signals if name not in arm.io]
+    lacks += [name for name in scenario.signals if name not in tuple(arm.io)]
     if lacks:
         return f"this cabinet lacks {', '.join(lacks)}"
     if scenario.operator and not has_operator(arm):
@@ -178,7 +178,7 @@ def tidy(arm: Arm, *, home: bool) -> None:
     arm.stop()
     arm.wait_for_rest(timeout=_PATIENCE)
     state = arm.state
-    if not state.safety.ready_to_move:
+    if not state.safety.ready_to_move and state.safety.is_known:
         if not arm.is_virtual:  # a person has to find out why it does not move
             raise NotReady(f"the robot is not ready: {', '.join(state.safety.stops) or 'it gives no reason'}")
         arm.recover(timeout=_PATIENCE)

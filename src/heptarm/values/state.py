@@ -34,6 +34,7 @@ class OperationMode(Enum):
     T1 = "t1"  # reduced speed, enabling switch held
     T2 = "t2"  # full speed, enabling switch held
     AUT = "aut"  # automatic
+    UNKNOWN = "unknown"  # the cabinet does not report it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,13 +87,13 @@ class Cartesian(Value):
     Attributes:
         stamp: cabinet time of the measurement [ns].
         pose: measured.
-        pose_cmd: commanded.
+        pose_cmd: commanded; None: the cabinet does not report it.
         redundancy: E1, Status and Turn of the arm.
     """
 
     stamp: int
     pose: Pose
-    pose_cmd: Pose
+    pose_cmd: Pose | None
     redundancy: Redundancy
 
 
@@ -193,7 +194,7 @@ class MotionStatus(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Safety(Value):
-    """Readiness and safety.
+    """Readiness and safety. What a cabinet does not report is None, so that nothing unknown looks fine.
 
     Attributes:
         stamp: cabinet time of the sample [ns].
@@ -215,29 +216,36 @@ class Safety(Value):
 
     stamp: int
     mode: OperationMode
-    ready_to_move: bool = False
-    paused: bool = False
-    brakes_open: bool = False
+    ready_to_move: bool | None = False
+    paused: bool | None = False
+    brakes_open: bool | None = False
     moving: bool = False
-    mastered: bool = False
-    emergency_stop: bool = False
-    protective_stop: bool = False
-    operator_safety_open: bool = False
-    enabling_switch: bool = False
-    torque_referenced: bool = False
-    position_referenced: bool = False
-    recovery_required: bool = False
-    hand_guiding_switch: bool = False
+    mastered: bool | None = False
+    emergency_stop: bool | None = False
+    protective_stop: bool | None = False
+    operator_safety_open: bool | None = False
+    enabling_switch: bool | None = False
+    torque_referenced: bool | None = False
+    position_referenced: bool | None = False
+    recovery_required: bool | None = False
+    hand_guiding_switch: bool | None = False
 
     def __str__(self) -> str:
         """One line."""
+        if not self.is_known:
+            return "unknown: this cabinet reports no safety state"
         ready = "ready to move" if self.ready_to_move else "not ready"
         return ", ".join((self.mode.value.upper(), ready, *self.stops))
 
     @property
+    def is_known(self) -> bool:
+        """Whether the cabinet reports its safety state; heptarm's preview for Sunrise 2.x does not."""
+        return self.mode is not OperationMode.UNKNOWN
+
+    @property
     def stops(self) -> tuple[str, ...]:
         """Reasons why the arm cannot move, as text; empty: none known."""
-        released = self.mode is not OperationMode.AUT and not self.enabling_switch
+        released = self.is_known and self.mode is not OperationMode.AUT and not self.enabling_switch
         named = self.emergency_stop or self.operator_safety_open or released
         reasons = {
             "emergency stop": self.emergency_stop,
@@ -464,8 +472,19 @@ class State(Value):
 
     @property
     def pose_cmd(self) -> Pose:
-        """Commanded pose of the motion frame in the base frame."""
-        return _of(self.groups.pose, "pose").pose_cmd
+        """Commanded pose of the motion frame in the base frame.
+
+        Raises:
+            StaleState: the cabinet does not report it.
+        """
+        commanded = _of(self.groups.pose, "pose").pose_cmd
+        if commanded is None:
+            raise StaleState(
+                "this cabinet does not report the commanded pose",
+                parameter="pose",
+                hint="use the measured one: state.pose",
+            )
+        return commanded
 
     @property
     def redundancy(self) -> Redundancy:

@@ -91,6 +91,7 @@ class OperationMode(enum.IntEnum):
     T1 = 0
     T2 = 1
     AUT = 2
+    UNKNOWN = 3
 
 
 class OrientationType(enum.IntEnum):
@@ -242,6 +243,7 @@ class SafetyBits(enum.IntFlag):
     POSITION_REFERENCED = 1024
     RECOVERY_REQUIRED = 2048
     HAND_GUIDING_SWITCH = 4096
+    UNKNOWN = 8192
 
 
 _Pose_0 = Struct(">3d4d")

@@ -67,7 +67,7 @@ class RecoveryAttempts:
                 HeptarmError
             ):  # the cabinet reported that it is ready: a late state changes nothing
                 connection.wait_for(
-                    lambda state: state.groups.safety is not None and state.groups.safety.ready_to_move,
+                    lambda state: state.groups.safety is not None and bool(state.groups.safety.ready_to_move),
                     _STATE_TIMEOUT,
                 )
         return ()

@@ -194,7 +194,7 @@ def _cartesian(message: wire.PoseState) -> values.Cartesian:
     return values.Cartesian(
         message.stamp,
         Pose.of(message.xyz, message.quat),
-        Pose.of(message.xyz_cmd, message.quat_cmd),
+        None if isnan(message.xyz_cmd[0]) else Pose.of(message.xyz_cmd, message.quat_cmd),
         _redundancy(message.redundancy),
     )
 
@@ -247,8 +247,9 @@ def _safety(message: wire.SafetyState) -> values.Safety:
 
 
 @lru_cache(maxsize=256)
-def _safety_bits(bits: int) -> tuple[bool, ...]:
-    return tuple(bool(bits & bit) for bit in _SAFETY)
+def _safety_bits(bits: int) -> tuple[Any, ...]:
+    is_known = not bits & wire.SafetyBits.UNKNOWN
+    return tuple(bool(bits & bit) if is_known or bit == wire.SafetyBits.MOVING else None for bit in _SAFETY)
 
 
 #: The groups of a state, each with the function that makes a value of its message.

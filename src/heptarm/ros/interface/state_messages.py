@@ -203,7 +203,8 @@ class StateMessages:
         if state is not None and state.groups.safety is not None:
             safety = state.groups.safety
             for name in _SAFETY:
-                setattr(message, name, getattr(safety, name))
+                value = getattr(safety, name)  # what is unknown counts as a stop, not as fine
+                setattr(message, name, name.endswith("_stop") if value is None else value)
             message.operation_mode = getattr(self._status, f"MODE_{safety.mode.name}")
         if state is not None and state.motion is not None:
             message.override = state.motion.override
@@ -284,7 +285,8 @@ def preset_event(ros: RosAdapter, kind: Any, value: str) -> Any:
 
 
 #: Codes of FRI: of operation modes, safety states (normal, stop 1, stop 2) and drive states (off, active).
-_OPERATION_MODES = {OperationMode.T1: 0, OperationMode.T2: 1, OperationMode.AUT: 2}
+#: A mode that a cabinet does not report counts as the most careful one, T1, and its safety state as a stop.
+_OPERATION_MODES = {OperationMode.T1: 0, OperationMode.T2: 1, OperationMode.AUT: 2, OperationMode.UNKNOWN: 0}
 _SAFE, _EMERGENCY, _PROTECTIVE = 0, 2, 3
 _DRIVE_OFF, _DRIVE_ON = 0, 2
 
@@ -306,7 +308,11 @@ def _lbr_state(message: Any, state: State, stamp: int) -> Any:
         message.operation_mode = _OPERATION_MODES[safety.mode]
         message.drive_state = _DRIVE_ON if safety.brakes_open else _DRIVE_OFF
         message.safety_state = (
-            _EMERGENCY if safety.emergency_stop else _PROTECTIVE if safety.protective_stop else _SAFE
+            _EMERGENCY
+            if safety.emergency_stop
+            else _PROTECTIVE
+            if safety.protective_stop or not safety.is_known
+            else _SAFE
         )
     return message
 

@@ -85,6 +85,10 @@ def diagnose(
         "recovery_required",
     ):
         values[name.replace("_", " ")] = _yes_no(getattr(safety, name))
+    if not safety.is_known:
+        return Diagnosis(
+            DiagnosticLevel.WARN, "the safety state is unknown: this cabinet reports none", values
+        )
     for active_fault, text in (
         (safety.emergency_stop, "emergency stop: release it and acknowledge it on the smartPAD"),
         (safety.protective_stop, "safety stop: remove its cause and acknowledge it on the smartPAD"),
@@ -100,5 +104,5 @@ def diagnose(
     return Diagnosis(DiagnosticLevel.OK, "ready" if active else "ready, inactive", values)
 
 
-def _yes_no(value: bool) -> str:
-    return "yes" if value else "no"
+def _yes_no(value: bool | None) -> str:
+    return "unknown" if value is None else "yes" if value else "no"

@@ -4,6 +4,7 @@ import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
+import heptarm.core.robot.AbcAngles;
 import heptarm.wire.Pose;
 
 /** Converts between metres and quaternions and Sunrise's millimetres and A-B-C angles; nothing else does. */
@@ -19,20 +20,8 @@ final class Convert {
 
     /** Convert a pose in SI units. */
     static Transformation transformation(Pose pose) {
-        double x = pose.quat[0];
-        double y = pose.quat[1];
-        double z = pose.quat[2];
-        double w = pose.quat[3];
-        double r00 = 1 - 2 * (y * y + z * z);
-        double r10 = 2 * (x * y + w * z);
-        double a = Math.atan2(r10, r00);
-        double ca = Math.cos(a);
-        double sa = Math.sin(a);
-        // b and c from the rest of the rotation after a: where a is ill-defined (b near 90 degrees) they compensate for it
-        double b = Math.atan2(2 * (w * y - x * z), ca * r00 + sa * r10);
-        double c = Math.atan2(sa * 2 * (x * z + w * y) - ca * 2 * (y * z - w * x),
-                ca * (1 - 2 * (x * x + z * z)) - sa * 2 * (x * y - w * z));
-        return Transformation.ofRad(pose.xyz[0] / MM, pose.xyz[1] / MM, pose.xyz[2] / MM, a, b, c);
+        double[] abc = AbcAngles.of(pose.quat);
+        return Transformation.ofRad(pose.xyz[0] / MM, pose.xyz[1] / MM, pose.xyz[2] / MM, abc[0], abc[1], abc[2]);
     }
 
     static double[] xyz(ITransformation t) {

@@ -10,8 +10,8 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
+import heptarm.core.robot.FailureTexts;
 import heptarm.core.robot.MotionJob;
-import heptarm.wire.Code;
 
 /** A motion container of Sunrise as a job of the core. It ends once, whichever callback comes first. */
 class SunriseJob implements MotionJob, IMotionContainerListener {
@@ -58,7 +58,7 @@ class SunriseJob implements MotionJob, IMotionContainerListener {
 
     void fail(String text) {
         String why = text == null ? "the cabinet reports no reason" : text;
-        end(Outcome.FAILED, code(why), why);
+        end(Outcome.FAILED, FailureTexts.code(why), why);
     }
 
     private void end(Outcome outcome, int code, String text) {
@@ -69,23 +69,6 @@ class SunriseJob implements MotionJob, IMotionContainerListener {
             ended = true;
         }
         listener.finished(outcome, code, text);
-    }
-
-    /** The code of a failure: the cabinet reports texts only. */
-    static int code(String text) {
-        if (text.indexOf("safety stop") >= 0) {
-            return Code.SAFETY_STOP;
-        }
-        if (text.indexOf("singularity") >= 0) {
-            return text.indexOf("Can not plan") >= 0 ? Code.PLANNING_FAILED : Code.EXECUTION_FAILED;
-        }
-        if (text.indexOf("violates limit") >= 0) {
-            return Code.JOINT_LIMIT;
-        }
-        if (text.indexOf("not reachable") >= 0) {
-            return Code.UNREACHABLE;
-        }
-        return text.indexOf("Can not plan") >= 0 ? Code.PLANNING_FAILED : Code.EXECUTION_FAILED;
     }
 
     public void onStateChanged(IExecutionContainer changed, ExecutionState state) {

@@ -13,6 +13,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.robot.FailureTexts;
 import heptarm.core.robot.ServoJob;
 import heptarm.wire.Code;
 import heptarm.wire.Mode;
@@ -126,6 +127,6 @@ final class SunriseServo implements ServoJob {
 
     private static CommandRejected refusal(RuntimeException error) {
         String text = String.valueOf(error.getMessage());
-        return new CommandRejected(SunriseJob.code(text), text);
+        return new CommandRejected(FailureTexts.code(text), text);
     }
 }

@@ -4,8 +4,6 @@ import java.util.ArrayList;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
-import java.util.regex.Matcher;
-import java.util.regex.Pattern;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.ioModel.AbstractIO;
@@ -13,14 +11,13 @@ import com.kuka.roboticsAPI.ioModel.AbstractIO;
 import heptarm.core.CommandRejected;
 import heptarm.core.Log;
 import heptarm.core.robot.SignalPort;
+import heptarm.core.robot.SignalWord;
 import heptarm.wire.Code;
-import heptarm.wire.IoDirection;
-import heptarm.wire.IoType;
 import heptarm.wire.SignalInfo;
 
 /**
- * The signals that the process data heptarm.io list, separated by spaces: Group.Name&lt;type for an input, Group.Name&gt;type for
- * an output, of type bool, u8 (unsigned, 8 bits), i16, or analog12[0,10]; "flange" stands for those of a media flange.
+ * The signals that the process data heptarm.io list, separated by spaces, see {@link SignalWord}; "flange" stands for those
+ * of a media flange.
  * Signals that the cabinet does not have are left out, with a line in the log.
  */
 final class SunriseSignals implements SignalPort {
@@ -29,9 +26,6 @@ final class SunriseSignals implements SignalPort {
     private static final String[] FLANGE_SIGNALS = {"InputX3Pin3<bool", "InputX3Pin4<bool", "InputX3Pin10<bool", "InputX3Pin13<bool",
         "InputX3Pin16<bool", "UserButton<bool", "OutputX3Pin1>bool", "OutputX3Pin2>bool", "OutputX3Pin11>bool", "OutputX3Pin12>bool",
         "SwitchOffX3Voltage>bool", "LEDBlue>bool", "LEDRed>bool", "LEDGreen>bool"};
-    private static final Pattern WORD =
-            Pattern.compile("(.+)\\.([^.<>]+)([<>])(bool|u([0-9]+)|i([0-9]+)|analog([0-9]+)\\[([^,]+),([^,]+)\\])");
-    private static final int MAX_BITS = 32;
 
     private static final class Signal {
         final IoGroup group;
@@ -66,58 +60,20 @@ final class SunriseSignals implements SignalPort {
 
     private void add(String word, String complaint, Log log) {
         try {
-            Matcher parts = WORD.matcher(word);
-            if (!parts.matches()) {
-                throw new IllegalArgumentException("a signal must read Group.Name<type or Group.Name>type");
-            }
-            SignalInfo info = info(parts);
-            IoGroup group = groups.get(parts.group(1));
+            SignalWord signal = SignalWord.of(word);
+            IoGroup group = groups.get(signal.group);
             if (group == null) {
-                group = new IoGroup(controller, parts.group(1));
-                groups.put(parts.group(1), group);
+                group = new IoGroup(controller, signal.group);
+                groups.put(signal.group, group);
             }
-            group.add(parts.group(2), info, bits(parts));
-            group.read(parts.group(2), info); // throws if the cabinet has no such signal
-            all.add(new Signal(group, parts.group(2), info));
+            group.add(signal.name, signal.info, signal.bits);
+            group.read(signal.name, signal.info); // throws if the cabinet has no such signal
+            all.add(new Signal(group, signal.name, signal.info));
         } catch (RuntimeException e) {
             if (complaint != null) {
                 log.warn(complaint + word + " is left out: " + e.getMessage());
             }
         }
-    }
-
-    private static int bits(Matcher parts) {
-        for (int i = 5; i <= 7; i++) {
-            if (parts.group(i) != null) {
-                int bits = Integer.parseInt(parts.group(i));
-                if (bits < 1 || bits > MAX_BITS) {
-                    throw new IllegalArgumentException("a number must have 1 to " + MAX_BITS + " bits, got " + bits);
-                }
-                return bits;
-            }
-        }
-        return 1;
-    }
-
-    private static SignalInfo info(Matcher parts) {
-        IoDirection direction = "<".equals(parts.group(3)) ? IoDirection.INPUT : IoDirection.OUTPUT;
-        String name = parts.group(1) + "." + parts.group(2);
-        double span = Math.pow(2, bits(parts));
-        if (parts.group(5) != null) {
-            return new SignalInfo(name, direction, IoType.UNSIGNED, 0, span - 1);
-        }
-        if (parts.group(6) != null) {
-            return new SignalInfo(name, direction, IoType.INTEGER, -span / 2, span / 2 - 1);
-        }
-        if (parts.group(7) != null) {
-            double low = Double.parseDouble(parts.group(8));
-            double high = Double.parseDouble(parts.group(9));
-            if (!(low < high)) {
-                throw new IllegalArgumentException("the range of an analog signal must ascend, got " + low + " to " + high);
-            }
-            return new SignalInfo(name, direction, IoType.ANALOG, low, high);
-        }
-        return new SignalInfo(name, direction, IoType.BOOLEAN, 0, 1);
     }
 
     public SignalInfo[] signals() {

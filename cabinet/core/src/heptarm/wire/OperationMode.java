@@ -5,7 +5,8 @@ package heptarm.wire;
 public enum OperationMode {
     T1(0),
     T2(1),
-    AUT(2);
+    AUT(2),
+    UNKNOWN(3);
 
     private final int value;
 

@@ -8,7 +8,7 @@ public final class PoseState {
     /** measured [m] */
     public final double[] xyz;
     public final double[] quat;
-    /** commanded [m] */
+    /** commanded; NaN: the cabinet does not report it [m] */
     public final double[] xyz_cmd;
     public final double[] quat_cmd;
     public final Redundancy redundancy;

@@ -16,6 +16,7 @@ public final class SafetyBits {
     public static final int POSITION_REFERENCED = 1024;
     public static final int RECOVERY_REQUIRED = 2048;
     public static final int HAND_GUIDING_SWITCH = 4096;
+    public static final int UNKNOWN = 8192;
 
     private SafetyBits() {
     }

@@ -128,7 +128,7 @@ class LibiiwaServer:
         """Return whether the arm can move."""
         state = context.driver.state
         safety = None if state is None else state.groups.safety
-        ready = context.driver.active and safety is not None and safety.ready_to_move
+        ready = context.driver.active and safety is not None and bool(safety.ready_to_move)
         return ServiceResponse(True, "", {"data": ready})
 
     def has_active_motion(self, context: NodeContext, request: Any) -> ServiceResponse:

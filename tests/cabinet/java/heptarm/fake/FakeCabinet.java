@@ -48,7 +48,7 @@ public final class FakeCabinet {
         Threads.start("fake-robot", motions);
         double[] high = {2.96, 2.09, 2.96, 2.09, 2.96, 2.09, 3.05};
         double[] low = Arrays.stream(high).map(limit -> -limit).toArray();
-        return new Robot(RobotModels.describe("LBR_iiwa_14_R820_1", low, high), "fake", true, new String[] {"ptp", "hold"}, motions,
+        return new Robot(RobotModels.describe("LBR_iiwa_14_R820_1", low, high), "fake", true, new String[] {"ptp", "hold", "pause", "override", "triggers", "dialogs", "user_keys", "process_data", "tools"}, motions,
                 sensors, safety, new FakeTools(), signals, new FakePanel(faults, safety));
     }
 

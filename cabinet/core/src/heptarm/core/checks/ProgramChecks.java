@@ -134,6 +134,9 @@ public final class ProgramChecks {
 
     /** Refuses triggers that would never fire, and actions that cannot be executed. */
     private void checkTriggers(Item item, String path) throws CommandRejected {
+        if (item.triggers.length > 0) {
+            robot.require("triggers", path + "triggers", "triggers");
+        }
         for (int i = 0; i < item.triggers.length; i++) {
             Trigger one = item.triggers[i];
             String at = path + "triggers[" + i + "].";

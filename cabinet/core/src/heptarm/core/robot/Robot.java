@@ -1,5 +1,9 @@
 package heptarm.core.robot;
 
+import java.util.Arrays;
+
+import heptarm.core.CommandRejected;
+import heptarm.wire.Code;
 import heptarm.wire.RobotInfo;
 
 /** A robot as the core sees it, in SI units: a description, and one port for each concern. */
@@ -30,5 +34,13 @@ public final class Robot {
         this.tools = tools;
         this.signals = signals;
         this.panel = panel;
+    }
+
+    /** Refuses what this robot cannot do, by the name of the capability and what a client has asked for. */
+    public void require(String capability, String parameter, String request) throws CommandRejected {
+        if (!Arrays.asList(capabilities).contains(capability)) {
+            throw new CommandRejected(Code.UNSUPPORTED, parameter, request, "",
+                    "this cabinet does not support " + request + " (capability " + capability + ")");
+        }
     }
 }

@@ -18,13 +18,18 @@ final class SafetyAssessment {
         return (state.bits & bit) != 0;
     }
 
+    /** Whether the cabinet reports its safety state. */
+    private boolean isKnown() {
+        return !has(SafetyBits.UNKNOWN);
+    }
+
     boolean differsFrom(SafetyAssessment other, int ignored) {
         return ((state.bits ^ other.state.bits) & ~ignored) != 0 || state.mode != other.state.mode;
     }
 
     /** Whether the mode requires an enabling switch and none is pressed. */
     boolean lacksEnabling() {
-        return state.mode != OperationMode.AUT && !has(SafetyBits.ENABLING_SWITCH);
+        return isKnown() && state.mode != OperationMode.AUT && !has(SafetyBits.ENABLING_SWITCH);
     }
 
     /** Whether a stop is active; the stop that a released enabling switch causes does not count. */
@@ -49,6 +54,9 @@ final class SafetyAssessment {
 
     /** What an operator has to do, step by step; empty: nothing. */
     String steps() {
+        if (!isKnown()) {
+            return "look at the smartPAD: this cabinet reports no safety state";
+        }
         StringBuilder steps = new StringBuilder();
         if (has(SafetyBits.EMERGENCY_STOP)) {
             step(steps, "release the emergency stop and acknowledge it at the smartPAD");
@@ -85,6 +93,9 @@ final class SafetyAssessment {
 
     /** The state in a sentence. */
     String summary() {
+        if (!isKnown()) {
+            return "the safety state is unknown: this cabinet reports none";
+        }
         if (isHolding()) {
             return reason();
         }

@@ -113,12 +113,16 @@ public final class CommandHandler {
         } else if (message instanceof Cancel) {
             executor.cancel(((Cancel) message).id);
         } else if (message instanceof Pause) {
+            robot.require("pause", "", "a pause");
             robot.motion.pause();
         } else if (message instanceof Resume) {
+            robot.require("pause", "", "a pause");
             robot.motion.resume();
         } else if (message instanceof SetOverride) {
+            robot.require("override", "", "a speed override");
             robot.motion.setOverride(((SetOverride) message).value);
         } else if (ToolChange.handles(message)) {
+            robot.require("tools", "", "tools and workpieces");
             executor.whileIdle(new ToolChange(tools, message));
         } else if (message instanceof Recover) {
             safety.recover();

@@ -2,6 +2,7 @@ package heptarm.core.session;
 
 import heptarm.core.CommandRejected;
 import heptarm.core.robot.PanelPort;
+import heptarm.core.robot.Robot;
 import heptarm.core.state.SignalTable;
 import heptarm.wire.Accepted;
 import heptarm.wire.AskOperator;
@@ -20,12 +21,14 @@ final class PanelRequests {
     private static final String SECRET = "heptarm.key";
 
     private final SignalTable signals;
+    private final Robot robot;
     private final PanelPort panel;
     private final OperatorDialogs dialogs;
 
-    PanelRequests(SignalTable signals, PanelPort panel, OperatorDialogs dialogs) {
+    PanelRequests(SignalTable signals, Robot robot, OperatorDialogs dialogs) {
         this.signals = signals;
-        this.panel = panel;
+        this.robot = robot;
+        this.panel = robot.panel;
         this.dialogs = dialogs;
     }
 
@@ -36,6 +39,13 @@ final class PanelRequests {
 
     /** Execute a request; returns its answer. */
     Message execute(Message message) throws CommandRejected {
+        if (message instanceof SetKey) {
+            robot.require("user_keys", "", "user keys");
+        } else if (message instanceof AskOperator) {
+            robot.require("dialogs", "", "dialogs");
+        } else if (message instanceof GetProcessData || message instanceof SetProcessData) {
+            robot.require("process_data", "", "process data");
+        }
         if (message instanceof SetSignals) {
             signals.write((SetSignals) message);
         } else if (message instanceof SetKey) {

@@ -54,7 +54,7 @@ public final class RobotService {
         dialogs = new OperatorDialogs(robot.panel, events, log);
         sampler = new StateSampler(robot, reader, executor, signals, tools, clock, log);
         commands = new CommandHandler(robot, executor, monitors, safety, tools, new ProgramChecks(robot, tools, signals),
-                new PanelRequests(signals, robot.panel, dialogs), log);
+                new PanelRequests(signals, robot, dialogs), log);
         watchdog = new Watchdog(clock, log);
         watchdog.add("FRI sessions", 1, monitors);
         watchdog.add("the safety state", SAFETY_ROUNDS, safety);

@@ -1,0 +1,6 @@
+package com.kuka.fri.api.commanding;
+
+/** What an FRI client commands. */
+public enum EClientCommandMode {
+    JOINT_POSITION
+}

@@ -1,0 +1,8 @@
+package com.kuka.fri.api.monitoring;
+
+/** An FRI session. */
+public interface IFriSession {
+    void addFriSessionListener(IFriSessionListener listener);
+
+    void close();
+}

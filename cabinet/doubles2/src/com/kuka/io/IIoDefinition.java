@@ -1,0 +1,5 @@
+package com.kuka.io;
+
+/** A signal. */
+public interface IIoDefinition {
+}

@@ -1,0 +1,6 @@
+package com.kuka.io;
+
+/** Finds signals. */
+public interface IIoDefinitionProvider {
+    IIoDefinition getIoDefinition(String group, String name);
+}

@@ -1,0 +1,5 @@
+package com.kuka.math.geometry;
+
+/** Something with a translation and a rotation. */
+public interface ITransformation {
+}

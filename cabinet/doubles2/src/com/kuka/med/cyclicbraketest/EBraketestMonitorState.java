@@ -1,0 +1,6 @@
+package com.kuka.med.cyclicbraketest;
+
+/** State of the cyclic brake test. */
+public enum EBraketestMonitorState {
+    OK, PENDING, ERROR, FATAL
+}

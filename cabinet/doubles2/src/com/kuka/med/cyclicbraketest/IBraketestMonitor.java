@@ -1,0 +1,6 @@
+package com.kuka.med.cyclicbraketest;
+
+/** The cyclic brake test. */
+public interface IBraketestMonitor {
+    EBraketestMonitorState getState();
+}

@@ -1,0 +1,6 @@
+package com.kuka.motion;
+
+/** A motion. */
+public interface IMotion {
+    heptarm.sunrise1.roboticsAPI.motionModel.IMotion behind();
+}
