@@ -28,6 +28,7 @@ from heptarm.do import notify
 from heptarm.fri import SessionState
 from heptarm.modes import CartesianImpedance, Position
 from heptarm.planning import find_path
+from heptarm.record.demonstration import Demonstrations
 from heptarm.values.robot import robot
 from heptarm.values.state import State
 from heptarm.when import force
@@ -105,6 +106,9 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Trajectory.load": {"path": "no such file"},
     "load": {"path": "no such file"},
     "replay_in_sim": {"recording": "no such file"},
+    "load_episodes": {"folder": "no such folder", "labels": ("success",)},
+    "save_lerobot": {"episodes": Demonstrations(Path("no such folder"), ()), "folder": "no such folder"},
+    "Arm.episodes": {"folder": "no such folder", "cameras": (), "streams": None, "reset": None},
     "export_model": {"path": "no such format"},
     "record_client": {"path": "no folder of mine/run.mcap"},
     "Recording.__getitem__": {"name": "q"},
@@ -267,7 +271,11 @@ REPORTS = (
         "Collision",
         "CompiledLaw",
         "Contact",
+        "Demonstration",
+        "Demonstrations",
         "Detour",
+        "Episode",
+        "EpisodeSet",
         "Deviation",
         "FollowedPath",
         "ForeseenCollision",
@@ -290,6 +298,7 @@ REPORTS = (
         "Recording",
         "RepeatedMotion",
         "StatesOfArms",
+        "TakenChunk",
         "TouchOnPath",
         "Twin",
         "TwistServo",
