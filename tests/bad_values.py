@@ -99,6 +99,7 @@ FOUND = find_path(heptarm.CollisionModel("iiwa14"), start=HOME, goal=HOME + 0.1)
 #: Arguments that a name does not give away, by function and parameter.
 ARGUMENTS: dict[str, dict[str, object]] = {
     "Pose": {"quat": (0.0, 0.0, 0.0, 1.0)},
+    "PartialPose": dict.fromkeys("xyzabc", 0.5),
     "Pose.from_matrix": {"matrix": np.eye(4)},
     "Trajectory": {"q": np.zeros((3, 7))},
     "Trajectory.of": {"q": np.zeros((3, 7))},
