@@ -38,6 +38,18 @@ html_title = f"heptarm {__version__}"
 html_show_sourcelink = False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = [("versions.js", {"defer": "defer"})]
+templates_path = ["_templates"]
+html_sidebars = {
+    "**": [
+        "sidebar/brand.html",
+        "sidebar/versions.html",  # hidden where no scripts/publish_site.py has listed versions
+        "sidebar/search.html",
+        "sidebar/scroll-start.html",
+        "sidebar/navigation.html",
+        "sidebar/scroll-end.html",
+    ]
+}
 REPOSITORY = "https://github.com/heptarm/heptarm"
 html_theme_options = {
     "source_repository": REPOSITORY,  # links to view and to edit each page

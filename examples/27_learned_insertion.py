@@ -9,7 +9,7 @@ import sys
 import numpy as np
 
 import heptarm as ha
-from heptarm.rl.deploy_peg import deploy_peg
+from heptarm.rl.deploy_contact import deploy_contact
 from heptarm.rl.policy import Policy, shipped_peg
 
 PEG_IN_HOLE = "sim://iiwa14?scene=peg-in-hole"
@@ -40,10 +40,10 @@ with ha.connect(target, watchdog=2.0) as arm, arm.tool(GRIPPER):
     with arm.attached(PEG):
         arm.move(ha.lin_rel(z=0.1, frame="base", speed_mps=0.1))
         errors = policy.task.targets(np.random.default_rng(SEED), NUMBER)  # what the policy does not know
-        report = deploy_peg(
+        report = deploy_contact(
             arm,
             policy,
-            hole,
+            [policy.task.presumed(hole, error) for error in errors],
             errors,
             progress=lambda number, missing: print(f"{number + 1}: {missing * 1e3:.1f} mm missing"),
         )

@@ -214,6 +214,59 @@ static int guiding(const struct heptarm_state *s, struct heptarm_command *out, c
 }
 HEPTARM_LAW(free_guiding, guiding, struct guiding, struct guiding_memory)
 
+/* ----------------------------------------------------------------------------------------------- reflected force */
+
+struct reflection {
+    struct robot robot;
+    double wrench[6], force_max, moment_max, damping[N], tank, is_passive, tau_max[N], filter;
+};
+
+struct reflection_memory {
+    double wrench[6], energy, fraction, dq[N], q[N], tau[N], started, saturated;
+};
+
+/* A leader feels the wrench of its follower, which comes late; the torques give back no more energy than was put in. What they
+   took is known exactly, since a torque is constant for a cycle: the torque times the joints' movement (Ryu, Preusche, Hannaford
+   and Hirzinger, "Time domain passivity control with reference energy following", 2005). The wrench is reduced to what the tank
+   has left, and damping repays what a prediction missed. */
+static int reflection(const struct heptarm_state *s, struct heptarm_command *out, const struct reflection *p, struct reflection_memory *m) {
+    struct posture posture;
+    double j[6][N], mass[N][N], factor[N * N], felt[N], change[N], tau[N], work = 0.0, square = 0.0;
+    int fresh = m->started == 0.0;
+    find_posture(&p->robot, s->q, &posture);
+    smooth(s, p->filter, m->dq, fresh);
+    for (int i = 0; i < N && !fresh; i++) m->energy -= m->tau[i] * (s->q[i] - m->q[i]);
+    m->energy = fmin(m->energy, p->tank);
+    memcpy(m->q, s->q, sizeof m->q);
+    m->started = 1.0;
+    memcpy(m->wrench, p->wrench, sizeof m->wrench);
+    int limited = shorten(m->wrench, 3, p->force_max) | shorten(m->wrench + 3, 3, p->moment_max);
+    jacobian(posture.axis, posture.origin, posture.place, j);
+    moved_mass(&p->robot, &posture, mass);
+    memcpy(factor, mass, sizeof factor);
+    if (!factorise(factor, N)) return 1;
+    for (int i = 0; i < N; i++) {
+        felt[i] = 0.0;
+        for (int r = 0; r < 6; r++) felt[i] += j[r][i] * m->wrench[r];
+    }
+    memcpy(change, felt, sizeof change);
+    solve(factor, N, change);
+    for (int i = 0; i < N; i++) { /* of the next cycle, in which the torques also accelerate the joints */
+        work += s->dt * felt[i] * (s->dq[i] + s->dt * change[i]);
+        square += s->dq[i] * s->dq[i];
+    }
+    m->fraction = p->is_passive == 0.0 || work <= 0.0 ? 1.0 : fmin(1.0, fmax(0.0, m->energy) / work);
+    double repaid = p->is_passive != 0.0 && m->energy < 0.0 && square > 0.0 ? -m->energy / (s->dt * square) : 0.0;
+    for (int i = 0; i < N; i++)
+        tau[i] = m->fraction * felt[i] - p->damping[i] * m->dq[i] - fmin(repaid, 0.25 * mass[i][i] / s->dt) * s->dq[i];
+    limited += limit_torques(tau, p->tau_max);
+    m->saturated += limited != 0;
+    memcpy(m->tau, tau, sizeof tau);
+    memcpy(out->tau, tau, sizeof tau);
+    return 0;
+}
+HEPTARM_LAW(reflected_force, reflection, struct reflection, struct reflection_memory)
+
 /* ---------------------------------------------------------------------------------------------------- admittance */
 
 struct admittance {

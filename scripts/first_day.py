@@ -2,6 +2,7 @@
 
     python3 scripts/first_day.py                          everything
     python3 scripts/first_day.py --only clone,demo,pick   some steps
+    python3 scripts/first_day.py --patience 3600          on a machine that is busy with other things
 
 Each program is the section of a page as it is printed, typed into one file and run in an empty home. It needs the
 network, and nothing but Python's standard library.
@@ -19,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from scripts.newcomer import Newcomer, Step, take
+from scripts.newcomer import PATIENCE, Newcomer, Step, take
 
 COOKBOOK = "docs/guide/cookbook.md"
 #: Short names of the programs, the pages and sections in which they are.
@@ -63,9 +64,9 @@ def in_a_container(newcomer: Newcomer, image: Path) -> str:
     return newcomer.last(image / ".venv/bin" / entry, *words, cwd=newcomer.home)
 
 
-def steps(folder: Path) -> Iterator[Step]:
-    """The day, in its order."""
-    newcomer = Newcomer(folder)
+def steps(folder: Path, *, patience: float) -> Iterator[Step]:
+    """The day, in its order; no step may last longer than `patience` [s]."""
+    newcomer = Newcomer(folder, patience=patience)
     yield Step("clone", "git clone", newcomer.get)
     yield Step("demo", "make demo", lambda: newcomer.last("make", "demo"))
     yield Step(
@@ -90,7 +91,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Do and time a lab's first day, from the documentation.")
     names = ", ".join(("clone", "demo", "extras", *PROGRAMS, *COMMANDS, "container"))
     parser.add_argument("--only", default="", help=f"steps, separated by commas, of {names}")
-    return take(steps, parser.parse_args().only)
+    parser.add_argument("--patience", type=float, default=PATIENCE, help="longest duration of a step [s]")
+    given = parser.parse_args()
+    return take(partial(steps, patience=given.patience), given.only)
 
 
 if __name__ == "__main__":

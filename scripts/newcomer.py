@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -20,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 #: The environment that a newcomer has as well: the network's, and where the system's programs are.
 KEPT = ("PATH", "LANG", "TERM", "http_proxy", "https_proxy", "no_proxy", "PIP_INDEX_URL", "SSL_CERT_FILE")
-#: Longest duration of a step [s].
+#: Longest duration of a step on a machine that does nothing else [s].
 PATIENCE = 900.0
 #: A block of Python that a reader types; one whose fence states `no-run` is none.
 BLOCK = re.compile(r"^```python(?![^\n]*no-run)[^\n]*\n(.*?)^```", re.S | re.M)
@@ -50,9 +51,11 @@ class Newcomer:
 
     Args:
         folder: an empty folder.
+        patience: longest duration of a step [s].
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, patience: float = PATIENCE) -> None:
+        self._patience = patience
         self.home, self.clone = folder / "home", folder / "heptarm"
         self._folder = folder
         self.home.mkdir()
@@ -70,18 +73,25 @@ class Newcomer:
         """
         environment = {name: os.environ[name] for name in KEPT if name in os.environ}
         environment |= {"HOME": str(self.home), "PIP_NO_CACHE_DIR": "1"}
-        done = subprocess.run(
-            [str(one) for one in command],
+        started = subprocess.Popen(
+            [str(word) for word in command],
             cwd=self.clone if cwd is None else cwd,
             env=environment,
-            capture_output=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-            timeout=PATIENCE,
-            check=False,
+            start_new_session=True,
         )
-        if done.returncode:
-            raise RuntimeError((done.stderr.strip() or done.stdout.strip())[-2000:])
-        return done.stdout
+        try:
+            output, complaint = started.communicate(timeout=self._patience)
+        except BaseException:  # it ran too long, or Ctrl-C: what it has started ends with it
+            os.killpg(started.pid, signal.SIGKILL)
+            started.communicate()
+            raise
+        if started.returncode:
+            raise RuntimeError((complaint.strip() or output.strip())[-2000:])
+        return output
 
     def last(self, *command: str | Path, cwd: Path | None = None) -> str:
         """Run a command; returns the last line that it prints."""

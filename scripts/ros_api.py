@@ -39,6 +39,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "groups": (WORDS + "the nodes subscribe to what their topics need",),
         "history": (WORDS + "a rosbag keeps the states",),
         "record": (WORDS + "a rosbag records the topics; `heptarm record` runs beside the node",),
+        "episodes": (WORDS + "a rosbag for each episode; `EpisodeSet.push` takes what a topic brings",),
         "state_rate": ("parameter `state_rate`",),
         "breaking_on": ("~/collision_guard", "fields `until` of goals"),
         "camera": (
@@ -176,6 +177,10 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     "arm.servo(...)": {
         "active": ("~/state",),
         "change": (WORDS + "a servo topic keeps its initial control mode",),
+        "correct": (WORDS + "`Takeover` runs beside the policy, in its program",),
+        "follow": ("~/follow_joint_trajectory", "a new goal replaces the one before"),
+        "hold": ("silence of a servo topic: the arm rests",),
+        "target": (WORDS + "the node publishes the set-points",),
         "close": ("the end of the messages", "~/stop"),
         "refused": ("the node's log",),
         "result": ("~/state",),
@@ -234,6 +239,8 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "lin_rel": ("~/move_pose", "~/run_program"),
         "live": (WORDS + "rviz shows the arm; `heptarm live` runs beside the node",),
         "load": (WORDS + "it reads a file",),
+        "load_episodes": (WORDS + "it reads files",),
+        "save_lerobot": (WORDS + "it writes a data set of recorded episodes",),
         "param": (WORDS + "a law is Python code",),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),

@@ -28,6 +28,7 @@ from heptarm.do import notify
 from heptarm.fri import SessionState
 from heptarm.modes import CartesianImpedance, Position
 from heptarm.planning import find_path
+from heptarm.record.demonstration import Demonstrations
 from heptarm.values.robot import robot
 from heptarm.values.state import State
 from heptarm.when import force
@@ -98,12 +99,16 @@ FOUND = find_path(heptarm.CollisionModel("iiwa14"), start=HOME, goal=HOME + 0.1)
 #: Arguments that a name does not give away, by function and parameter.
 ARGUMENTS: dict[str, dict[str, object]] = {
     "Pose": {"quat": (0.0, 0.0, 0.0, 1.0)},
+    "PartialPose": dict.fromkeys("xyzabc", 0.5),
     "Pose.from_matrix": {"matrix": np.eye(4)},
     "Trajectory": {"q": np.zeros((3, 7))},
     "Trajectory.of": {"q": np.zeros((3, 7))},
     "Trajectory.load": {"path": "no such file"},
     "load": {"path": "no such file"},
     "replay_in_sim": {"recording": "no such file"},
+    "load_episodes": {"folder": "no such folder", "labels": ("success",)},
+    "save_lerobot": {"episodes": Demonstrations(Path("no such folder"), ()), "folder": "no such folder"},
+    "Arm.episodes": {"folder": "no such folder", "cameras": (), "streams": None, "reset": None},
     "export_model": {"path": "no such format"},
     "record_client": {"path": "no folder of mine/run.mcap"},
     "Recording.__getitem__": {"name": "q"},
@@ -201,6 +206,7 @@ _OPEN = "NaN keeps the default"
 _FREE = "infinite: no limit"
 #: Values with a documented meaning that their type does not show: function or parameter, the bad value, the meaning.
 ACCEPTED: dict[tuple[str, str], str] = {
+    **{(f"PartialPose.{name}", "nan"): "keeps this coordinate" for name in "xyzabc"},
     **{("Dynamics", bad): _OPEN for bad in ("nan", "nan array")},
     ("PoseLimits", "inf"): _FREE,
     **{
@@ -265,7 +271,11 @@ REPORTS = (
         "Collision",
         "CompiledLaw",
         "Contact",
+        "Demonstration",
+        "Demonstrations",
         "Detour",
+        "Episode",
+        "EpisodeSet",
         "Deviation",
         "FollowedPath",
         "ForeseenCollision",
@@ -288,6 +298,7 @@ REPORTS = (
         "Recording",
         "RepeatedMotion",
         "StatesOfArms",
+        "TakenChunk",
         "TouchOnPath",
         "Twin",
         "TwistServo",

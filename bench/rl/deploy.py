@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,12 +12,16 @@ from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.rl.oracle import Oracle
 from heptarm.rl.deploy import DeploySettings, deploy
+from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.evaluate import held_back
-from heptarm.rl.policy import shipped
+from heptarm.rl.policy import shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
+from heptarm.rl.station import held_peg
 from heptarm.values.mode.impedance import JointImpedance
 
 EPISODES, SPEED, SOON, LATER = 200, 4.0, 1.5, 1.8
+#: Pegs; fewer, such as BENCH_INSERTIONS=5, for a quick check.
+INSERTIONS = int(os.environ.get("BENCH_INSERTIONS", "100"))
 PLAIN = DeploySettings(homing=0.6)
 HARD = DeploySettings(homing=0.6, mode=JointImpedance(300.0), latency=0.06)
 
@@ -62,3 +67,23 @@ def _figures(name: str, report: EpisodeReport, limit: float, attainable: float) 
         at_least=True,
         detail={"promised": 0.99, "within_1.8_s": report.reached_within(LATER)},
     )
+
+
+@benchmark("rl_insert")
+def rl_insert() -> Iterator[Figure]:
+    """A peg inserted 100 times through the whole stack: noisy sensors, 20 ms latency, unseen holes."""
+    policy = shipped_peg()
+    errors = held_back(policy.task, INSERTIONS, seed=101)
+    settings = ContactSettings(latency=0.02, stale=2.0)
+    with (
+        Cabinet("--scene", "peg-in-hole", "--sensors", "noisy:1") as cabinet,
+        ha.connect(cabinet.target, watchdog=5.0) as arm,
+        held_peg(arm) as hole,
+    ):
+        origins = [policy.task.presumed(hole, error) for error in errors]
+        report = deploy_contact(arm, policy, origins, errors, settings=settings)
+    yield Figure(
+        "rl_insert_success", report.success_rate, "fraction", limit=0.9, at_least=True, detail=report.facts
+    )
+    yield Figure("rl_insert_time", float(np.median(report.time_to_reach)), "s")
+    yield Figure("rl_insert_peak_force", float(report.peak_force.max()), "N", limit=30.0)

@@ -14,6 +14,7 @@ import numpy as np
 from bench.measure.figure import Figure, benchmark
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.randomisation import Randomisation
 from heptarm.rl.task import ReachTask
 
@@ -94,7 +95,7 @@ def rl_speed() -> Iterator[Figure]:
     rate = per_update / float(np.median(updates))
     yield Figure("train_steps", rate, "steps/s")
     for threads in (2, 1):
-        arms = BatchReach(ReachTask(), envs=512, threads=threads)
+        arms = BatchReach(ReachTask(), BatchSettings(envs=512, threads=threads))
         action = np.random.default_rng(0).uniform(-1, 1, (512, 7))
         times = []
         for _ in range(150):

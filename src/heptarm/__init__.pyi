@@ -20,6 +20,9 @@ from .arm.link.state_stream import (
 from .arm.link.target import (
     target_from_env as target_from_env,
 )
+from .arm.motion.chunks import (
+    TakenChunk as TakenChunk,
+)
 from .arm.motion.following import (
     Detour as Detour,
 )
@@ -182,8 +185,26 @@ from .fri.loop.compiled import (
 from .fri.loop.parameters import (
     param as param,
 )
+from .record.demonstration import (
+    Demonstration as Demonstration,
+)
+from .record.demonstration import (
+    Demonstrations as Demonstrations,
+)
+from .record.demonstration import (
+    load_episodes as load_episodes,
+)
+from .record.episodes import (
+    Episode as Episode,
+)
+from .record.episodes import (
+    EpisodeSet as EpisodeSet,
+)
 from .record.fri_client import (
     record_client as record_client,
+)
+from .record.lerobot import (
+    save_lerobot as save_lerobot,
 )
 from .record.pictures import (
     Pictures as Pictures,
@@ -328,6 +349,9 @@ from .values.motion.spline import (
 )
 from .values.motion.trajectory import (
     Trajectory as Trajectory,
+)
+from .values.pose import (
+    PartialPose as PartialPose,
 )
 from .values.pose import (
     Pose as Pose,

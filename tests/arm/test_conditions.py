@@ -53,6 +53,21 @@ def test_a_line_down_until_it_touches(arm: ha.Arm) -> None:
     assert lifted.arrived and lifted.stopped_by is None and lifted.fired_at is None
 
 
+def test_the_axes_of_any_frame_in_the_base(arm: ha.Arm) -> None:
+    tilted = ha.Pose.xyz_abc(0.5, 0.2, 0.1, *ha.deg(0, 90, 0))  # its x points down
+    pressed = force(frame=tilted).along("x") < -10
+    across = (force(frame=tilted).normal("z") > 8) | (force(frame=tilted).along("x") > 5)
+    turned = abs(torque(frame=tilted).about("x")) > 100
+    down = ha.lin_rel(z=-0.5, frame="base", speed_mps=0.04)
+    assert arm.move(down, until=across | turned | pressed).stopped_by == pressed
+    with arm.servo(
+        "joint", watchdog=2.0, until=pressed
+    ) as sv:  # evaluated by the application, not by Sunrise
+        while sv.tick() and sv.t < 30.0:
+            pass
+    assert sv.result is not None and sv.result.stopped_by == pressed
+
+
 def test_touching_gently(arm: ha.Arm) -> None:
     compliant = CartesianImpedance(stiffness=(1000, 1000, 500, 100, 100, 100))
     down = ha.lin_rel(z=-0.5, frame="base", speed_mps=0.05)

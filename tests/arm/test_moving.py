@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.model import forward
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer, Served
@@ -72,6 +73,43 @@ def test_nan_keeps_the_set_point_of_a_joint(peer: Peer) -> None:
         )
         with pytest.raises(ha.CommandRejected, match=r"motions\[1\] keeps joints .* not known yet"):
             arm.move([ha.lin_rel(z=0.01), only_a7])
+
+
+def test_a_partial_pose_keeps_the_coordinates_where_its_motion_begins(peer: Peer) -> None:
+    sent: list[wire.Run] = []
+    peer.runs(
+        1, *(wire.ItemReached(id=1, item=n) for n in range(4)), peer.finished(1, item=4), check=sent.append
+    )
+    turned = ha.Pose.xyz_abc(0.2, 0.1, 0.0, *ha.deg(90, 0, 0))
+    with peer.arm() as arm:
+        here = arm.pose("flange")
+        a, b, c = here.abc.tolist()
+        up = ha.lin(ha.PartialPose(z=0.4), moving="flange")
+        beside = ha.lin(ha.PartialPose(x=0.1), moving="flange", frame=turned)
+        other = ha.ptp(ha.PartialPose(y=0.05, b=b + 0.1), moving="flange")
+        arm.move([up, ha.hold(0.1), beside, other, HOME, up])
+        first, _, second, third, _, last = (item.motion for item in sent[0].items)
+        wanted = ha.Pose.of([here.x, here.y, 0.4], here.quat)
+        assert reached(first, wanted)
+        wanted = ha.Pose.of(
+            turned.rotation @ [0.1, *(turned.inverse() @ wanted).xyz[1:]] + turned.xyz, here.quat
+        )
+        assert reached(second, wanted)  # x of the frame, which is y of the base, is 0.1 m from its origin
+        assert wanted.y == pytest.approx(0.2) and wanted.x == pytest.approx(here.x)
+        assert reached(third, ha.Pose.xyz_abc(wanted.x, 0.05, 0.4, a, b + 0.1, c))
+        home = ha.Pose.from_matrix(forward(arm.robot, ha.deg(0, 30, 0, -90, 0, 60, 0)))
+        assert reached(last, ha.Pose.of([home.x, home.y, 0.4], home.quat))
+        with pytest.raises(ha.CommandRejected, match=r"motions\[1\] keeps coordinates .* not known yet"):
+            arm.move([ha.lin_rel(z=0.01, moving="flange"), up])
+        with pytest.raises(ha.CommandRejected, match=r"motions\[1\] keeps coordinates .* not known yet"):
+            arm.move([up, ha.lin(ha.PartialPose(z=0.4))])  # of another motion frame
+    assert len(sent) == 1
+
+
+def reached(motion: object, wanted: ha.Pose) -> bool:
+    assert isinstance(motion, wire.Lin | wire.PtpPose)
+    target = ha.Pose.of(motion.target.xyz, motion.target.quat)
+    return target.distance_to(wanted) < 1e-9 and target.angle_to(wanted) < 1e-7
 
 
 def test_arcs_whose_start_is_known_are_checked_before_they_are_sent(peer: Peer) -> None:

@@ -15,6 +15,8 @@ from tests.cabinet.peer import Peer, run
 #: The fake's A7 turns against a spring of 10 Nm/rad; it pushes along z of the flange, x of the base.
 PUSHED = wire.JointTorqueOutside(joint=6, low=-3.0, high=3.0)
 NEVER = wire.JointTorqueOutside(joint=0, low=-3.0, high=3.0)
+#: A pose in the base whose y points against x of the base.
+TURNED = wire.Pose(xyz=(0.4, 0.0, 0.0), quat=(0.0, 0.0, 0.5**0.5, 0.5**0.5))
 CAUSE = wire.Cause
 
 
@@ -65,6 +67,7 @@ def test_the_leaf_that_fired_is_named_and_where_the_robot_was(cabinet: FakeCabin
         ((wire.NormalForceAbove(axis=wire.Axis.Z, threshold=2.0),), 0),
         ((wire.NormalForceAbove(axis=wire.Axis.X, threshold=2.0, frame="base"),), 0),
         ((wire.ShearForceAbove(axis=wire.Axis.X, threshold=2.0),), 0),
+        ((wire.NormalForceAbove(axis=wire.Axis.Y, threshold=2.0, frame="base", axes=TURNED),), 0),
         ((wire.ForceOutside(axis=wire.Axis.Z, low=-2.0, high=1000.0),), 0),
         ((wire.ForceAbove(threshold=900.0, tolerance=0.1),), 0),  # the estimate is 0.5 N inaccurate
         ((wire.SignalIs(signal="Flange.Button", value=False),), 0),
@@ -85,6 +88,7 @@ def test_every_kind_fires(cabinet: FakeCabinet, nodes: tuple[wire.ConditionNode,
         (PUSHED, NEVER, wire.AllOf(n=2)),
         (wire.ShearForceAbove(axis=wire.Axis.Z, threshold=2.0),),
         (wire.ForceOutside(axis=wire.Axis.Z, low=-1000.0, high=2.0),),
+        (wire.NormalForceAbove(axis=wire.Axis.X, threshold=2.0, frame="base", axes=TURNED),),
         (wire.SignalIs(signal="Flange.Button", value=True),),
         (wire.SignalOutside(signal="Cell.Level", low=-1.0, high=2.0),),
     ],

@@ -19,7 +19,7 @@ from heptarm.values.motion.ptp import Ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import Body, robot
 from heptarm.values.tool import Tool
-from tests.long import longer
+from tests.long import few, longer
 
 IIWA = robot("iiwa14")
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
@@ -160,7 +160,7 @@ def test_inertia_from_a_motion() -> None:
 
 @pytest.mark.parametrize(
     ("excitation", "load", "declared"),
-    [("short", LONG_LOAD, None), ("full", LONG_TOOL, Body(3.0, np.array([0.0, 0.0, 0.2])))],
+    few([("short", LONG_LOAD, None), ("full", LONG_TOOL, Body(3.0, np.array([0.0, 0.0, 0.2])))], 1),
 )
 def test_inertia_from_recorded_motions(excitation: str, load: Body, declared: Body | None) -> None:
     runs, off = longer(1, 50), []
@@ -175,13 +175,13 @@ def test_inertia_from_recorded_motions(excitation: str, load: Body, declared: Bo
 
 
 def test_an_inertia_that_no_motion_shows_does_not_matter() -> None:
-    small = Body(1.0, np.array([0.0, 0.0, 0.05]), inertia=np.array([0.003, 0.001, 0.001, 0.0, 0.0, 0.0]))
+    small = Body(1.0, np.array([0.0, 0.0, 0.05]), inertia=np.array([0.003, 0.0028, 0.001, 0.0, 0.0, 0.0]))
     found = calibration.estimate_load(
         at_rest(None, small).joined(moving(None, small, None, "short")), robot=IIWA
     )
-    assert found.matters == (True, False, False)
-    assert "yy, zz does not matter: no motion of the arm shows less than 0.002" in str(found)
-    assert np.abs(found.inertia[1:3] - 0.001).max() < 3.0 * found.sigma_inertia[1:3].max()
+    assert found.matters == (True, True, False)
+    assert "zz does not matter: no motion of the arm shows less than 0.002" in str(found)
+    assert abs(found.inertia[2] - 0.001) < 3.0 * found.sigma_inertia[2]
 
 
 def test_motions_too_slow_for_an_inertia_are_refused() -> None:

@@ -242,6 +242,9 @@ def test_plan_to_finds_a_path_around_a_box_and_moves_nothing(target: str) -> Non
             ("goal is in collision",),
         ),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
+        (("move", "lin-rel", "--x", "0.01", "--speed", "50"), ("did you mean 0.5?",)),
+        (("move", "ptp", "0", "90", "0", "-90", "0", "60", "0"), ("did you mean them in degrees? --deg",)),
+        (("move", "lin", "0.5", "0", "0.4", "180", "0", "180"), ("did you mean them in degrees? --deg",)),
     ],
 )
 def test_refusals_are_one_sentence_and_exit_code_1(

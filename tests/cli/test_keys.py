@@ -20,6 +20,7 @@ import heptarm as ha
 from heptarm.arm.link.target import parse_target
 from heptarm.cli import main, options
 from heptarm.io import keys
+from heptarm.rl.policy import shipped
 from heptarm.sim.runtime.project import read_process_data
 from tests.cli.running import objects, run, sim
 
@@ -150,7 +151,7 @@ def test_every_command_uses_the_key(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     if name == "rl deploy":
-        monkeypatch.setattr("heptarm.cli.rl._load_reach", lambda *_: None)
+        monkeypatch.setattr("heptarm.cli.rl._load", lambda *_: shipped())
     if name == "stop":  # stops before it connects, without a key
         monkeypatch.setattr("heptarm.cli.stop.halt", lambda *_, **__: None)
     if name == "live":  # its extra is not installed here

@@ -12,14 +12,16 @@ import pytest
 
 import heptarm as ha
 from heptarm.rl.deploy import DeploySettings, circle, deploy
-from heptarm.rl.deploy_peg import deploy_peg
+from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.film import film
 from heptarm.rl.pilot import PolicyGuard, Watch
 from heptarm.rl.policy import shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
+from heptarm.rl.station import held_peg
 from heptarm.rl.task import ReachTask
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
+from tests.cli.running import refused, run
 from tests.retry import retry
 
 FAST = "sim://iiwa14?speed=2"
@@ -83,14 +85,16 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
         for bad in ([2.0, 0, 0.4], [np.nan, 0, 0.4], [0.5, 0.1]):
             with pytest.raises(ha.CommandRejected):
                 deploy(arm, shipped(feature=True), [bad])
-        with pytest.raises(ha.CommandRejected, match="of the task peg-in-hole, got one of reach"):
-            deploy_peg(arm, cast("Any", shipped()), arm.pose())
+        with pytest.raises(ha.CommandRejected, match="of a task with contacts, got one of reach"):
+            deploy_contact(arm, cast("Any", shipped()), arm.pose())
         with pytest.raises(ha.CommandRejected, match="of the task reach, got one of peg-in-hole"):
             deploy(arm, cast("Any", shipped_peg()), [POINT])
-        with pytest.raises(ha.ShapeError, match="errors"):
-            deploy_peg(arm, shipped_peg(), arm.pose(), [[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])
+        with pytest.raises(ha.ShapeError, match="targets"):
+            deploy_contact(arm, shipped_peg(), arm.pose(), [[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])
         with pytest.raises(ha.CommandRejected, match="tip"):
-            deploy_peg(arm, shipped_peg(), arm.pose())
+            deploy_contact(arm, shipped_peg(), arm.pose())
+        with pytest.raises(ha.LimitError, match="speed must be at least"):
+            deploy_contact(arm, shipped_peg(), arm.pose(), settings=ContactSettings(speed=0.01))
         assert np.abs(arm.state.q - before).max() < 1e-4
     with pytest.raises(ha.LimitError, match="latency"):
         DeploySettings(latency=3.0)
@@ -154,3 +158,53 @@ def test_film_and_row_of_pictures(reached: EpisodeReport, tmp_path: Path) -> Non
     assert gif.read_text() == "mine"
     with pytest.raises(ha.CommandRejected, match="gif"):
         film(reached, tmp_path / "reach.mp4")
+
+
+def test_the_command_line_refuses_what_a_policy_with_contacts_has_not() -> None:
+    for words, why in (
+        (("--follow",), "are of the reach task, not of peg-in-hole"),
+        (("--stiffness", "300"), "are of the reach task, not of peg-in-hole"),
+        (("--tip", "0.2"), "--at and --tip must be given together"),
+        (("--at", "0.6", "0.1", "0.24"), "--at and --tip must be given together"),
+        (("--random", "0"), "--random must be at least 1"),
+    ):
+        done = refused("rl", "deploy", "peg-in-hole", *words)
+        assert done.returncode != 0 and why in done.stderr, done.stderr
+    done = refused("rl", "deploy", "--tip", "0.2")
+    assert done.returncode != 0 and "of policies with contacts" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_the_command_line_inserts_a_peg_and_records_it(tmp_path: Path) -> None:
+    target = "sim://iiwa14?scene=peg-in-hole&sensors=noisy:1"
+    out = tmp_path / "inserted"
+    words = ("--random", "2", "--latency", "0.02", "--out", str(out), "--target", target)
+    done = run("rl", "deploy", "peg-in-hole", *words)
+    assert done.returncode == 0, done.stderr
+    report = EpisodeReport.load(out.with_suffix(".npz"))
+    assert report.success.any() and report.peak_force.max() < 30.0
+    assert report.facts["guard"] == {"force": 0} and report.facts["latency"] == 0.02
+    recording = ha.load(out.with_suffix(".mcap"))
+    assert recording.complete and len(recording) > 2000
+
+
+@pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_a_force_above_the_guard_ends_the_episode_at_rest() -> None:
+    with ha.connect("sim://iiwa14?scene=peg-in-hole&speed=0.5", watchdog=5.0) as arm, held_peg(arm) as hole:
+        policy = shipped_peg()
+        error = np.array([0.0, 0.0, -0.001, 0.0, 0.0, 0.0])
+        gentle = ContactSettings(peak=2.0, stale=2.0)
+        beside = hole.shifted(y=0.02, frame="tool")
+        report = deploy_contact(arm, policy, policy.task.presumed(beside, error), [error], settings=gentle)
+        assert report.facts["guard"] == {"force": 1} and not report.success.any()
+        broken = shipped_peg()
+        broken.layers[-1] = (broken.layers[-1][0], np.full(5, np.nan, dtype=np.float32))
+        with pytest.raises(ha.CommandRejected, match="an action of the policy must be finite"):
+            deploy_contact(
+                arm, broken, policy.task.presumed(hole, error), [error], settings=ContactSettings(stale=2.0)
+            )
+        arm.wait_for_rest()

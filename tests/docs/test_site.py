@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote, urldefrag, urlsplit
+from urllib.parse import quote, unquote, urldefrag, urlsplit
 
 import pytest
+
+from scripts.publish_site import publish
+from tests.drawing import until
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Width and height of a desktop and of a phone [px].
@@ -23,6 +31,18 @@ const culprits = wide ? [...document.querySelectorAll("main *")]
     .slice(0, 3).map(e => e.tagName + ": " + e.textContent.trim().slice(0, 60)) : [];
 const images = [...document.images].filter(i => !i.complete || i.naturalWidth === 0).map(i => i.getAttribute("src"));
 return {wide: wide, culprits: culprits, images: images, title: document.title};
+"""
+
+RESULTS = "return [...document.querySelectorAll('#search-results li > a')].map(a => a.getAttribute('href'))"
+#: The version that the list in the sidebar shows, and all that it has; null while it is hidden.
+VERSIONS = """
+const list = document.querySelector(".site-versions"), select = list.querySelector("select");
+return list.hidden ? null : [select.value, [...select.options].map(option => option.value)];
+"""
+CHOOSE = """
+const select = document.querySelector(".site-versions select");
+select.value = arguments[0];
+select.dispatchEvent(new Event("change"));
 """
 
 #: CI builds the site beside the tests, see .github/workflows/test.yml; `test_links` is quick.
@@ -69,6 +89,62 @@ def test_every_link_within_the_site_has_its_target(site: Path) -> None:
             elif anchor and other in pages and unquote(anchor) not in pages[other].anchors:
                 broken.append(f"{path.relative_to(site)}: {target} (no such anchor)")
     assert not broken, "\n".join(sorted(broken))
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(
+    ("words", "pages"),
+    [
+        ("LIN", ("guide/motions", "reference/python/motions")),
+        ("hand eye", ("guide/cameras", "reference/python/calibration")),
+        ("PartialPose", ("reference/python/motions",)),
+    ],
+)
+def test_the_search_finds_what_people_type(
+    site: Path, browser: Any, words: str, pages: tuple[str, ...]
+) -> None:
+    browser.get(f"{(site / 'search.html').as_uri()}?q={quote(words)}")
+    until(lambda: {f"{page}.html" for page in pages} <= set(hrefs(browser)[:10]))
+
+
+@pytest.mark.browser
+def test_another_version_is_one_choice_away(site: Path, browser: Any, tmp_path: Path) -> None:
+    for version in ("0.1.0", "main"):
+        publish(site, tmp_path, version)
+    (tmp_path / "0.1.0/guide/tools.html").unlink()
+    with serving(tmp_path) as address:
+        for page, lands in (
+            ("guide/motions.html", "/0.1.0/guide/motions.html"),
+            ("guide/tools.html", "/0.1.0/"),
+        ):
+            browser.get(f"{address}/main/{page}")
+            until(lambda: browser.execute_script(VERSIONS) == ["main", ["main", "0.1.0"]])
+            browser.execute_script(CHOOSE, "0.1.0")
+            until(lambda: urlsplit(browser.current_url).path == lands)  # noqa: B023
+    browser.get((site / "index.html").as_uri())
+    assert browser.execute_script("return document.querySelector('.site-versions').hidden")
+
+
+def hrefs(browser: Any) -> list[str]:
+    """The pages of the results, in their order."""
+    return [str(target).partition("#")[0] for target in browser.execute_script(RESULTS)]
+
+
+@contextmanager
+def serving(folder: Path) -> Iterator[str]:
+    """Serve a folder over HTTP on this machine."""
+    handler = partial(QuietHandler, directory=str(folder))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    """Serves files, and prints nothing."""
+
+    def log_message(self, *_: object) -> None:
+        """Nothing."""
 
 
 @pytest.mark.browser

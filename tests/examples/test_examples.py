@@ -19,7 +19,7 @@ SPEED = FASTER
 #: These borrow another one, in real time: they look at the clock of this machine, or answer FRI.
 REAL_TIME = (
     *("03_async_cancel.py", "06_servo.py", "07_fri.py", "10_recovery.py", "12_straight_servo.py"),
-    *("13_hand_guiding.py", "18_teleoperation.py", "21_laws.py"),
+    *("13_hand_guiding.py", "18_teleoperation.py", "21_laws.py", "28_demonstrations.py"),
 )
 #: These bring a simulator with what they touch.
 OWN_SIMULATOR = ("24_tool_shapes.py",)
@@ -30,7 +30,7 @@ IN_LONG_RUN = tuple(
     for one in (
         *("12_straight_servo", "13_hand_guiding", "14_collision_guard", "15_pick_and_place", "16_insertion"),
         *("17_polishing", "18_teleoperation", "20_two_arms", "21_laws", "24_tool_shapes", "25_around_things"),
-        *("26_calibrate", "27_learned_insertion"),
+        *("26_calibrate", "27_learned_insertion", "28_demonstrations"),
     )
 )
 RUNNER = """

@@ -124,8 +124,11 @@ class Trial:
                 if self.is_guarded:
                     target = guarded(target, q=q, dq=dq, period=dt, is_braking=braking)
                 waiting = np.array(target)
-            by = {"wrench" if self.by_wrench else "tau": effort}
-            plant.overlay(Superposition(set_point, **by))
+            plant.overlay(
+                Superposition(set_point, wrench=effort)
+                if self.by_wrench
+                else Superposition(set_point, tau=effort)
+            )
             plant.tick()
             self.speed = np.maximum(self.speed, np.abs(plant.data.qvel[:7]) / arm.dq_max)
             here = plant.data.qpos[:7]

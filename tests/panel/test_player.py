@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import heptarm as ha
 from heptarm.model.kinematics import forward
 from heptarm.panel.player import Player, open_player
 from heptarm.panel.process import PanelOptions
 from heptarm.record.mcap_file import merge
+from heptarm.record.pictures import Pictures
 from heptarm.record.recorded import RecordedEvent
 from heptarm.record.recording import Recording
 from heptarm.values.robot import robot
@@ -60,6 +63,22 @@ def test_a_twin_plays_with_its_ghost(tmp_path: Path) -> None:
         player.step(0.5)
         assert player.slider.value == 0.0, "at its end it begins again"
         assert "token" in player.url
+
+
+def test_an_episode_shows_what_its_cameras_saw() -> None:
+    def picture(level: int) -> bytes:
+        data = io.BytesIO()
+        Image.fromarray(np.full((8, 8, 3), level, np.uint8)).save(data, "JPEG")
+        return data.getvalue()
+
+    view = Pictures(np.array([0.0, 1.0, 2.0]), tuple(picture(level) for level in (10, 100, 200)))
+    player = Player(replace(recording(), views={"wrist": view}), PanelOptions(port=0))
+    try:
+        for t, level in ((0.2, 10), (1.2, 100), (1.9, 200), (0.1, 10)):
+            player.show(t)
+            assert player.pictures["wrist"].image.mean() == pytest.approx(level, abs=2)
+    finally:
+        player.close()
 
 
 def test_what_cannot_be_played(tmp_path: Path) -> None:

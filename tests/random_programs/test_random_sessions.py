@@ -22,7 +22,7 @@ from heptarm.sim.controller.safety import StopRequest
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode
-from tests.long import longer
+from tests.long import few, longer
 from tests.random_programs.judge import Violation, judged
 from tests.sim_fri.lockstep import Lockstep
 from tests.sim_fri.test_late import bad_line
@@ -104,9 +104,16 @@ def session(seed: int) -> tuple[list[Violation], float]:
     return found, 1e-3 * len(made.rows)
 
 
+@pytest.mark.parametrize("seed", few([1617, 1475], 1))
+def test_what_was_found_once(seed: int) -> None:
+    """After a load was missing for one tick the set-point went back at once, and a pulse of 320 Nm turned A5."""
+    found, _ = session(seed)
+    assert not found, "\n".join(map(str, found))
+
+
 def test_no_session_moves_the_arm_beyond_its_limits() -> None:
     simulated = 0.0
-    for seed in range(SEED, SEED + longer(4, 3000)):
+    for seed in range(SEED, SEED + longer(3, 3000)):
         found, seconds = session(seed)
         simulated += seconds
         assert not found, f"HEPTARM_SEED={seed}, after {simulated:.0f} s:\n" + "\n".join(map(str, found))

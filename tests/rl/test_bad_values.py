@@ -6,13 +6,13 @@ import pytest
 
 pytest.importorskip("gymnasium")
 
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.deploy import DeploySettings, circle
-from heptarm.rl.deploy_peg import InsertionSettings
-from heptarm.rl.env import ReachEnv
-from heptarm.rl.peg import PegInHole
-from heptarm.rl.peg_env import PegInHoleEnv
+from heptarm.rl.deploy_contact import ContactSettings
+from heptarm.rl.env import ContactEnv, ReachEnv
 from heptarm.rl.pilot import PolicyGuard
 from heptarm.rl.policy import shipped
+from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.randomisation import Randomisation
 from heptarm.rl.task import ReachTask
 from tests.bad_values import Call, call_of, wrong
@@ -22,10 +22,11 @@ MADE = (
     PegInHole,
     PolicyGuard,
     DeploySettings,
-    InsertionSettings,
+    ContactSettings,
+    BatchSettings,
     Randomisation,
     ReachEnv,
-    PegInHoleEnv,
+    ContactEnv,
     circle,
     shipped,
 )

@@ -11,6 +11,7 @@ import pytest
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.rl.sim import simulation
 from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import STRONG, Randomisation
 from heptarm.rl.task import ReachTask
@@ -26,16 +27,16 @@ def drive(arms: BatchReach, steps: int, seed: int = 0) -> list[np.ndarray]:
 def test_the_same_seed_gives_the_same_run_with_any_threads(action: str) -> None:
     task = ReachTask(action=action)
     one, other = (
-        drive(BatchReach(task, envs=6, randomisation=STRONG, seed=5, threads=threads), 120)
+        drive(BatchReach(task, BatchSettings(envs=6, randomisation=STRONG, seed=5, threads=threads)), 120)
         for threads in (1, 2)
     )
     assert all((a == b).all() for a, b in zip(one, other, strict=True))
-    third = drive(BatchReach(task, envs=6, randomisation=STRONG, seed=6), 1)
+    third = drive(BatchReach(task, BatchSettings(envs=6, randomisation=STRONG, seed=6)), 1)
     assert not (third[0] == one[0]).all()
 
 
 def test_episodes_end_by_their_length_and_begin_again() -> None:
-    arms = BatchReach(ReachTask(steps=20), envs=4, starts="together")
+    arms = BatchReach(ReachTask(steps=20), BatchSettings(envs=4, starts="together"))
     goals = arms.target.copy()
     for count in range(1, 21):
         step = arms.step(np.ones((4, 7)))
@@ -49,14 +50,14 @@ def test_episodes_end_by_their_length_and_begin_again() -> None:
 
 
 def test_staggered_episodes_do_not_end_together() -> None:
-    arms = BatchReach(ReachTask(), envs=50)
+    arms = BatchReach(ReachTask(), BatchSettings(envs=50))
     ended = [int(arms.step(np.zeros((50, 7))).done.sum()) for _ in range(100)]
     assert sum(ended) >= 50
     assert max(ended) < 10
 
 
 def test_the_arm_comes_to_where_it_is_commanded() -> None:
-    arms = BatchReach(ReachTask(), envs=3, starts="together")
+    arms = BatchReach(ReachTask(), BatchSettings(envs=3, starts="together"))
     for _ in range(8):
         arms.step(np.ones((3, 7)))
     for _ in range(30):
@@ -68,7 +69,9 @@ def test_late_commands_come_late() -> None:
     task = ReachTask()
     moved = []
     for late in (0, 3):
-        arms = BatchReach(task, envs=1, randomisation=Randomisation(latency=(late, late)), starts="together")
+        arms = BatchReach(
+            task, BatchSettings(envs=1, randomisation=Randomisation(latency=(late, late)), starts="together")
+        )
         begin = arms.q.copy()
         paths = []
         for _ in range(6):
@@ -82,7 +85,9 @@ def test_late_commands_come_late() -> None:
 def test_a_slow_servo_trails() -> None:
     trails = []
     for bandwidth in (5.0, 40.0):
-        arms = BatchReach(ReachTask(), envs=1, randomisation=Randomisation(bandwidth=(bandwidth,) * 2))
+        arms = BatchReach(
+            ReachTask(), BatchSettings(envs=1, randomisation=Randomisation(bandwidth=(bandwidth,) * 2))
+        )
         for _ in range(10):
             arms.step(np.ones((1, 7)))
         trails.append(float(np.abs(arms.command - arms.q).max()))
@@ -93,7 +98,7 @@ def test_an_unknown_payload_bends_a_compliant_arm_more_than_a_stiff_one() -> Non
     sags = []
     for stiffness in (300.0, inf):
         draw = Randomisation(payload=(2.0, 2.0), stiffness=(stiffness, stiffness))
-        arms = BatchReach(ReachTask(), envs=1, randomisation=draw, starts="together")
+        arms = BatchReach(ReachTask(), BatchSettings(envs=1, randomisation=draw, starts="together"))
         for _ in range(60):
             arms.step(np.zeros((1, 7)))
         sags.append(float((arms.task.tip(arms.command) - arms.task.tip(arms.q))[0, 2]))
@@ -104,11 +109,11 @@ def test_an_unknown_payload_bends_a_compliant_arm_more_than_a_stiff_one() -> Non
 
 def test_a_saved_simulation_goes_on_as_if_nothing_had_happened() -> None:
     task = ReachTask(steps=25, action="cartesian")
-    arms = BatchReach(task, envs=5, randomisation=STRONG, seed=9)
+    arms = BatchReach(task, BatchSettings(envs=5, randomisation=STRONG, seed=9))
     drive(arms, 13)
     saved = arms.save()
     went_on = drive(arms, 30, seed=1)
-    other = BatchReach(task, envs=5, randomisation=STRONG, seed=9)
+    other = BatchReach(task, BatchSettings(envs=5, randomisation=STRONG, seed=9))
     other.load(saved)
     assert all((a == b).all() for a, b in zip(went_on, drive(other, 30, seed=1), strict=True))
 
@@ -117,7 +122,7 @@ def test_finer_steps_of_the_engine_would_move_the_arms_alike(monkeypatch: pytest
     paths = []
     for steps in (simulation.SUBSTEPS, 64):
         monkeypatch.setattr(simulation, "SUBSTEPS", steps)
-        arms = BatchReach(ReachTask(), envs=4, randomisation=STRONG, seed=3, starts="together")
+        arms = BatchReach(ReachTask(), BatchSettings(envs=4, randomisation=STRONG, seed=3, starts="together"))
         drive(arms, 20)
         paths.append([arms.step(np.full((4, 7), 0.8)).tip for _ in range(20)])
     away = np.linalg.norm(np.diff(paths, axis=0)[0], axis=-1)
@@ -130,7 +135,9 @@ def test_the_plant_moves_alike() -> None:
     task = ReachTask()
     goals = task.targets(np.random.default_rng(4), 2)
     engines: tuple[dict[str, Any], ...] = ({}, {"engine": PlantEngine})
-    trained, plant = (BatchReach(task, envs=2, starts="together", seed=4, **engine) for engine in engines)
+    trained, plant = (
+        BatchReach(task, BatchSettings(envs=2, starts="together", seed=4), **engine) for engine in engines
+    )
     assert (trained.reset(goals) == plant.reset(goals)).all()
     for index in range(45):
         action = np.full((2, 7), 0.8 if index < 20 else -0.3 if index < 30 else 0.0)
@@ -143,7 +150,9 @@ def test_the_plant_moves_alike() -> None:
 
 def test_a_plant_with_joint_impedance_and_a_weight_complies() -> None:
     compliant = Randomisation(stiffness=(300.0, 300.0), payload=(1.0, 1.0))
-    arms = BatchReach(ReachTask(), envs=1, starts="together", engine=PlantEngine, randomisation=compliant)
+    arms = BatchReach(
+        ReachTask(), BatchSettings(envs=1, starts="together", randomisation=compliant), engine=PlantEngine
+    )
     for _ in range(45):
         arms.step(np.zeros((1, 7)))
     assert 0.002 < float((arms.task.tip(arms.command) - arms.task.tip(arms.q))[0, 2]) < 0.05
@@ -151,7 +160,7 @@ def test_a_plant_with_joint_impedance_and_a_weight_complies() -> None:
 
 @pytest.mark.parametrize("action", [np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan)])
 def test_actions_that_are_none_are_refused(action: np.ndarray) -> None:
-    arms = BatchReach(ReachTask(), envs=3)
+    arms = BatchReach(ReachTask(), BatchSettings(envs=3))
     before = arms.q.copy()
     with pytest.raises(ShapeError, match="action"):
         arms.step(action)
@@ -161,12 +170,12 @@ def test_actions_that_are_none_are_refused(action: np.ndarray) -> None:
 def test_bad_arguments_are_refused_by_name() -> None:
     task = ReachTask()
     with pytest.raises(LimitError, match="envs"):
-        BatchReach(task, envs=0)
+        BatchReach(task, BatchSettings(envs=0))
     with pytest.raises(LimitError, match="threads"):
-        BatchReach(task, envs=1, threads=0)
+        BatchReach(task, BatchSettings(envs=1, threads=0))
     with pytest.raises(CommandRejected, match="starts"):
-        BatchReach(task, envs=1, starts="never")
+        BatchReach(task, BatchSettings(envs=1, starts="never"))
     with pytest.raises(ShapeError, match="targets"):
-        BatchReach(task, envs=2).reset(np.zeros((1, 3)))
+        BatchReach(task, BatchSettings(envs=2)).reset(np.zeros((1, 3)))
     with pytest.raises(ShapeError, match="2 arms"):
-        BatchReach(task, envs=3).load(BatchReach(task, envs=2).save())
+        BatchReach(task, BatchSettings(envs=3)).load(BatchReach(task, BatchSettings(envs=2)).save())

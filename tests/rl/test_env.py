@@ -17,6 +17,7 @@ import heptarm.rl
 from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 
@@ -29,15 +30,15 @@ heptarm.rl.register()
 def test_gymnasium_finds_nothing_to_complain_of(engine: str, action: str, feature: str) -> None:
     from gymnasium.utils.env_checker import check_env
 
-    env = gymnasium.make(heptarm.rl.ENVIRONMENT, engine=engine, action=action, feature=feature)
+    env = gymnasium.make("heptarm/Reach-v0", engine=engine, action=action, feature=feature)
     check_env(env.unwrapped)
 
 
 def test_one_arm_and_a_batch_see_the_same() -> None:
     task = ReachTask(feature="kinematic")
-    env = gymnasium.make(heptarm.rl.ENVIRONMENT, feature="kinematic", engine="training")
+    env = gymnasium.make("heptarm/Reach-v0", feature="kinematic", engine="training")
     seen, info = env.reset(seed=11)
-    arms = BatchReach(task, envs=3, starts="together")
+    arms = BatchReach(task, BatchSettings(envs=3, starts="together"))
     arms.target[:] = info["target"]
     q = env.unwrapped._arms.q
     arms.engine.place(np.arange(3), np.tile(q, (3, 1)))
@@ -57,7 +58,7 @@ def test_one_arm_and_a_batch_see_the_same() -> None:
 
 
 def test_a_target_may_be_given() -> None:
-    env = gymnasium.make(heptarm.rl.ENVIRONMENT)
+    env = gymnasium.make("heptarm/Reach-v0")
     seen, info = env.reset(options={"target": (0.5, 0.1, 0.3)})
     assert seen[14:17] == pytest.approx([0.5, 0.1, 0.3])
     assert info["distance"] == pytest.approx(np.linalg.norm(info["tip"] - [0.5, 0.1, 0.3]))
@@ -65,7 +66,7 @@ def test_a_target_may_be_given() -> None:
 
 
 def test_misuse_is_refused() -> None:
-    env = gymnasium.make(heptarm.rl.ENVIRONMENT, engine="training", disable_env_checker=True).unwrapped
+    env = gymnasium.make("heptarm/Reach-v0", engine="training", disable_env_checker=True).unwrapped
     with pytest.raises(NotReady, match="reset"):
         env.step(np.zeros(7))
     env.reset()
@@ -87,9 +88,9 @@ def test_misuse_is_refused() -> None:
 
 def vector(envs: int, task: ReachTask) -> Any:
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
-    from heptarm.rl.sim.vector_env import VectorReach
+    from heptarm.rl.sim.vector_env import VectorArms
 
-    return VectorReach(BatchReach(task, envs=envs))
+    return VectorArms(BatchReach(task, BatchSettings(envs=envs)))
 
 
 def test_stable_baselines_gets_the_last_observation_of_an_episode() -> None:
@@ -146,6 +147,24 @@ def test_its_ppo_learns_on_the_same_simulator() -> None:
     assert evaluate(policy, 50, task=task).mean < 0.5 * before
 
 
+# ---------------------------------------------------------------------------------- RSL-RL
+
+
+def test_rsl_rl_gets_tensors_of_all_arms() -> None:
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    pytest.importorskip("tensordict", reason="tensordict is not installed")
+    from heptarm.rl.sim.rsl_env import RslArms
+
+    env = RslArms(BatchReach(ReachTask(steps=3), BatchSettings(envs=4, starts="together")))
+    assert env.get_observations()["policy"].shape == (4, 17)
+    for index in range(3):
+        seen, reward, done, extras = env.step(torch.zeros(4, env.num_actions))
+        assert seen["policy"].shape == (4, 17) and reward.shape == done.shape == (4,)
+        assert bool(done.all()) == bool(extras["time_outs"].all()) == (index == 2)
+    env.episode_length_buf = torch.full((4,), 2)
+    assert env.step(torch.zeros(4, env.num_actions))[2].all()
+
+
 # ---------------------------------------------------------------------------------- MuJoCo Warp
 
 
@@ -163,7 +182,9 @@ def test_warp_moves_the_arms_alike() -> None:
         )
         engines: tuple[dict[str, Any], ...] = ({"engine": WarpEngine}, {})
         for draw in (NONE, hard):
-            warp, batch = (BatchReach(task, envs=8, randomisation=draw, **engine) for engine in engines)
+            warp, batch = (
+                BatchReach(task, BatchSettings(envs=8, randomisation=draw), **engine) for engine in engines
+            )
             random = np.random.default_rng(0)
             for index in range(40):
                 action = random.uniform(-1, 1, (8, 7))

@@ -9,6 +9,7 @@ from heptarm.ros.interface.conditions import condition_of
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.force import force, torque
 from heptarm.values.condition.signals import io, path
+from heptarm.values.pose import Pose
 
 
 @pytest.mark.parametrize(
@@ -17,6 +18,7 @@ from heptarm.values.condition.signals import io, path
         ("force > 10", force > 10),
         ("15 < force", force > 15),
         ("force(frame='base', tolerance=3) > 4", force(frame="base", tolerance=3) > 4),
+        ("force(frame=Pose.xyz_abc(a=0.5)).along('x') > 4", force(frame=Pose.xyz_abc(a=0.5)).along("x") > 4),
         ("force.normal('x') > 2.5", force.normal("x") > 2.5),
         ("~(force.shear('z') > 2)", ~(force.shear("z") > 2)),
         ("abs(torque[3]) > 8", abs(torque[3]) > 8),
@@ -55,6 +57,7 @@ def test_no_text_is_no_condition(text: str) -> None:
         "force(*[1]) > 3",
         "force(**{}) > 3",
         "force(x=3) > 1",
+        "force(frame=Pose.at(1, 2, 3)) > 1",
         "[force > 3][0]",
         "(lambda: force > 3)()",
         "force >",

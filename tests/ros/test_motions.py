@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -77,6 +77,14 @@ TARGET, VIA = ha.Pose.at(0.5, 0.1, 0.4), ha.Pose.at(0.5, 0.0, 0.5)
     ("given", "wanted"),
     [
         (message(0, position=HERE.tolist()), ha.ptp(HERE)),
+        (
+            message(0, pose=stamped("", nan, nan, 0.4, (nan,) * 4)),
+            ha.ptp(ha.PartialPose(z=0.4)),
+        ),
+        (
+            message(1, pose=stamped("Table/Corner", 0.1, nan, nan)),
+            ha.lin(ha.PartialPose(x=0.1, a=0.0, b=0.0, c=0.0).placed(CORNER)),
+        ),
         (
             message(0, joint_names=["A1"], position=[0.0], joint_speed=[0.3], blend_rel=0.5),
             ha.ptp(HERE, speed=0.3, blend_rel=0.5),

@@ -43,6 +43,7 @@ def ended(seed: int, manner: str, *, kind: str) -> Lockstep:
     """A session of a random law, period, stiffness and posture that ends, or loses answers, at a random moment."""
     rng = np.random.default_rng(seed)
     stiffness, q = float(rng.choice((0.0, 50.0, 100.0, 300.0, 1000.0))), POSTURES[rng.integers(len(POSTURES))]
+    mode: JointImpedance | CartesianImpedance
     if kind == "torque":
         mode, period = JointImpedance(stiffness), int(rng.choice((1, 5)))
         law, command = square(rng, 7, "tau"), CommandMode.TORQUE

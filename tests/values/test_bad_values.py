@@ -74,6 +74,8 @@ EXPECTED: dict[str, type[Exception]] = {
     "CollisionGuard.seen": heptarm.StaleState,
     "Trajectory.load": heptarm.CommandRejected,
     "load": heptarm.CommandRejected,
+    "load_episodes": heptarm.CommandRejected,
+    "save_lerobot": heptarm.CommandRejected,
     "mesh": heptarm.CommandRejected,
     "CollisionModel.remove": heptarm.CommandRejected,
     "CollisionModel.seen_by": heptarm.CommandRejected,

@@ -29,9 +29,11 @@ from heptarm.values.condition.force import (
     torque,
 )
 from heptarm.values.condition.signals import PathReached, SignalIs, SignalOutside, io, path
+from heptarm.values.pose import Pose, deg
 
 TOUCH = force.along("z") > 15
 HIT = abs(torque[3]) > 8
+TURNED = Pose.xyz_abc(0.4, 0.1, 0.2, *deg(0, 30, 0))
 
 
 @pytest.mark.parametrize(
@@ -47,6 +49,8 @@ HIT = abs(torque[3]) > 8
         (force.along("y").inside(-4, 5), Inverted(ForceOutside("y", -4, 5))),
         (force.normal("z") > 20, NormalForceAbove("z", 20)),
         (force(frame="base").shear("z") > 20, ShearForceAbove("z", 20, frame="base")),
+        (force(frame=TURNED).along("x") > 5, ForceOutside("x", -1000, 5, frame=TURNED)),
+        (torque(frame=TURNED).about("z") > 2, TorqueOutside("z", -1000, 2, frame=TURNED)),
         (torque[6] > 2, JointTorqueOutside(6, -500, 2)),
         (HIT, JointTorqueOutside(3, -8, 8)),
         (torque.about("x").outside(-1, 2), TorqueOutside("x", -1, 2)),
@@ -76,6 +80,7 @@ def test_they_combine() -> None:
     assert ~~TOUCH == TOUCH
     either_one = TOUCH ^ HIT
     assert either_one == OneOf(TOUCH, HIT)
+    assert str(force(frame=TURNED).shear("x") > 5) == "force across x of axes at a 0 b 30 c 0 deg > 5 N"
     assert str(TOUCH & ~HIT) == "(force along z of tool > 15 N & ~(external torque of A4 outside [-8, 8] Nm))"
 
 
@@ -122,6 +127,7 @@ def test_what_only_the_cabinet_knows_is_not_answered_here(careless: Callable[[],
         (lambda: force(tolerance=0.0) > 5, LimitError),
         (lambda: force.along("w") > 5, ShapeError),
         (lambda: force(frame="") > 5, ShapeError),
+        (lambda: force(frame=5.0) > 5, ShapeError),  # type: ignore[arg-type]
         (lambda: force.along("z").outside(5, 5), LimitError),
         (lambda: torque[7] > 5, LimitError),
         (lambda: torque[0] > 501, LimitError),

@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.frames import BASE
+from heptarm.values.motion.circle import circ
 from heptarm.values.motion.dynamics import Blending, Dynamics
 from heptarm.values.motion.line import Lin, LinRel, lin, lin_rel
 from heptarm.values.motion.motion import Hold, Motion, hold
 from heptarm.values.motion.ptp import Ptp, PtpPose, ptp, ptp_home, ptp_transport
-from heptarm.values.motion.spline import spl, spline_joints
-from heptarm.values.pose import Pose, Redundancy, deg
+from heptarm.values.motion.spline import spl, spline, spline_joints
+from heptarm.values.pose import PartialPose, Pose, Redundancy, deg
 from heptarm.values.robot import robot
 
 Q = deg(0, 30, 0, -90, 0, 60, 0)
@@ -34,6 +35,7 @@ MAKERS: list[Callable[[], Motion]] = [
     lambda: ptp_home(speed=0.3, blend_rel=0.2),
     lambda: ptp_transport(speed=0.3, blend_rel=0.2),
     lambda: ptp(POSE, redundancy=Redundancy(0.2, 2, 10), moving="flange"),
+    lambda: lin(PartialPose(z=0.3, a=0.1), frame=POSE),
     lambda: lin(POSE, speed_mps=0.1, acceleration_mps2=1.0, jerk_mps3=10.0, near=Q),
     lambda: lin(POSE, speed_radps=0.5, joint_speed=0.3, blend_m=0.02, blend_rad=0.1),
     lambda: lin_rel(z=-0.1, frame=BASE, speed_mps=0.05),
@@ -194,6 +196,13 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: Dynamics(speed_mps=11.0), LimitError, "speed_mps must .*got 11"),
         (lambda: Dynamics(joint_speed=Q), LimitError, r"joint_speed\[0\] must .*got 0"),
         (lambda: Blending(relative=2.0), LimitError, "relative must .*got 2"),
+        (PartialPose, LimitError, "one coordinate at least"),
+        (lambda: PartialPose(z=math.inf), LimitError, "z must be finite"),
+        (lambda: PartialPose(a=90.0), LimitError, "a must be in .*got 90 rad"),
+        (lambda: PartialPose(z="up"), ShapeError, "z must be a number"),  # type: ignore[arg-type]
+        (lambda: PartialPose(z=0.3).completed(Q), ShapeError, "start must be a Pose"),  # type: ignore[arg-type]
+        (lambda: circ(POSE, PartialPose(z=0.3)), ShapeError, "end must be a Pose"),  # type: ignore[arg-type]
+        (lambda: spline([lin(PartialPose(z=0.3))]), CommandRejected, "has a partial target of its own"),
         (lambda: Redundancy(math.inf), LimitError, "e1 must .*got inf"),
         (lambda: Redundancy(e1=math.nan), LimitError, "e1 must .*got nan"),
         (lambda: Redundancy(e1=np.float64(np.nan)), LimitError, "e1 must .*got nan"),

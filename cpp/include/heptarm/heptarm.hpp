@@ -1309,12 +1309,14 @@ struct ForceAbove {
     std::string frame;
     double threshold = unset;  ///< [N]
     double tolerance = unset;  ///< largest inaccuracy of the estimate [N]
+    std::optional<Pose> axes;  ///< a pose in the base whose axes count; absent: those of frame
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
         visit(self.frame, "frame", {-infinite, infinite, false, false, false, 0, 128});
         visit(self.threshold, "threshold", {0.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1324,6 +1326,7 @@ struct NormalForceAbove {
     Axis axis = Axis::x;
     double threshold = unset;  ///< [N]
     double tolerance = unset;  ///< [N]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1331,6 +1334,7 @@ struct NormalForceAbove {
         visit(self.axis, "axis");
         visit(self.threshold, "threshold", {0.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1340,6 +1344,7 @@ struct ShearForceAbove {
     Axis axis = Axis::x;
     double threshold = unset;  ///< [N]
     double tolerance = unset;  ///< [N]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1347,6 +1352,7 @@ struct ShearForceAbove {
         visit(self.axis, "axis");
         visit(self.threshold, "threshold", {0.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1357,6 +1363,7 @@ struct ForceOutside {
     double low = unset;  ///< [N]
     double high = unset;  ///< [N]
     double tolerance = unset;  ///< [N]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1365,6 +1372,7 @@ struct ForceOutside {
         visit(self.low, "low", {-1000.0, 1000.0});
         visit(self.high, "high", {-1000.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 
@@ -1375,6 +1383,7 @@ struct TorqueOutside {
     double low = unset;  ///< [Nm]
     double high = unset;  ///< [Nm]
     double tolerance = unset;  ///< [Nm]
+    std::optional<Pose> axes;
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1383,6 +1392,7 @@ struct TorqueOutside {
         visit(self.low, "low", {-1000.0, 1000.0});
         visit(self.high, "high", {-1000.0, 1000.0});
         visit(self.tolerance, "tolerance", {0.0, 1000.0, true, true});
+        visit(self.axes, "axes");
     }
 };
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import inf
@@ -62,6 +62,7 @@ from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.planning.search import STATES, TIMEOUT, Goal, Keep
 from heptarm.record.camera import CameraFeed, CameraSubject
+from heptarm.record.episodes import EpisodeSet, EpisodeTerms, NumberSource, named_cameras
 from heptarm.record.recorder import Recorder
 from heptarm.values.camera import NO_DISTORTION, Camera
 from heptarm.values.checks import array, callback, flag, instance, integer, shown, within, word
@@ -438,6 +439,55 @@ class ArmVerbs(Sealed):
         return Recorder(
             {"": self._connection}, path_of(path), rate=rate, cameras=cameras, overwrite=overwrite
         )
+
+    def episodes(
+        self,
+        folder: str | Path,
+        *,
+        rate: float = 20.0,
+        cameras: Mapping[str, Camera | PictureSource] | Sequence[Camera | PictureSource] = (),
+        streams: Mapping[str, NumberSource | None] | None = None,
+        task: str = "",
+        reset: Callable[[], object] | None = None,
+    ) -> EpisodeSet:
+        """Episodes of a task for learning: each a recording of its own, with a label, pictures and streams.
+
+        `heptarm.load_episodes` reads them in equal steps; `heptarm convert FOLDER OUT --to lerobot` makes a data set
+        for LeRobot.
+
+        Args:
+            folder: of the files; is made if it is not there, and gets more episodes if it has some.
+            rate: steps per second of the robot's clock, up to 500 [Hz].
+            cameras: simulated ones or functions, as `camera` takes them, by their names.
+            streams: functions that return numbers of a sensor, or None where there is nothing new, by their names; each
+                is called twice a step in a thread of its own. None instead of a function: the program pushes
+                the numbers, `EpisodeSet.push`.
+            task: what is done, in words.
+            reset: called before each episode, to bring arm and scene to the start. After an error of it there is no
+                episode.
+
+        Raises:
+            ShapeError: no such cameras, streams or function.
+            LimitError: a rate outside its range.
+            CommandRejected: a name that is taken, or has other characters than a to z, 0 to 9 and _.
+        """
+        check_states(self.state_rate, self.groups)
+        given = named_cameras(cameras)
+        for name, source in given.items():
+            if not isinstance(source, Camera) and not callable(source):
+                raise ShapeError(
+                    f"cameras[{name!r}] must be a Camera or a function that returns a picture, got {shown(source)}",
+                    parameter="cameras",
+                )
+        terms = EpisodeTerms(
+            rate=rate,
+            task=task,
+            cameras={name: partial(self.camera, source) for name, source in given.items()},
+            streams=dict(instance({} if streams is None else streams, Mapping, "streams")),
+            reset=reset,
+            factor=self.real_time_factor,
+        )
+        return EpisodeSet(self._connection, path_of(folder, "folder"), terms)
 
     def camera(
         self,

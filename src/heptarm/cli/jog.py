@@ -23,7 +23,8 @@ from heptarm.skills.teleoperation import RATE, SCALE, TURN_SCALE, teleoperate
 from heptarm.values.checks import within
 
 _ACCESS = Access()
-_DEVICES: dict[str, Callable[[], InputDevice]] = {
+#: What opens each device, by its name.
+DEVICES: dict[str, Callable[[], InputDevice]] = {
     "keyboard": keyboard,
     "gamepad": gamepad,
     "spacemouse": spacemouse,
@@ -67,7 +68,7 @@ def jog(
     limit = None if seconds is None else within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
     with access.target.connect() as arm:
         access.ask_first(arm, f"Jog the real {arm.robot.title}?")
-        opened = _DEVICES[device]()
+        opened = DEVICES[device]()
         try:
             if not access.as_json:
                 print(_help(opened, opened.roles.dead_man if dead_man is None else dead_man), flush=True)

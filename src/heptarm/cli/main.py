@@ -22,7 +22,7 @@ from heptarm.errors import HeptarmError, missing_extra, shortage
 #: Exit code after misuse of a command, as of other tools.
 _USAGE = 2
 #: What errors say in Python about angles that were given in degrees; a shell has an option for it.
-_IN_DEGREES = re.compile(r"did you mean ha\.deg\([^)]*\)\?")
+_IN_DEGREES = re.compile(r"did you mean (?:ha\.deg|math\.radians)\([^)]*\)\?")
 #: Commands and where their functions are.
 COMMANDS = {
     "demo": "demo:demo",
@@ -33,12 +33,14 @@ COMMANDS = {
     "recover": "motion:recover",
     "servo": "motion:servo",
     "jog": "jog:jog",
+    "teleop": "teleop:teleop",
     "teach": "motion:teach",
     "replay": "motion:replay",
     "live": "live:live",
     "record": "record:record",
     "plot": "plot:plot",
     "convert": "record:convert",
+    "episodes": "record:episodes",
     "twin": "twin:twin",
     "export": "export:export",
     "doctor": "doctor:doctor",

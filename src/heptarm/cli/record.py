@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from cyclopts import Parameter
 
@@ -14,7 +14,9 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop.client import Client
 from heptarm.record.convert import convert as convert_recording
+from heptarm.record.demonstration import load_episodes
 from heptarm.record.fri_client import record_client
+from heptarm.record.lerobot import save_lerobot
 from heptarm.record.recorder import Recorder
 from heptarm.record.recording import load
 from heptarm.values.camera import Camera
@@ -197,15 +199,47 @@ def _names(groups: object) -> set[str]:
 
 
 def convert(
-    file: Annotated[Path, Parameter(help="Recording, MCAP.")],
-    out: Annotated[Path, Parameter(help="File to write: .parquet, .csv or .npz; or a folder for pictures.")],
+    file: Annotated[Path, Parameter(help="Recording, MCAP; or a folder of episodes.")],
+    out: Annotated[
+        Path,
+        Parameter(help="File to write: .parquet, .csv or .npz; or a folder for pictures, or for a data set."),
+    ],
     /,
     *,
+    to: Annotated[
+        Literal["lerobot"] | None,
+        Parameter(help="Make a data set for LeRobot (version 3.0) of a folder of episodes."),
+    ] = None,
+    label: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Of a folder of episodes, those with this label: success, failure, unlabelled, unfinished; may be "
+            "repeated. Default: success."
+        ),
+    ] = (),
+    rate: Annotated[
+        float | None, Parameter(help="Steps per second of a data set [Hz]. Default: as recorded.")
+    ] = None,
     arm: Annotated[str, Parameter(help="Which arm, in a recording of several.")] = "",
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
-    """Convert a recording to Parquet, CSV or NumPy, or its pictures to a folder of JPEG files."""
+    """Convert a recording to Parquet, CSV or NumPy, its pictures to JPEG files, or episodes to a data set.
+
+    For example:
+
+        heptarm convert run.mcap run.parquet
+
+        heptarm convert insert/ data/insert --to lerobot
+    """
+    if to is not None:
+        return _to_lerobot(file, out, label or ("success",), rate, overwrite=overwrite, as_json=as_json)
+    if label or rate is not None:
+        raise CommandRejected(
+            "label and rate are of data sets",
+            parameter="label" if label else "rate",
+            hint="give --to lerobot, or leave them out",
+        )
     run = load(file, arm=arm)
     files = convert_recording(run, out, overwrite=overwrite)
     count = len(run.pictures)
@@ -220,4 +254,50 @@ def convert(
             print(f"{count} pictures were left out; a path without a suffix is a folder for them")
     if not as_json and not run.complete:
         print(f"{file} was cut off at its end; everything before was converted")
+    return 0
+
+
+def _to_lerobot(
+    folder: Path, out: Path, labels: tuple[str, ...], rate: float | None, *, overwrite: bool, as_json: bool
+) -> int:
+    """Make a data set of a folder of episodes."""
+    found = load_episodes(folder, labels=labels, rate=rate)
+    where = save_lerobot(found, out, overwrite=overwrite)
+    steps = sum(map(len, found))
+    if as_json:
+        emit({"folder": str(where), "episodes": len(found), "steps": steps})
+    else:
+        print(f"{len(found)} episodes, {steps} steps in {where}")
+    return 0
+
+
+def episodes(
+    folder: Annotated[
+        Path, Parameter(help="Folder of episodes, as arm.episodes or heptarm teleop records them.")
+    ],
+    /,
+    *,
+    as_json: Json = False,
+) -> int:
+    """List the episodes of a folder: label, duration, steps, what was dropped or corrected.
+
+    `heptarm panel --play FOLDER/episode-00000.mcap` plays one.
+    """
+    found = load_episodes(folder)
+    for episode in found:
+        if as_json:
+            emit(
+                {
+                    "file": str(episode.path),
+                    "label": episode.label,
+                    "reason": episode.reason,
+                    "task": episode.task,
+                }
+                | {"duration": episode.duration, "steps": len(episode), "dropped": dict(episode.dropped)}
+                | {"corrected": int(episode.corrected.sum())}
+            )
+        else:
+            print(episode)
+    if not as_json:
+        print(found)
     return 0

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,16 +25,23 @@ from heptarm.cli.options import (
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, require
 from heptarm.rl import deploy as deployment
+from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.deploy import DeploySettings, circle
-from heptarm.rl.peg import PegInHole
+from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.policy import Policy, shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
+from heptarm.rl.station import held_peg
 from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import task_named
 from heptarm.values.files import refuse_existing
 from heptarm.values.fitted_arm import load_fitted
 from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.pose import Pose
+from heptarm.values.tool import Tool
 
 if TYPE_CHECKING:
+    from heptarm.arm.arm import Arm
     from heptarm.rl.tasks import Task
     from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import Row
@@ -39,7 +49,7 @@ if TYPE_CHECKING:
 Seed = Annotated[int, Parameter(help="Seed of all random numbers.")]
 Randomisation = Annotated[
     Literal["none", "mild", "strong"],
-    Parameter(help="How much simulated robots differ; of peg-in-hole: latency and bandwidth."),
+    Parameter(help="How much simulated robots differ; with contacts: latency and bandwidth."),
 ]
 Engine = Annotated[
     Literal["mujoco", "warp", "plant"],
@@ -54,7 +64,9 @@ AnyPolicy = Annotated[
 
 
 def train(
-    task: Annotated[Literal["reach", "peg-in-hole"], Parameter(help="What is learned.")] = "reach",
+    task: Annotated[
+        str, Parameter(help="What is learned: reach, or a task with contacts such as peg-in-hole.")
+    ] = "reach",
     /,
     *,
     out: Annotated[Path | None, Parameter(help="File of the policy, .npz. Default: TASK.npz.")] = None,
@@ -67,7 +79,7 @@ def train(
         bool, Parameter(negative="", help="Exactly the paper's reward: no costs for robustness.")
     ] = False,
     steps: Annotated[
-        int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 for peg-in-hole.")
+        int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 with contacts.")
     ] = 0,
     seed: Seed = 0,
     fitted: Annotated[
@@ -92,21 +104,21 @@ def train(
             parameter="fitted",
             hint="leave it out",
         )
-    if task == "peg-in-hole" and (action, feature, exact, engine) != ("joint", False, False, "mujoco"):
-        raise CommandRejected(
-            "--action, --feature, --exact and --engine are of the reach task, not of peg-in-hole",
-            parameter="task",
-            value=task,
-            hint="leave them out",
-        )
-    chosen: Task = (
-        PegInHole(robot)
-        if task == "peg-in-hole"
-        else ReachTask(robot, action=action, feature="kinematic" if feature else "")
-    )
+    chosen: Task
+    if task == ReachTask.name:
+        chosen = ReachTask(robot, action=action, feature="kinematic" if feature else "")
+    else:
+        if (action, feature, exact, engine) != ("joint", False, False, "mujoco"):
+            raise CommandRejected(
+                f"--action, --feature, --exact and --engine are of the reach task, not of {task}",
+                parameter="task",
+                value=task,
+                hint="leave them out",
+            )
+        chosen = replace(task_named(task), robot=robot)
     out = out or Path(f"{task}.npz")
     recipe = recipe_of(chosen, seed=seed, steps=steps, fitted=fitted, is_exact=exact)
-    budget, left = recipe.steps, "missing" if task == "peg-in-hole" else "away"
+    budget, left = recipe.steps, "away" if task == ReachTask.name else "missing"
 
     def show(row: Row) -> None:
         if as_json:
@@ -198,7 +210,7 @@ def evaluate(
 
     _refuse_reports(out, overwrite=overwrite, film=False)
     network, known = _load(policy), level(randomisation)
-    if isinstance(network.task, PegInHole):
+    if isinstance(network.task, ContactTask):
         known = known.of_servo()
     report = work(network, episodes, randomisation=known, seed=seed, engine=_engine(engine))
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
@@ -219,6 +231,14 @@ def deploy(
     stiffness: Annotated[
         float | None, Parameter(help="Joint impedance [Nm/rad] instead of position control.")
     ] = None,
+    tip: Annotated[
+        float | None,
+        Parameter(
+            help="With contacts and --at: what is held ends so far in front of the flange [m]. "
+            "Default: the peg of the scene peg-in-hole is fetched."
+        ),
+    ] = None,
+    mass: Annotated[float, Parameter(help="With --tip: mass of what is on the flange [kg].")] = 0.0,
     latency: Annotated[float, Parameter(help="Delay between observation and command [s].")] = 0.0,
     speed: Speed = 0.5,
     out: Annotated[Path | None, Parameter(help="Write report, recording and plot under this name.")] = None,
@@ -230,9 +250,27 @@ def deploy(
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
-    """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
+    """Let a policy control an arm with a servo motion; needs no torch.
+
+    A policy with contacts inserts --random times, the hole presumed wrongly each time, on a virtual cabinet with the
+    scene peg-in-hole; or once at each --at. A recording is written in any case.
+    """
+    network = _load(policy)
+    if isinstance(network.task, ContactTask):
+        if ask or follow or film or stiffness is not None:
+            raise CommandRejected(
+                f"--ask, --follow, --film and --stiffness are of the reach task, not of {network.task.name}",
+                parameter="policy",
+                value=network.task.name,
+                hint="leave them out",
+            )
+        place = _Place(at, random, seed, tip, mass, latency)
+        return _insert(network, place, out=out, overwrite=overwrite, yes=yes, target=target, as_json=as_json)
+    if tip is not None or mass:
+        raise CommandRejected(
+            "--tip and --mass are of policies with contacts", parameter="tip", hint="leave them out"
+        )
     _refuse_reports(out, overwrite=overwrite, film=film)
-    network = _load_reach(policy)
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
@@ -258,16 +296,86 @@ def _load(file: Path | None) -> Policy[Any]:
     return shipped_peg() if str(file) == PegInHole.name else Policy.load(file)
 
 
-def _load_reach(file: Path | None) -> Policy[ReachTask]:
-    policy = _load(file)
-    if not isinstance(policy.task, ReachTask):
-        raise CommandRejected(
-            f"the policy must be of the reach task, got one of {policy.task.name}",
-            parameter="policy",
-            value=policy.task.name,
-            hint="a peg must be in the gripper: see examples/27_learned_insertion.py",
-        )
-    return policy
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a policy with contacts is deployed, see `deploy`."""
+
+    at: tuple[tuple[float, float, float], ...]
+    random: int
+    seed: int
+    tip: float | None
+    mass: float
+    latency: float
+
+    def __post_init__(self) -> None:
+        if (self.tip is None) == bool(self.at):
+            raise CommandRejected(
+                "--at and --tip must be given together, or neither", parameter="tip", value=self.tip
+            )
+        if self.random < 1:
+            raise CommandRejected(f"--random must be at least 1, got {self.random}", parameter="random")
+
+    @contextmanager
+    def prepared(self, arm: Arm, task: ContactTask) -> Iterator[tuple[str, list[Pose], Any]]:
+        """Frame of the tip, origins and targets of the episodes, while the part is held."""
+        if self.tip is not None:
+            held = Tool("held", mass=self.mass, com=(0, 0, 0.5 * self.tip), tcp=Pose.at(0, 0, self.tip))
+            with arm.tool(held):
+                quat = arm.pose().quat
+                origins = [Pose.of(place, quat) for place in self.at]
+                yield (
+                    "tool",
+                    origins,
+                    np.zeros((len(origins), len(task.targets(np.random.default_rng(0), 1)[0]))),
+                )
+            return
+        if not isinstance(task, PegInHole):
+            raise CommandRejected(
+                f"--at and --tip must be given for the task {task.name}: no scene of it is shipped",
+                parameter="at",
+            )
+        with held_peg(arm) as hole:
+            errors = task.targets(np.random.default_rng(self.seed), self.random)
+            yield "tip", [task.presumed(hole, error) for error in errors], errors
+
+
+def _insert(
+    network: Policy[Any],
+    place: _Place,
+    *,
+    out: Path | None,
+    overwrite: bool,
+    yes: bool,
+    target: CommandTarget,
+    as_json: bool,
+) -> int:
+    """Deploy a policy with contacts, and record it."""
+    out = out or Path(f"{network.task.name}-{datetime.now():%Y%m%d-%H%M%S}")
+    recording = refuse_existing(out.with_suffix(".mcap"), overwrite=overwrite, name="out")
+    _refuse_reports(out, overwrite=overwrite, film=False)
+    with target.connect() as arm:
+        if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
+            raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
+
+        def show(number: int, missing: float) -> None:
+            if not as_json:
+                print(f"{number + 1:4d}: {1e3 * missing:6.1f} mm missing", file=sys.stderr)
+
+        with (
+            arm.record(recording, overwrite=overwrite),
+            place.prepared(arm, network.task) as (frame, origins, targets),
+        ):
+            report = deploy_contact(
+                arm,
+                network,
+                origins,
+                targets,
+                settings=ContactSettings(
+                    frame=frame, latency=place.latency, stale=2.0 if arm.is_virtual else 0.25
+                ),
+                progress=show,
+            )
+    return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
 
 
 def _targets(

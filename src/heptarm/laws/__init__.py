@@ -18,6 +18,7 @@ from heptarm.laws.ready import (
     low_pass,
     low_pass_readings,
     minimum_jerk,
+    reflected_force,
     search,
 )
 
@@ -32,5 +33,6 @@ __all__ = [
     "low_pass",
     "low_pass_readings",
     "minimum_jerk",
+    "reflected_force",
     "search",
 ]

@@ -20,7 +20,7 @@ from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw
 from heptarm.fri.loop.parameters import Param
 from heptarm.model.dynamics import ROTOR, rigid_bodies
-from heptarm.values.checks import Array, array, frozen, instance, integer, numbers, scalar, within, word
+from heptarm.values.checks import Array, array, flag, frozen, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
@@ -263,6 +263,59 @@ def free_guiding(
             "filter": Param(FILTER, live=False),
         },
         {"force": _ZEROS3, "dq": _ZEROS7, "started": 0.0, "saturated": 0.0},
+        kind="torque",
+    )
+
+
+def reflected_force(
+    *,
+    force_max: float = 40.0,
+    moment_max: float = 5.0,
+    damping: npt.ArrayLike = (2.0, 2.0, 2.0, 2.0, 1.0, 0.5, 0.5),
+    tank: float = 1.0,
+    passive: bool = True,
+    tau_max: npt.ArrayLike | None = None,
+) -> ReadyLaw:
+    """Guide the arm by hand and feel the wrench of another one, its follower; gravity is compensated.
+
+    The wrench comes late, over a network, and a follower at a stiff wall would make the leader's hand swing up. So an
+    observer counts the energy that the torques take from the hand, and they give back no more than that (passivity in
+    the time domain). `rt.memory` has `energy`, what is left [J], `fraction` of the wrench that is felt now, and
+    `saturated`, the number of cycles in which wrench or torques were limited.
+
+    Args:
+        force_max: largest force that is felt [N].
+        moment_max: largest moment that is felt [Nm].
+        damping: of the joints, shape (7,) [Nm s/rad].
+        tank: most energy that is kept for later [J].
+        passive: False: without the observer, to compare; the leader may become unstable then.
+        tau_max: largest torques, shape (7,) [Nm]; None: 30 % of the robot's.
+    """
+    return ReadyLaw(
+        "reflected_force",
+        {
+            "robot": lambda arm: Param(rigid_bodies(arm, rotor=ROTOR), live=False),
+            "wrench": _vector(
+                _ZEROS6, "wrench", low=-WRENCH, high=WRENCH, unit="N or Nm", rate=50.0 * WRENCH
+            ),
+            "force_max": _number(force_max, "force_max", high=100.0, unit="N", rate=200.0),
+            "moment_max": _number(moment_max, "moment_max", high=20.0, unit="Nm", rate=40.0),
+            "damping": _vector(damping, "damping", high=(100.0,) * 7, unit="Nm s/rad", rate=200.0),
+            "tank": Param(within(tank, "tank", 0.0, 10.0, unit="J"), live=False),
+            "is_passive": Param(float(flag(passive, "passive")), live=False),
+            "tau_max": _torques(tau_max),
+            "filter": Param(FILTER, live=False),
+        },
+        {
+            "wrench": _ZEROS6,
+            "energy": 0.0,
+            "fraction": 1.0,
+            "dq": _ZEROS7,
+            "q": _ZEROS7,
+            "tau": _ZEROS7,
+            "started": 0.0,
+            "saturated": 0.0,
+        },
         kind="torque",
     )
 

@@ -46,7 +46,8 @@ class DrawnWorld:
         server: a viser server.
         model: "iiwa7", "iiwa14", "med7" or "med14".
         scene: what is around the arm and on its flange; None: nothing.
-        positions: file in which the simulator writes all positions; None: only the arm moves, and what a program says.
+        positions: file in which the simulator writes all positions; None: only the arm moves, and bodies that a
+            program adds.
         meshes: of the arm; None: heptarm's own.
         root: node of viser's scene that is the base of the arm; empty: the world.
     """

@@ -1,4 +1,4 @@
-"""A recording on the page of the panel: the arm as it moved, by a slider or in time; its twin as a ghost."""
+"""A recording on the page of the panel: the arm as it moved, by a slider or in time; pictures, its twin as a ghost."""
 
 from __future__ import annotations
 
@@ -81,6 +81,10 @@ class Player:
         self.is_playing = server.gui.add_checkbox("play", True)
         self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
         self.events = server.gui.add_markdown("")
+        pictures = {**recording.views, **({"camera": recording.pictures} if len(recording.pictures) else {})}
+        #: What the cameras saw, by their names; each with the picture that is shown.
+        self.pictures = {name: server.gui.add_image(view[0], label=name) for name, view in pictures.items()}
+        self._views, self._shown = pictures, dict.fromkeys(pictures, 0)
         server.initial_camera.position = (1.7, -1.5, 1.15)
         server.initial_camera.look_at = (0.15, 0.0, 0.5)
         guard.port = server.get_port()  # from now on it lets in who has the token
@@ -99,6 +103,10 @@ class Player:
                 tcp = Pose.of(pose[:3], pose[3:] / np.linalg.norm(pose[3:]))
                 self._marks.show(tcp, self._world.flange.xpos.copy(), force if is_felt else None)
         self._ghost.show(self._outline, t)
+        for name, view in self._views.items():
+            index = int(np.abs(view.t - t).argmin())
+            if index != self._shown[name]:
+                self._shown[name], self.pictures[name].image = index, view[index]
         past = [event for event in run.events if event.t <= t and event.kind != "signals"]
         self.events.content = "\n".join(
             f"- `{event.t:.2f} s` {event.text[:120]}" for event in past[-_EVENTS:]

@@ -17,6 +17,7 @@ from heptarm.wire import messages as wire
 
 #: Kinds of entries.
 REQUEST, REFUSAL, EVENT, ERROR, NOTE, FRI = "request", "refusal", "event", "error", "note", "fri"
+CORRECTION = "correction"
 #: Entries that are kept for the black box, their age [ns], and entries that a slow recorder may leave waiting.
 KEPT, KEPT_TIME, WAITING = 5_000, 31_000_000_000, 100_000
 
@@ -27,7 +28,8 @@ class JournalEntry(NamedTuple):
     Attributes:
         time: our clock [ns].
         kind: "request": the cabinet has accepted one; "refusal": it has refused one; "event": from the cabinet;
-            "error": what went wrong on this side; "note": the user's; "fri": a message of an FRI session's loop.
+            "error": what went wrong on this side; "note": the user's; "fri": a message of an FRI session's loop;
+            "correction": where a person's correction of a policy begins or ends.
         content: a message of the protocol, or a text.
         id: number under which the cabinet accepted a request; 0 elsewhere.
     """

@@ -3,7 +3,8 @@
 Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp and /tf (the motion frame, and the frames
 of the links with the names of the URDF, for a 3D view, at most 30 per second), /log (what happened, as text), /journal
 (the same with all its data), /signals (IO and control mode, when they change), /camera/image and /camera/calibration
-(pictures of a simulated camera). The log time of a message is its receipt, the publish time of a state the moment of
+(pictures of a simulated camera), /camera/NAME/image and /stream/NAME (pictures and numbers of an episode, see
+`heptarm.record.episodes`). The log time of a message is its receipt, the publish time of a state the moment of
 its sampling; a picture has those of the state that it shows. In a recording of several arms the topics begin with
 the arm's name, as in /left/state, and so do the frames: left_base.
 """
@@ -72,6 +73,7 @@ _JOURNAL_SCHEMA = {
         "content": {"type": "object"},
     },
 }
+_STREAM_SCHEMA = {"type": "object", "properties": {"values": {"type": "array", "items": {"type": "number"}}}}
 _SIGNALS_SCHEMA = {"type": "object", "properties": {"io": {"type": "object"}, "mode": {"type": "object"}}}
 
 
@@ -127,6 +129,7 @@ class RecordingFile:
         self._rest = RestWatch()
         self._cycles: int | None = None
         self._camera: tuple[int, int] | None = None
+        self._more: dict[str, int] = {}
         self._names = f"{arm}_" if arm else ""
         self._out.add_metadata(BEGIN, {**facts, **({ARM: arm} if arm else {})})
         self._states = self._add_rows("/state", STATE)
@@ -230,6 +233,22 @@ class RecordingFile:
             (image, encode_image(at, frame, picture.data)),
         ):
             self._out.add_message(channel, received, data, at, number)
+
+    def view(self, name: str, at: int, data: bytes) -> None:
+        """Write a picture of a named camera, the bytes of a JPEG file, taken at a time of our clock [ns]."""
+        topic = f"/camera/{name}/image"
+        if topic not in self._more:
+            self._more[topic] = self._add(topic, *COMPRESSED_IMAGE)
+        at += self._epoch
+        self._out.add_message(self._more[topic], at, encode_image(at, f"{self._names}{name}", data), at)
+
+    def numbers(self, name: str, at: int, values: Sequence[float]) -> None:
+        """Write numbers of a named stream at a time of our clock [ns]."""
+        topic = f"/stream/{name}"
+        if topic not in self._more:
+            self._more[topic] = self._add_json(topic, "heptarm.Numbers", _STREAM_SCHEMA)
+        at += self._epoch
+        self._out.add_message(self._more[topic], at, json.dumps({"values": list(values)}).encode(), at)
 
     def entry(self, entry: JournalEntry) -> None:
         """Write what happened."""

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.record.journal import NOTE
+from heptarm.record.journal import CORRECTION, NOTE
 from heptarm.record.pictures import Pictures
 from heptarm.record.samples import to_frame
 from heptarm.values.checks import Array, choice, finite, flag, shown
@@ -19,6 +19,29 @@ from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.notebook import as_html
 from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.text import lines
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedNumbers:
+    """Numbers that a program has recorded beside the states; `heptarm.load(...).streams`.
+
+    Attributes:
+        t: times of the recording, shape (n,) [s].
+        values: shape (n, m).
+    """
+
+    t: Array
+    values: Array
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.t)
+
+    def between(self, begin: float, end: float) -> RecordedNumbers:
+        """Those of a time of the recording [s]."""
+        inside = _within(self.t, begin, end)
+        return RecordedNumbers(self.t[inside], self.values[inside])
+
 
 _Data = TypeVar("_Data", bound="RecordedData")
 #: Before the names of signals of FRI cycles, which have their own times: "fri.t".
@@ -31,7 +54,7 @@ class RecordedEvent:
 
     Attributes:
         t: when, on the time line of the recording [s].
-        kind: "request", "refusal", "event", "error", "note", "fri" or "signals".
+        kind: "request", "refusal", "event", "error", "note", "fri", "signals" or "correction".
         name: of the message, such as "MotionFinished".
         text: one line for people.
         content: everything, as plain data.
@@ -91,6 +114,9 @@ class RecordedData:
         lost: states and FRI cycles that could not be recorded; only known of a complete file.
         damage: where and how the file is damaged; what is here is all before that. Empty: it is not.
         pictures: of a simulated camera, if there was one.
+        views: pictures of the cameras of an episode, by their names.
+        streams: numbers of the streams of an episode, by their names.
+        outcome: texts of the end of a complete file.
     """
 
     path: Path
@@ -102,6 +128,9 @@ class RecordedData:
     lost: int = 0
     pictures: Pictures = field(default_factory=Pictures)
     damage: str = ""
+    views: Mapping[str, Pictures] = field(default_factory=dict)
+    streams: Mapping[str, RecordedNumbers] = field(default_factory=dict)
+    outcome: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         """Array of a signal, such as "q", "fri.tau" or "t".
@@ -145,6 +174,21 @@ class RecordedData:
         """The marks that `Recorder.note` has put."""
         return tuple(event for event in self.events if event.kind == NOTE)
 
+    @property
+    def corrections(self) -> Array:
+        """Times in which a person corrected a policy, from begin to end, shape (n, 2) [s]; see `JointServo.correct`."""
+        found: list[tuple[float, float]] = []
+        begin: float | None = None
+        for event in self.events:
+            if event.kind == CORRECTION and event.text == "begins":
+                begin = event.t
+            elif event.kind == CORRECTION and begin is not None:
+                found.append((begin, event.t))
+                begin = None
+        if begin is not None:
+            found.append((begin, float(self.t[-1]) if len(self) else begin))
+        return np.array(found, dtype=np.float64).reshape(-1, 2)
+
     def between(self: _Data, begin: float | str, end: float | str) -> _Data:
         """A part of the recording; its times stay those of the whole.
 
@@ -176,6 +220,8 @@ class RecordedData:
             ),
             events=tuple(event for event in self.events if first <= event.t <= last),
             pictures=self.pictures.between(first, last),
+            views={name: view.between(first, last) for name, view in self.views.items()},
+            streams={name: stream.between(first, last) for name, stream in self.streams.items()},
         )
 
     def _moment(self, when: float | str, name: str) -> float:

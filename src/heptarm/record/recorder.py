@@ -130,6 +130,14 @@ def chunk_size(rate: float) -> int:
     return int(min(max(rate * STATE.dtype.itemsize * _CHUNK_TIME, _CHUNK_LEAST), _CHUNK_MOST))
 
 
+class RecordFeed(Protocol):
+    """Something else that is written to the file, as numbers of a sensor are; called by the recorder's thread alone."""
+
+    def write(self, file: RecordingFile) -> None:
+        """Write what has arrived."""
+        ...
+
+
 class CycleTap:
     """Takes the cycles of FRI sessions out of their rings, none twice.
 
@@ -249,6 +257,8 @@ class Recorder(Sealed):
         period: time between two looks at what has arrived [s].
         cameras: what draws pictures for the file, by the name of the arm.
         overwrite: replace a file that exists.
+        feeds: what else is written to the file.
+        facts: texts of the beginning, beside those of the sources.
 
     Attributes:
         path: the file.
@@ -270,8 +280,13 @@ class Recorder(Sealed):
         period: float = _PERIOD,
         cameras: Mapping[str, CameraFeed] | None = None,
         overwrite: bool = False,
+        feeds: Sequence[RecordFeed] = (),
+        facts: Mapping[str, str] | None = None,
     ) -> None:
         self._sources = dict(sources)
+        self._feeds, self._facts = tuple(feeds), dict(facts or {})
+        self._recording: RecordingFile | None = None
+        self._outcome: dict[str, str] = {}
         self._overwrite = flag(overwrite, "overwrite") or sinks is not None
         self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
         self.path = refuse_existing(path, overwrite=self._overwrite)
@@ -325,7 +340,9 @@ class Recorder(Sealed):
         (name, first), *others = sources.items()
         refuse_existing(self.path, overwrite=self._overwrite)  # it may have appeared meanwhile
         size = chunk_size(sum(source.state_rate for source in sources.values()))
-        file = RecordingFile(self.path, first.facts, epoch=epoch_of(first), chunk=size, arm=name)
+        about = {**first.facts, **self._facts}
+        file = RecordingFile(self.path, about, epoch=epoch_of(first), chunk=size, arm=name)
+        self._recording = file
         files = [file, *(file.beside(source.facts, name) for name, source in others)]
         for name, writer in zip(sources, files, strict=True):
             if name in self._cameras:
@@ -353,6 +370,10 @@ class Recorder(Sealed):
         check_printable(text.replace("\t", " "), "text", lines=True)
         for source in self._sources.values():
             source.journal.add(NOTE, text)
+
+    def conclude(self, facts: Mapping[str, str]) -> None:
+        """Have texts written at the end of the file; without them the file was cut off."""
+        self._outcome = dict(facts)
 
     @property
     def lost(self) -> int:
@@ -426,6 +447,9 @@ class Recorder(Sealed):
                 is_last = self._ended.wait(self._period)
                 for tap in self._taps:
                     self._states += tap.write()
+                for feed in self._feeds:
+                    assert self._recording is not None
+                    feed.write(self._recording)
                 file.flush()
                 if is_last:
                     break
@@ -434,7 +458,7 @@ class Recorder(Sealed):
             counts = {"states": self.states, "lost": self.lost}
             if self._films:
                 counts |= {"pictures": self.pictures, "pictures_dropped": self.pictures_dropped}
-            file.finish({name: str(count) for name, count in counts.items()})
+            file.finish({name: str(count) for name, count in counts.items()} | self._outcome)
         except OSError as error:
             self._failure = error
             file.abandon()

@@ -20,7 +20,7 @@ from heptarm.record.pictures import Pictures
 from heptarm.record.plot import Chart, chart_of
 from heptarm.record.plot.content import Style
 from heptarm.record.plot.signals import Kind
-from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
+from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion, RecordedNumbers
 from heptarm.record.samples import signals_of
 from heptarm.values.checks import Array, flag, frozen, instance, shown
 from heptarm.values.files import open_regular, path_of
@@ -53,6 +53,9 @@ class Recording(RecordedData):
         lost: states and FRI cycles that could not be recorded; only known of a complete file.
         damage: where and how the file is damaged; what is here is all before that. Empty: it is not.
         pictures: of a simulated camera, if there was one.
+        views: pictures of the cameras of an episode, by their names.
+        streams: numbers of the streams of an episode, by their names.
+        outcome: texts of the end of a complete file.
     """
 
     def chart(self, *signals: str, kind: Kind = "time") -> Chart:
@@ -100,6 +103,8 @@ class _Content:
     cycled: list[int] = field(default_factory=list)
     entries: list[tuple[int, str, bytes]] = field(default_factory=list)
     pictures: list[tuple[int, bytes]] = field(default_factory=list)
+    views: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
+    streams: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
     arm: str = ""
     arms: list[str] = field(default_factory=list)
     earliest: int | None = None
@@ -234,6 +239,12 @@ def _take(record: Any, content: _Content) -> None:
             content.cycled.append(record.publish_time)
         elif topic == f"{prefix}/camera/image":
             content.pictures.append((record.publish_time, image_data(record.data)))
+        elif topic.startswith(f"{prefix}/camera/") and topic.endswith("/image"):
+            name = topic.removeprefix(f"{prefix}/camera/").removesuffix("/image")
+            content.views.setdefault(name, []).append((record.publish_time, image_data(record.data)))
+        elif topic.startswith(f"{prefix}/stream/"):
+            name = topic.removeprefix(f"{prefix}/stream/")
+            content.streams.setdefault(name, []).append((record.publish_time, record.data))
         elif topic in (f"{prefix}/journal", f"{prefix}/signals"):
             content.entries.append((record.publish_time, topic.removeprefix(prefix), record.data))
     elif kind == "Channel":
@@ -300,12 +311,23 @@ def _recording(path: Path, content: _Content) -> Recording:
         events,
         complete=content.end is not None,
         lost=int((content.end or {}).get("lost", 0)),
-        pictures=Pictures(
-            line([at for at, _ in content.pictures]) if content.pictures else frozen(np.zeros(0)),
-            tuple(data for _, data in content.pictures),
-            int((content.end or {}).get("pictures_dropped", 0)),
+        pictures=_pictures(
+            content.pictures, line, dropped=int((content.end or {}).get("pictures_dropped", 0))
         ),
+        views={name: _pictures(found, line) for name, found in content.views.items()},
+        streams={name: _numbers(found, line) for name, found in content.streams.items()},
+        outcome=content.end or {},
     )
+
+
+def _pictures(found: Sequence[tuple[int, bytes]], line: _TimeLine, *, dropped: int = 0) -> Pictures:
+    times = line([at for at, _ in found]) if found else frozen(np.zeros(0))
+    return Pictures(times, tuple(data for _, data in found), dropped)
+
+
+def _numbers(found: Sequence[tuple[int, bytes]], line: _TimeLine) -> RecordedNumbers:
+    values = np.array([json.loads(data)["values"] for _, data in found], dtype=np.float64)
+    return RecordedNumbers(line([at for at, _ in found]), values)
 
 
 def _events(entries: Sequence[tuple[int, str, bytes]], line: _TimeLine) -> Iterator[RecordedEvent]:

@@ -1,29 +1,37 @@
 """Reinforcement learning: the tasks, batched simulators, PPO, policies that need no torch.
 
-Importing it registers `gymnasium.make("heptarm/Reach-v0")` and "heptarm/PegInHole-v0", if Gymnasium is installed.
+Importing it registers the environments with Gymnasium, if that is installed: `gymnasium.make("heptarm/Reach-v0")`,
+"heptarm/PegInHole-v0" and so on, one for each task.
 """
 
 from __future__ import annotations
 
 from importlib.util import find_spec
 
-#: Names of the environments at Gymnasium.
-ENVIRONMENT, PEG_IN_HOLE = "heptarm/Reach-v0", "heptarm/PegInHole-v0"
+from heptarm.rl.tasks import TASKS, Task, environment
 
 
-def register() -> None:
-    """Register the environments with Gymnasium; repeated calls have no effect."""
+def register(kind: type[Task] | None = None) -> None:
+    """Make a task of your own known by its name, and to Gymnasium; repeated calls have no effect.
+
+    Args:
+        kind: the class of the task; None: those that come with heptarm.
+    """
+    if kind is not None:
+        TASKS[kind.name] = kind
+    if find_spec("gymnasium") is None:
+        return
     import gymnasium
 
-    if ENVIRONMENT not in gymnasium.registry:
-        gymnasium.register(ENVIRONMENT, entry_point="heptarm.rl.env:ReachEnv")
-    if PEG_IN_HOLE not in gymnasium.registry:
-        gymnasium.register(
-            PEG_IN_HOLE,
-            entry_point="heptarm.rl.peg_env:PegInHoleEnv",
-            vector_entry_point="heptarm.rl.peg_env:PegInHoleVectorEnv",
-        )
+    for known in TASKS.values() if kind is None else (kind,):
+        if environment(known) not in gymnasium.registry:
+            entry = "ReachEnv" if known.name == "reach" else "ContactEnv"
+            gymnasium.register(
+                environment(known),
+                entry_point=f"heptarm.rl.env:{entry}",
+                vector_entry_point="heptarm.rl.env:TaskVectorEnv",
+                kwargs={} if known.name == "reach" else {"task": known.name},
+            )
 
 
-if find_spec("gymnasium") is not None:
-    register()
+register()

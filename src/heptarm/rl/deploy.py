@@ -105,7 +105,7 @@ def deploy(
             f"the policy must be of the task {ReachTask.name}, got one of {task.name}",
             parameter="policy",
             value=task.name,
-            hint="heptarm.rl.deploy_peg inserts a peg",
+            hint="heptarm.rl.deploy_contact deploys it",
         )
     if arm.robot.name != task.model.name:
         raise LimitError(

@@ -1,4 +1,4 @@
-"""A task as a Gymnasium environment with one arm, and the reach task as one: `gymnasium.make("heptarm/Reach-v0")`."""
+"""Tasks as Gymnasium environments: one arm by `make("heptarm/Push-v0")`, many at once in one process by `make_vec`."""
 
 from __future__ import annotations
 
@@ -8,32 +8,52 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, NotReady, require
-from heptarm.rl.sim.batch import BatchReach, Engine
-from heptarm.rl.sim.episodes import TaskBatch
+from heptarm.rl.contact.task import ContactTask
+from heptarm.rl.sim.batch import Engine
+from heptarm.rl.sim.episodes import BatchSettings, TaskBatch
 from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
+from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import COARSE, ReachTask
-from heptarm.rl.tasks import Task
+from heptarm.rl.tasks import Task, task_named
 from heptarm.values.checks import array, instance, word
 
 require("gymnasium", extra="rl")
 
 import gymnasium  # noqa: E402  after the check that it is there
 from gymnasium import spaces  # noqa: E402
+from gymnasium.vector import AutoresetMode, VectorEnv  # noqa: E402
+from gymnasium.vector.utils import batch_space  # noqa: E402
 
 ENGINES = {"plant": PlantEngine, "training": Engine}
 Observation = npt.NDArray[np.float32]
 #: Largest distance of a target from the base [m].
 FARTHEST = 2.0
+#: Largest number of an observation of a task with contacts; what is above is clipped.
+LARGEST = 10.0
 
 
-def observation_space(task: ReachTask) -> spaces.Box:
-    """Space of the observations of the reach task, for all targets of a robot."""
+def observation_space(task: Task) -> spaces.Box:
+    """Space of the observations of a task; of the reach task for all targets of a robot."""
+    if not isinstance(task, ReachTask):
+        return spaces.Box(-LARGEST, LARGEST, (task.observation_size,), dtype=np.float32)
     high = np.ones(task.observation_size, dtype=np.float32)
     high[:7] = 1.5
     high[14:17] = FARTHEST
     high[17:20] = 2 * FARTHEST / COARSE
     return spaces.Box(-high, high, dtype=np.float32)
+
+
+def _seen(observation: npt.NDArray[np.float64], space: spaces.Box) -> Observation:
+    """An observation as its space has it; what is beyond is clipped."""
+    return np.clip(observation, space.low, space.high).astype(np.float32)
+
+
+def _arms(
+    task: Task, randomisation: Randomisation, *, envs: int = 1, threads: int = 1, engine: str = "training"
+) -> TaskBatch:
+    settings = BatchSettings(envs=envs, randomisation=randomisation, threads=threads, starts="together")
+    return simulate(task, settings, engine=ENGINES[engine])
 
 
 def action_space(task: Task) -> spaces.Box:
@@ -49,7 +69,6 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
 
     Args:
         arms: the simulation, of one arm.
-        space: of its observations.
         render_mode: None; there are no pictures.
 
     Raises:
@@ -58,11 +77,11 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
 
     metadata = {"render_modes": [], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
 
-    def __init__(self, arms: TaskBatch, space: spaces.Box, *, render_mode: str | None) -> None:
+    def __init__(self, arms: TaskBatch, *, render_mode: str | None) -> None:
         if render_mode is not None:
             raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
         self.render_mode = None
-        self.observation_space = self._space = space
+        self.observation_space = self._space = observation_space(arms.task)
         self.action_space = action_space(arms.task)
         self._arms = arms
         self._open = False
@@ -91,7 +110,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
         seen = self._arms.reset(goals, seed=own)
         self._open = True
         tip, left = self._arms.outcome()
-        return self._seen(seen), self._info(tip[0], float(left[0]), self._arms.target[0].copy(), 0.0)
+        return _seen(seen[0], self._space), self._info(
+            tip[0], float(left[0]), self._arms.target[0].copy(), 0.0
+        )
 
     def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One decision.
@@ -111,12 +132,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
         self._open = not ended
         seen = step.final if ended else step.observation
         info = self._info(step.tip[0], float(step.distance[0]), target, float(step.force[0]))
-        return self._seen(seen), float(step.reward[0]), False, ended, info
-
-    def _seen(self, observation: npt.NDArray[np.float64]) -> Observation:
-        space = self._space
-        seen: Observation = np.clip(observation[0].astype(np.float32), space.low, space.high)
-        return seen
+        return _seen(seen[0], self._space), float(step.reward[0]), False, ended, info
 
     def _info(self, tip: Any, distance: float, target: Any, force: float) -> dict[str, Any]:
         return {
@@ -163,12 +179,98 @@ class ReachEnv(TaskEnv):
         if task is not None:
             instance(task, ReachTask, "task")
         self.task = task or ReachTask(robot, action=action, feature=feature)
-        arms = BatchReach(
-            self.task,
-            envs=1,
-            randomisation=randomisation,
-            threads=1,
-            starts="together",
-            engine=ENGINES[engine],
-        )
-        super().__init__(arms, observation_space(self.task), render_mode=render_mode)
+        arms = _arms(self.task, randomisation, engine=engine)
+        super().__init__(arms, render_mode=render_mode)
+
+
+class ContactEnv(TaskEnv):
+    """One simulated arm in a task with contacts; "distance" is what is missing for success [m].
+
+    Args:
+        task: the task, or the name of one with its defaults.
+        randomisation: latency and bandwidth that differ from episode to episode.
+        render_mode: None; there are no pictures.
+
+    Raises:
+        CommandRejected: no such task, a render mode, or a randomisation that the task has not.
+        MissingExtra: Gymnasium is not installed.
+    """
+
+    def __init__(
+        self,
+        task: ContactTask | str = "peg-in-hole",
+        *,
+        randomisation: Randomisation = NONE,
+        render_mode: str | None = None,
+    ) -> None:
+        self.task = _task(task)
+        instance(self.task, ContactTask, "task")
+        instance(randomisation, Randomisation, "randomisation")
+        super().__init__(_arms(self.task, randomisation), render_mode=render_mode)
+
+
+class TaskVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked into
+    """Many simulated arms in a task, in one process; an episode that ends begins again within the same step.
+
+    Args:
+        num_envs: number of arms.
+        task: the task, or the name of one with its defaults.
+        randomisation: what differs from episode to episode; of tasks with contacts: latency and bandwidth.
+        threads: of the simulation.
+
+    Raises:
+        CommandRejected: no such task, or a randomisation that the task has not.
+        LimitError: no arms, or no threads.
+    """
+
+    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012  Gymnasium's own name
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        task: Task | str = ReachTask.name,
+        randomisation: Randomisation = NONE,
+        threads: int = 2,
+    ) -> None:
+        self.task, self.render_mode = _task(task), None
+        self._arms = _arms(self.task, randomisation, envs=num_envs, threads=threads)
+        self.num_envs = num_envs
+        self.single_observation_space = observation_space(self.task)
+        self.single_action_space = action_space(self.task)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode of every arm.
+
+        Raises:
+            CommandRejected: options, of which there are none.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise CommandRejected(f"unknown options: {', '.join(options)}", hint="there are none")
+        return _seen(self._arms.reset(seed=seed), self.single_observation_space), {}
+
+    def step(self, actions: Observation) -> tuple[Observation, Any, Any, Any, dict[str, Any]]:
+        """One decision of every arm; `actions` of shape (num_envs, n), clipped to +-1.
+
+        Raises:
+            ShapeError: another shape, or not finite.
+        """
+        step, space = self._arms.step(actions), self.single_observation_space
+        success = step.distance <= self.task.radius
+        info: dict[str, Any] = {"distance": step.distance, "is_success": success, "force": step.force}
+        if step.done.any():
+            last = np.empty(self.num_envs, dtype=object)
+            for index, seen in zip(np.flatnonzero(step.done).tolist(), _seen(step.final, space), strict=True):
+                last[index] = seen
+            info |= {"final_obs": last, "_final_obs": step.done}
+        goes_on = np.zeros(self.num_envs, dtype=np.bool_)
+        return _seen(step.observation, space), step.reward, goes_on, step.done, info
+
+
+def _task(task: Task | str) -> Any:
+    return task_named(task) if isinstance(task, str) else instance(task, (ReachTask, ContactTask), "task")

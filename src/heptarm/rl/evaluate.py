@@ -13,6 +13,7 @@ from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.policy import Policy
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.sim.batch import Engine
+from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.tasks import Task
@@ -65,11 +66,13 @@ def evaluate(
         goals = np.atleast_2d(np.asarray(targets, dtype=np.float64))
     arms = simulate(
         replace(task, steps=task.steps + 1),  # so that no arm begins again before its last state is read
-        envs=len(goals),
-        randomisation=randomisation,
-        seed=np.random.SeedSequence([_HELD_BACK, seed, 1]),
-        threads=threads,
-        starts="together",
+        BatchSettings(
+            envs=len(goals),
+            randomisation=randomisation,
+            seed=np.random.SeedSequence([_HELD_BACK, seed, 1]),
+            threads=threads,
+            starts="together",
+        ),
         engine=engine,
     )
     observation = arms.reset(goals)

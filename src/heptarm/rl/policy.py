@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.rl.peg import PegInHole
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import OfTask, task_from_dict
 from heptarm.values.checks import flag

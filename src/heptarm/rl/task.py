@@ -58,6 +58,9 @@ class ReachTask:
 
     #: Name at the command line.
     name: ClassVar[str] = "reach"
+    #: What the value network sees beyond an observation while a policy is trained: nothing. And no one teaches.
+    hidden_size: ClassVar[int] = 0
+    has_teacher: ClassVar[bool] = False
 
     robot: str = "iiwa14"
     _: KW_ONLY
@@ -98,11 +101,6 @@ class ReachTask:
         return 23 if self.feature else 17
 
     @property
-    def hidden_size(self) -> int:
-        """What the value network sees beyond an observation while a policy is trained: nothing."""
-        return 0
-
-    @property
     def action_size(self) -> int:
         """Size of an action."""
         return 7 if self.action == "joint" else 3
@@ -119,6 +117,10 @@ class ReachTask:
         return np.asarray(self.centre) + random.uniform(-half, half, (count, 3))
 
     # ------------------------------------------------------------------------------ what a decision is
+
+    def begin(self, q: Array) -> Array:
+        """The command of an arm at rest, shape (..., 7) [rad]: where it is."""
+        return q
 
     def tip(self, q: Array) -> Array:
         """Positions of the flange, shape (..., 7) [rad] to (..., 3) [m].

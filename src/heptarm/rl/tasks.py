@@ -5,13 +5,34 @@ from __future__ import annotations
 from typing import Any, TypeAlias, TypeVar
 
 from heptarm.errors import CommandRejected
-from heptarm.rl.peg import PegInHole
+from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.rl.contact.plug_insert import PlugInsert
+from heptarm.rl.contact.polish import Polish
+from heptarm.rl.contact.push import Push
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.task import ReachTask
 
 #: One definition of what is learned: it serves training, evaluation and an arm.
-Task: TypeAlias = ReachTask | PegInHole
-TASKS: dict[str, type[ReachTask] | type[PegInHole]] = {kind.name: kind for kind in (ReachTask, PegInHole)}
+Task: TypeAlias = ReachTask | ContactTask
+TASKS: dict[str, type[Task]] = {
+    kind.name: kind for kind in (ReachTask, PegInHole, Push, PickPlace, Polish, PlugInsert)
+}
 OfTask = TypeVar("OfTask", bound=Task)
+
+
+def environment(kind: type[Task]) -> str:
+    """Name of a task's environment at Gymnasium: "heptarm/PegInHole-v0"."""
+    return f"heptarm/{kind.__name__.removesuffix('Task')}-v0"
+
+
+def task_named(name: str) -> Task:
+    """The task of that name with its defaults.
+
+    Raises:
+        CommandRejected: no such task.
+    """
+    return _kind(name)()
 
 
 def task_from_dict(entries: dict[str, Any]) -> Task:
@@ -20,12 +41,15 @@ def task_from_dict(entries: dict[str, Any]) -> Task:
     Raises:
         CommandRejected: no such task, or entries that are not its.
     """
-    name = entries.get("name", ReachTask.name)
-    if name not in TASKS:
+    return _kind(entries.get("name", ReachTask.name)).from_dict(entries)
+
+
+def _kind(name: object) -> type[Task]:
+    if not isinstance(name, str) or name not in TASKS:
         raise CommandRejected(
             f"task must be one of {', '.join(TASKS)}, got {name!r}",
             parameter="task",
             value=name,
-            hint="the file may be of a newer heptarm",
+            hint="the file may be of a newer heptarm; your own task is registered by heptarm.rl.register(TASK)",
         )
-    return TASKS[name].from_dict(entries)
+    return TASKS[name]

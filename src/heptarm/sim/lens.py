@@ -41,7 +41,7 @@ class Lens:
         focal, centre = matrix[0, 0], matrix[:2, 2]
         u, v = np.meshgrid(np.arange(width), np.arange(height))
         seen = undistorted(np.stack([u, v], axis=-1), matrix, camera.distortion)
-        at = focal * seen + centre  # in the picture without distortion, whose origin it shares
+        at = focal * seen + centre  # in the picture without distortion, with the same origin
         first = np.minimum(np.floor(at.min(axis=(0, 1))).astype(int) - _MARGIN, 0)
         last = np.maximum(np.ceil(at.max(axis=(0, 1))).astype(int) + _MARGIN, (width - 1, height - 1))
         size = last - first + 1

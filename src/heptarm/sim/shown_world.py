@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from heptarm.io.panel_box import WorldFiles
 
 if TYPE_CHECKING:
-    from heptarm.sim.collision import CollisionModel
+    from heptarm.values.clearance import CollisionWorld
 
 #: Longest time after which panels are looked for, and the world is reported as fresh; shortest between two changes [s].
 _PERIOD, _SHORTEST = 0.5, 0.05
@@ -27,7 +27,7 @@ class ShownWorld:
         is_seen: whether a panel is open.
     """
 
-    def __init__(self, world: CollisionModel) -> None:
+    def __init__(self, world: CollisionWorld) -> None:
         self._files = WorldFiles(world.robot.name)
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -45,7 +45,7 @@ class ShownWorld:
             self._files.remove()
         atexit.unregister(self.end)
 
-    def _put(self, world: CollisionModel) -> int:
+    def _put(self, world: CollisionWorld) -> int:
         """Write what has changed; returns the revision that was written."""
         revision, outline = world.revision, world.outline()
         with self._lock, contextlib.suppress(OSError):
@@ -53,7 +53,7 @@ class ShownWorld:
                 self.is_seen = self._files.put(outline)
         return revision
 
-    def _follow(self, of: weakref.ref[CollisionModel]) -> None:
+    def _follow(self, of: weakref.ref[CollisionWorld]) -> None:
         while not self._ended.wait(_SHORTEST):
             world = of()
             if world is None:

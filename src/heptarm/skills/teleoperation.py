@@ -31,6 +31,22 @@ RATE = 50.0
 _JOINT_SPEED, _DIAGONAL = 0.5, 3.0**0.5
 
 
+def check_device(device: InputDevice) -> InputDevice:
+    """The device.
+
+    Raises:
+        ShapeError: it is none.
+    """
+    if not callable(getattr(device, "read", None)):
+        raise ShapeError(
+            f"device must be an input device, got {shown(device)}",
+            parameter="device",
+            value=device,
+            hint="for example heptarm.devices.gamepad()",
+        )
+    return device
+
+
 def teleoperate(
     arm: ArmVerbs,
     device: InputDevice,
@@ -79,13 +95,7 @@ def teleoperate(
         Timeout: the gripper did not confirm; the arm was brought to rest.
         MotionAborted: the motion ended early, as by a stop.
     """
-    if not callable(getattr(device, "read", None)):
-        raise ShapeError(
-            f"device must be an input device, got {shown(device)}",
-            parameter="device",
-            value=device,
-            hint="for example heptarm.devices.gamepad()",
-        )
+    check_device(device)
     speed = within(scale, "scale", 0.0, 1.0, above=True, unit="m/s")
     turn = within(turn_scale, "turn_scale", 0.0, 2.0, above=True, unit="rad/s")
     limit = None if duration is None else within(duration, "duration", 0.0, 1e6, above=True, unit="s")

@@ -11,6 +11,7 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.values.shape import Shape
 from heptarm.values.tool import KnownTool, Workpiece
+from heptarm.values.world import WorldOutline
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -107,6 +108,9 @@ class CollisionWorld(CollisionCheck, ClearanceModel, Protocol):
 
     def wait_for_change(self, revision: int, *, timeout: float) -> int:
         """Wait up to `timeout` [s] until the world has changed since a revision; the revision now."""
+
+    def outline(self) -> WorldOutline:
+        """What a panel shows of the world."""
 
     # What an arm grasps and carries.
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, cast
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -151,9 +151,7 @@ class Pose(Value):
         Raises:
             LimitError: a number is not finite, or an angle is more than a turn, as degrees are.
         """
-        angles = [
-            within(value, name, -_TURN, _TURN, unit="rad") for name, value in (("a", a), ("b", b), ("c", c))
-        ]
+        angles = [_angle(value, name) for name, value in (("a", a), ("b", b), ("c", c))]
         (sa, ca), (sb, cb), (sc, cc) = ((math.sin(t / 2), math.cos(t / 2)) for t in angles)
         quat = (
             sc * cb * ca - cc * sb * sa,
@@ -370,6 +368,87 @@ class Pose(Value):
         return f"Pose(xyz={self.xyz.tolist()}, quat={self.quat.tolist()})"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PartialPose(Value):
+    """A target of which only some coordinates are given; the others stay as they are where the motion begins.
+
+    ::
+
+        arm.move(ha.lin(ha.PartialPose(z=0.3)))  # straight up or down to a height of 0.3 m
+
+    It is no pose: what it lacks is known once the arm is about to move. `ptp` and `lin` accept it.
+
+    Attributes:
+        x: translation along x of the frame of the target [m]; NaN: as where the motion begins, likewise the others.
+        y: along y [m].
+        z: along z [m].
+        a: KUKA's angle about z [rad]: R = Rz(a) Ry(b) Rx(c). Where b is a quarter turn, a kept c is 0, see `Pose.abc`.
+        b: about y [rad].
+        c: about x [rad].
+        frame: pose of the frame of these numbers in the frame of the target.
+
+    Raises:
+        LimitError: a number is infinite, an angle is more than a turn, or no number is given.
+    """
+
+    x: float = math.nan
+    y: float = math.nan
+    z: float = math.nan
+    a: float = math.nan
+    b: float = math.nan
+    c: float = math.nan
+    frame: Pose = field(default_factory=Pose.at)
+
+    def __post_init__(self) -> None:
+        check_pose(self.frame, "frame")
+        for name in "xyzabc":
+            value = scalar(getattr(self, name), name)
+            if not math.isnan(value):
+                value = finite(value, name, unit="m") if name in "xyz" else _angle(value, name)
+            object.__setattr__(self, name, value)
+        if np.isnan(self._given).all():
+            raise LimitError(
+                "a target must have one coordinate at least, got NaN for all six",
+                code=1,
+                parameter="x",
+                value=math.nan,
+                hint="NaN keeps a coordinate; check how it was computed",
+            )
+
+    @property
+    def _given(self) -> Array:
+        return np.array([getattr(self, name) for name in "xyzabc"])
+
+    def placed(self, frame: Pose) -> PartialPose:
+        """The same target in the frame in which `frame` is given."""
+        return replace(self, frame=frame @ self.frame)
+
+    def completed(self, start: Pose) -> Pose:
+        """The whole target of a motion.
+
+        Args:
+            start: where the motion begins, in the same frame as the target.
+        """
+        check_pose(start, "start")
+        here = self.frame.inverse() @ start
+        xyz = np.where(np.isnan(self._given[:3]), here.xyz, self._given[:3])
+        if np.isnan(self._given[3:]).all():
+            return Pose(self.frame.rotation @ xyz + self.frame.xyz, start.quat)
+        return self.frame @ Pose.xyz_abc(
+            *xyz, *np.where(np.isnan(self._given[3:]), here.abc, self._given[3:])
+        )
+
+
+def check_target(target: Pose | PartialPose) -> None:
+    """Refuse what is no target of a motion.
+
+    Raises:
+        ShapeError: it is neither a pose nor a partial one.
+    """
+    if not isinstance(target, PartialPose):
+        check_pose(target)
+
+
 def check_pose(pose: Pose, parameter: str = "pose") -> None:
     """Refuse what is no pose.
 
@@ -385,7 +464,15 @@ def check_pose(pose: Pose, parameter: str = "pose") -> None:
         )
 
 
-def given_in(frame: str | Pose, *poses: Pose) -> tuple[str, tuple[Pose, ...]]:
+_Target = TypeVar("_Target", Pose, PartialPose, Pose | PartialPose)
+
+
+def placed_target(frame: Pose, target: _Target) -> _Target:
+    """A target that is given in a frame, seen from where the frame is given."""
+    return target.placed(frame) if isinstance(target, PartialPose) else frame @ target
+
+
+def given_in(frame: str | Pose, *poses: _Target) -> tuple[str, tuple[_Target, ...]]:
     """The name of the frame that poses refer to, and the poses in it.
 
     Args:
@@ -397,7 +484,13 @@ def given_in(frame: str | Pose, *poses: Pose) -> tuple[str, tuple[Pose, ...]]:
     """
     if not isinstance(frame, Pose):
         return check_name(frame, "frame"), poses
-    return BASE, tuple(frame @ pose if isinstance(pose, Pose) else pose for pose in poses)
+    return BASE, tuple(
+        placed_target(frame, pose) if isinstance(pose, Pose | PartialPose) else pose for pose in poses
+    )
+
+
+def _angle(value: float, name: str) -> float:
+    return within(value, name, -_TURN, _TURN, unit="rad")
 
 
 def _turned(quat: list[float]) -> bool:

@@ -1368,15 +1368,22 @@ class ForceAbove:
     frame: str = ""
     threshold: float
     tolerance: float = nan
+    axes: Pose | None = None
 
-    def __init__(self, *, frame: str = "", threshold: float, tolerance: float = nan) -> None:
+    def __init__(self, *, frame: str = "", threshold: float, tolerance: float = nan, axes: Pose | None = None) -> None:
         _ForceAbove_frame(self, frame)
         _ForceAbove_threshold(self, threshold)
         _ForceAbove_tolerance(self, tolerance)
+        _ForceAbove_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
         out.append(_ForceAbove_0.pack(self.threshold, self.tolerance))
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.axes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ForceAbove, int]:
@@ -1385,15 +1392,21 @@ class ForceAbove:
         pos += _ForceAbove_0.size
         threshold = v[0]
         tolerance = v[1]
-        return cls(frame=frame, threshold=threshold, tolerance=tolerance), pos
+        present, pos = codec.read_flag(data, pos)
+        axes: Pose | None = None
+        if present:
+            axes, pos = Pose._read(data, pos)
+        return cls(frame=frame, threshold=threshold, tolerance=tolerance, axes=axes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
         codec.check(self.threshold, path + "threshold", 0.0, 1000.0, False, False)
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
+        if self.axes is not None:
+            self.axes._check(path + "axes.")
 
 
-_ForceAbove_frame, _ForceAbove_threshold, _ForceAbove_tolerance = codec.setters(ForceAbove)
+_ForceAbove_frame, _ForceAbove_threshold, _ForceAbove_tolerance, _ForceAbove_axes = codec.setters(ForceAbove)
 
 _NormalForceAbove_0 = Struct(">Bdd")
 
@@ -1408,16 +1421,23 @@ class NormalForceAbove:
     axis: Axis
     threshold: float
     tolerance: float = nan
+    axes: Pose | None = None
 
-    def __init__(self, *, frame: str = "", axis: Axis, threshold: float, tolerance: float = nan) -> None:
+    def __init__(self, *, frame: str = "", axis: Axis, threshold: float, tolerance: float = nan, axes: Pose | None = None) -> None:
         _NormalForceAbove_frame(self, frame)
         _NormalForceAbove_axis(self, axis)
         _NormalForceAbove_threshold(self, threshold)
         _NormalForceAbove_tolerance(self, tolerance)
+        _NormalForceAbove_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
         out.append(_NormalForceAbove_0.pack(self.axis, self.threshold, self.tolerance))
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.axes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[NormalForceAbove, int]:
@@ -1427,15 +1447,21 @@ class NormalForceAbove:
         axis = codec.read_enum(Axis, v[0])
         threshold = v[1]
         tolerance = v[2]
-        return cls(frame=frame, axis=axis, threshold=threshold, tolerance=tolerance), pos
+        present, pos = codec.read_flag(data, pos)
+        axes: Pose | None = None
+        if present:
+            axes, pos = Pose._read(data, pos)
+        return cls(frame=frame, axis=axis, threshold=threshold, tolerance=tolerance, axes=axes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
         codec.check(self.threshold, path + "threshold", 0.0, 1000.0, False, False)
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
+        if self.axes is not None:
+            self.axes._check(path + "axes.")
 
 
-_NormalForceAbove_frame, _NormalForceAbove_axis, _NormalForceAbove_threshold, _NormalForceAbove_tolerance = codec.setters(NormalForceAbove)
+_NormalForceAbove_frame, _NormalForceAbove_axis, _NormalForceAbove_threshold, _NormalForceAbove_tolerance, _NormalForceAbove_axes = codec.setters(NormalForceAbove)
 
 _ShearForceAbove_0 = Struct(">Bdd")
 
@@ -1450,16 +1476,23 @@ class ShearForceAbove:
     axis: Axis
     threshold: float
     tolerance: float = nan
+    axes: Pose | None = None
 
-    def __init__(self, *, frame: str = "", axis: Axis, threshold: float, tolerance: float = nan) -> None:
+    def __init__(self, *, frame: str = "", axis: Axis, threshold: float, tolerance: float = nan, axes: Pose | None = None) -> None:
         _ShearForceAbove_frame(self, frame)
         _ShearForceAbove_axis(self, axis)
         _ShearForceAbove_threshold(self, threshold)
         _ShearForceAbove_tolerance(self, tolerance)
+        _ShearForceAbove_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
         out.append(_ShearForceAbove_0.pack(self.axis, self.threshold, self.tolerance))
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.axes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ShearForceAbove, int]:
@@ -1469,15 +1502,21 @@ class ShearForceAbove:
         axis = codec.read_enum(Axis, v[0])
         threshold = v[1]
         tolerance = v[2]
-        return cls(frame=frame, axis=axis, threshold=threshold, tolerance=tolerance), pos
+        present, pos = codec.read_flag(data, pos)
+        axes: Pose | None = None
+        if present:
+            axes, pos = Pose._read(data, pos)
+        return cls(frame=frame, axis=axis, threshold=threshold, tolerance=tolerance, axes=axes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
         codec.check(self.threshold, path + "threshold", 0.0, 1000.0, False, False)
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
+        if self.axes is not None:
+            self.axes._check(path + "axes.")
 
 
-_ShearForceAbove_frame, _ShearForceAbove_axis, _ShearForceAbove_threshold, _ShearForceAbove_tolerance = codec.setters(ShearForceAbove)
+_ShearForceAbove_frame, _ShearForceAbove_axis, _ShearForceAbove_threshold, _ShearForceAbove_tolerance, _ShearForceAbove_axes = codec.setters(ShearForceAbove)
 
 _ForceOutside_0 = Struct(">Bddd")
 
@@ -1493,17 +1532,24 @@ class ForceOutside:
     low: float
     high: float
     tolerance: float = nan
+    axes: Pose | None = None
 
-    def __init__(self, *, frame: str = "", axis: Axis, low: float, high: float, tolerance: float = nan) -> None:
+    def __init__(self, *, frame: str = "", axis: Axis, low: float, high: float, tolerance: float = nan, axes: Pose | None = None) -> None:
         _ForceOutside_frame(self, frame)
         _ForceOutside_axis(self, axis)
         _ForceOutside_low(self, low)
         _ForceOutside_high(self, high)
         _ForceOutside_tolerance(self, tolerance)
+        _ForceOutside_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
         out.append(_ForceOutside_0.pack(self.axis, self.low, self.high, self.tolerance))
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.axes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ForceOutside, int]:
@@ -1514,16 +1560,22 @@ class ForceOutside:
         low = v[1]
         high = v[2]
         tolerance = v[3]
-        return cls(frame=frame, axis=axis, low=low, high=high, tolerance=tolerance), pos
+        present, pos = codec.read_flag(data, pos)
+        axes: Pose | None = None
+        if present:
+            axes, pos = Pose._read(data, pos)
+        return cls(frame=frame, axis=axis, low=low, high=high, tolerance=tolerance, axes=axes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
         codec.check(self.low, path + "low", -1000.0, 1000.0, False, False)
         codec.check(self.high, path + "high", -1000.0, 1000.0, False, False)
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
+        if self.axes is not None:
+            self.axes._check(path + "axes.")
 
 
-_ForceOutside_frame, _ForceOutside_axis, _ForceOutside_low, _ForceOutside_high, _ForceOutside_tolerance = codec.setters(ForceOutside)
+_ForceOutside_frame, _ForceOutside_axis, _ForceOutside_low, _ForceOutside_high, _ForceOutside_tolerance, _ForceOutside_axes = codec.setters(ForceOutside)
 
 _TorqueOutside_0 = Struct(">Bddd")
 
@@ -1539,17 +1591,24 @@ class TorqueOutside:
     low: float
     high: float
     tolerance: float = nan
+    axes: Pose | None = None
 
-    def __init__(self, *, frame: str = "", axis: Axis, low: float, high: float, tolerance: float = nan) -> None:
+    def __init__(self, *, frame: str = "", axis: Axis, low: float, high: float, tolerance: float = nan, axes: Pose | None = None) -> None:
         _TorqueOutside_frame(self, frame)
         _TorqueOutside_axis(self, axis)
         _TorqueOutside_low(self, low)
         _TorqueOutside_high(self, high)
         _TorqueOutside_tolerance(self, tolerance)
+        _TorqueOutside_axes(self, axes)
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.frame))
         out.append(_TorqueOutside_0.pack(self.axis, self.low, self.high, self.tolerance))
+        if self.axes is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.axes._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[TorqueOutside, int]:
@@ -1560,16 +1619,22 @@ class TorqueOutside:
         low = v[1]
         high = v[2]
         tolerance = v[3]
-        return cls(frame=frame, axis=axis, low=low, high=high, tolerance=tolerance), pos
+        present, pos = codec.read_flag(data, pos)
+        axes: Pose | None = None
+        if present:
+            axes, pos = Pose._read(data, pos)
+        return cls(frame=frame, axis=axis, low=low, high=high, tolerance=tolerance, axes=axes), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
         codec.check(self.low, path + "low", -1000.0, 1000.0, False, False)
         codec.check(self.high, path + "high", -1000.0, 1000.0, False, False)
         codec.check(self.tolerance, path + "tolerance", 0.0, 1000.0, True, True)
+        if self.axes is not None:
+            self.axes._check(path + "axes.")
 
 
-_TorqueOutside_frame, _TorqueOutside_axis, _TorqueOutside_low, _TorqueOutside_high, _TorqueOutside_tolerance = codec.setters(TorqueOutside)
+_TorqueOutside_frame, _TorqueOutside_axis, _TorqueOutside_low, _TorqueOutside_high, _TorqueOutside_tolerance, _TorqueOutside_axes = codec.setters(TorqueOutside)
 
 _JointTorqueOutside_0 = Struct(">Bdd")
 

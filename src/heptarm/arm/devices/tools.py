@@ -294,7 +294,7 @@ class Tooling:
         """Refuse conditions that name unknown frames; raises CommandRejected."""
         for index, part in enumerate(parts):
             axes = getattr(part, "frame", TOOL)
-            if axes != TOOL:
+            if isinstance(axes, str) and axes != TOOL:
                 self.check_reference(axes, f"until[{index}].frame")
 
     def check_mode(self, mode: Mode | None) -> None:

@@ -26,7 +26,7 @@ from heptarm.values.motion.motion import Hold, Motion, triggers_of
 from heptarm.values.motion.planned_path import Path
 from heptarm.values.motion.ptp import Ptp, PtpPose
 from heptarm.values.motion.spline import JointSpline, Segment, Spline
-from heptarm.values.pose import Pose
+from heptarm.values.pose import PartialPose, Pose
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
@@ -99,14 +99,15 @@ class _Place:
         return self.pose if self.moving == moving else None
 
 
-def _end(motion: PtpPose | Segment) -> Pose:
-    return motion.end if isinstance(motion, Circ) else motion.target
+def _end(motion: PtpPose | Segment) -> Pose | None:
+    end = motion.end if isinstance(motion, Circ) else motion.target
+    return end if isinstance(end, Pose) else None
 
 
 def resolved(
     connection: Connection, tooling: Tooling, motions: tuple[Motion, ...], start: Array | None = None
 ) -> tuple[Motion, ...]:
-    """The motions with numbers for what depends on the arm: poses in the base, and joints that a PTP keeps.
+    """The motions with numbers for what depends on the arm: poses in the base, and what stays as it is.
 
     Where the start of an arc is known, its points are checked.
 
@@ -117,13 +118,13 @@ def resolved(
         start: set-point when the first one starts, shape (7,) [rad]; None: the present one.
 
     Raises:
-        CommandRejected: a set-point is not known yet: another motion runs, or one to a pose or home comes before. Or
-            poses in no fixed frame, points of an arc that define no circle, or a path of another robot or that begins
-            elsewhere.
+        CommandRejected: a set-point is not known yet: another motion runs, or one to home, by an offset or, for joints,
+            to a pose comes before. Or poses in no fixed frame, points of an arc that define no circle, or a path of
+            another robot or that begins elsewhere.
         StaleState: the newest state is too old, or lacks the joints.
     """
     place = _Place(start)
-    if start is None and any(isinstance(motion, Ptp) and motion.keeps for motion in motions):
+    if start is None and any(map(_keeps, motions)):
         place = _Place(_rest(connection, connection.fresh()))
     elif start is None and any(isinstance(motion, Circ | Spline | Path) for motion in motions):
         newest = connection.newest()
@@ -132,8 +133,8 @@ def resolved(
     for index, motion in enumerate(motions):
         with inside(f"motions[{index}]" if len(motions) > 1 else ""):
             placed = in_base(motion, tooling.taught)
-            if isinstance(placed, Ptp) and placed.keeps:
-                placed = _with_kept(placed, place.q, index)
+            if _keeps(placed):
+                placed = _with_kept(placed, place, tooling, index)
             elif isinstance(placed, Circ | Spline):
                 _check_arcs(placed, place.seen(placed.moving, tooling))
             elif isinstance(placed, Path):
@@ -151,14 +152,28 @@ def _rest(connection: Connection, state: State) -> Array | None:
     return state.q_cmd
 
 
-def _with_kept(motion: Ptp, known: Array | None, index: int) -> Ptp:
-    if known is None:
-        raise CommandRejected(
-            f"motions[{index}] keeps joints (NaN) whose set-points are not known yet",
-            parameter="q",
-            hint="wait until the arm rests, or give all seven joints",
-        )
-    return replace(motion, q=np.where(np.isnan(motion.q), known, motion.q))
+def _keeps(motion: Motion) -> bool:
+    """Whether its target depends on where it begins: joints, or coordinates of a pose, stay."""
+    if isinstance(motion, PtpPose | Lin):
+        return isinstance(motion.target, PartialPose)
+    return isinstance(motion, Ptp) and motion.keeps
+
+
+def _with_kept(motion: Motion, place: _Place, tooling: Tooling, index: int) -> Motion:
+    if isinstance(motion, Ptp) and place.q is not None:
+        return replace(motion, q=np.where(np.isnan(motion.q), place.q, motion.q))
+    if isinstance(motion, PtpPose | Lin) and isinstance(motion.target, PartialPose):
+        start = place.seen(motion.moving, tooling)
+        if start is not None:
+            return replace(motion, target=motion.target.completed(start))
+    kept, whole = (
+        ("joints", "all seven joints") if isinstance(motion, Ptp) else ("coordinates", "a whole pose")
+    )
+    raise CommandRejected(
+        f"motions[{index}] keeps {kept} (NaN) whose set-points are not known yet",
+        parameter="q" if isinstance(motion, Ptp) else "target",
+        hint=f"wait until the arm rests, or give {whole}",
+    )
 
 
 def _check_path(path: Path, here: Array | None, robot: str) -> None:

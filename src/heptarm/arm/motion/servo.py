@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import partial
 from math import nan
@@ -15,6 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.arm.link.connection import Connection
+from heptarm.arm.motion.chunks import (
+    MOST_ACTIONS,
+    ActionPath,
+    ActionStream,
+    TakenChunk,
+    action_times,
+    actions,
+)
 from heptarm.arm.motion.clear import ClearTargets
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
@@ -26,6 +34,7 @@ from heptarm.errors import (
     ShapeError,
     Timeout,
     Unreachable,
+    inside,
 )
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.inverse_kinematics import solve
@@ -39,6 +48,7 @@ from heptarm.model.velocity import (
     blockage,
     resolved_pose,
 )
+from heptarm.record.journal import CORRECTION
 from heptarm.values.checks import Array, array, instance, shown, within, word
 from heptarm.values.clearance import ClearanceModel
 from heptarm.values.condition.condition import Condition, check_condition
@@ -385,6 +395,8 @@ _PATIENCE = 5.0
 #: Calls of `set` whose cost is kept for the statistics.
 _COSTS = 4096
 _DOUBLES = np.dtype(np.float64)
+#: Of a target to rest at.
+_STILL = (0.0,) * 7
 #: Of a straight servo motion: time between two looks for what slows it down, the time that one takes at most [ns], and
 #: that in which it would be at its target, where nothing slows it down any more [s].
 _LOOK, _LOOK_TIME, _ARRIVED = 50_000_000, 3_000_000, 0.01
@@ -715,7 +727,11 @@ class Servo(Block):
             self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
         self._terms, self._message = terms, terms.message
         if settings:
+            self._prepare_again()
             self._begin_again()
+
+    def _prepare_again(self) -> None:
+        """Forget what depends on the limits before."""
 
     def _check_may_change(self, limit: str) -> None:
         """Refuse a change of the limits of a stream that cannot begin again; `limit` is the name of one."""
@@ -771,13 +787,185 @@ class Servo(Block):
         )
 
 
-class JointServo(Servo):
-    """A stream of joint positions."""
+class TargetServo(Servo):
+    """A stream of targets that the joints follow, one by one or in chunks; its subclasses define what a target is."""
 
     def __init__(self, connection: Connection, terms: StreamTerms) -> None:
         super().__init__(connection, terms)
         self._low, self._high = connection.robot.q_min.tolist(), connection.robot.q_max.tolist()
         self._newest: Array | None = None
+        self._newest_speed: Sequence[float] = _STILL
+        self._actions: ActionStream | None = None
+        self._is_corrected = False
+
+    def close(self) -> None:
+        """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
+        if self._actions is not None:
+            self._actions.close()
+        self._correct(is_on=False)
+        super().close()
+        if self._actions is not None:
+            self._actions.raise_failure()
+
+    def _prepare_again(self) -> None:
+        if self._actions is not None:
+            self._actions.close()
+            self._actions = None
+
+    def correct(self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None) -> Array:
+        """Send a person's target while a policy's chunks wait: `set`, and recordings flag the time as corrected.
+
+        The correction ends with the next `follow`, `hold` or `set`.
+
+        Args:
+            q: joint positions, shape (7,) [rad]; clipped as by `JointServo.set`.
+            dq: velocity at the target, shape (7,) [rad/s]; None: come to rest there.
+
+        Returns:
+            The positions sent, shape (7,) [rad].
+
+        Raises:
+            ShapeError: not seven numbers.
+            LimitError: one is not finite; OutsideWorkspace if `arm.workspace` refuses the target.
+            CollisionForeseen: bodies of `keep_clear_of` are too near; the last good target was sent again.
+            CommandRejected: a velocity for the engine "direct", or a straight servo motion.
+        """
+        self._refuse_lines()
+        if self._actions is not None:
+            self._actions.leave()
+        self._correct(is_on=True)
+        return self._joint_target(q, dq)
+
+    @property
+    def target(self) -> tuple[Array, Array]:
+        """The newest target: joint positions and their velocity, shape (7,) each [rad, rad/s]."""
+        return (self._here() if self._newest is None else self._newest), np.array(self._newest_speed)
+
+    def _here(self) -> Array:
+        """Joint positions from which the first target goes on, shape (7,) [rad]."""
+        return self.start.q  # raises unless it has begun
+
+    def _joint_target(self, q: npt.ArrayLike, dq: npt.ArrayLike | None) -> Array:
+        """Send joint positions and their velocity; see `JointServo.set`."""
+        began = self._clock.nanos()
+        if dq is not None and self._message.engine is wire.ServoEngine.DIRECT:
+            raise CommandRejected(
+                'the engine "direct" takes no velocity: the following targets define it',
+                parameter="dq",
+                hint='leave dq out, or use engine="smart"',
+            )
+        clamped = self._clamped
+        sent, target = self._clip(q)
+        if self._boundary is not None:
+            sent = self._inside_joints(sent, self._boundary)
+            if sent.tolist() != target:
+                self._clamped = clamped + 1
+                dq = None if dq is None else np.zeros(7)  # it comes to rest at the wall
+            target = sent.tolist()
+        velocity = [] if dq is None else array(dq, 7, "dq").tolist()
+        if self._clear is not None and self._active:
+            try:
+                self._clear.check(sent, parameter="q")
+            except CollisionForeseen:
+                self._newest = self._clear.q
+                self._send(began, wire.ServoJoints, self._newest.tolist())
+                raise
+        self._newest, self._newest_speed = sent, velocity or _STILL
+        self._send(began, wire.ServoJoints if dq is None else wire.ServoJointsVelocity, target + velocity)
+        return sent
+
+    def _clip(self, q: npt.ArrayLike) -> tuple[Array, list[float]]:
+        """Clip joint positions to the limits; returns them as an array and as a list."""
+        # with cold caches the number of different functions counts more than the number of calls
+        if not (type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,)):
+            q = array(q, 7, "q")
+        sent = q.copy()
+        target = sent.tolist()
+        if not (all(map(le, self._low, target)) and all(map(le, target, self._high))):  # nor is NaN
+            sent = array(sent, 7, "q").clip(self._low, self._high)
+            target = sent.tolist()
+            self._clamped += 1
+        return sent, target
+
+    def _inside_joints(self, q: Array, boundary: Boundary) -> Array:
+        """The target inside the workspace.
+
+        Raises:
+            OutsideWorkspace: it is outside, and such targets are refused.
+        """
+        last = self._here() if self._newest is None else self._newest
+        if boundary.refuses and boundary.excess(q) > max(boundary.excess(last), TOLERANCE):
+            raise boundary.refusal(q, "the target", parameter="q")
+        return boundary.clamped(q, last)
+
+    def hold(self) -> None:
+        """Brake and rest until the next `follow`, `set` or `correct`; a thread keeps sending meanwhile.
+
+        A program may then take its time, as for the first chunk of a policy, and the watchdog does not stop the arm.
+
+        Raises:
+            CommandRejected: a straight servo motion.
+        """
+        newest, speed = self.target  # raises unless it has begun
+        self._action_stream(newest).brake(newest, speed * self._connection.real_time_factor)
+        self._correct(is_on=False)
+
+    def _follow_actions(self, q: Array, times: Array) -> TakenChunk:
+        """Follow joint positions, shape (n, 7) [rad], at times of `t` [s]; see `JointServo.follow`."""
+        newest, speed = self.target  # raises unless it has begun
+        last = newest, speed * self._connection.real_time_factor
+        taken = self._action_stream(newest).take(times, q, last=last)
+        self._correct(is_on=False)
+        return taken
+
+    def _action_stream(self, here: Array) -> ActionStream:
+        """The thread that follows actions; made where the arm is, shape (7,) [rad]."""
+        self._refuse_lines()
+        if self._actions is None:
+            robot, rate = self._connection.robot, self._connection.real_time_factor
+            acceleration = self._message.acceleration
+            path = ActionPath(
+                here,
+                speed=self._message.velocity * rate * robot.dq_max,
+                acceleration=acceleration * rate**2 * robot.ddq_max,
+                jerk=acceleration * rate**3 * robot.dddq_max,
+            )
+            is_direct = self._message.engine is wire.ServoEngine.DIRECT
+            self._actions = ActionStream(
+                path,
+                lambda q, dq: self._joint_target(q, None if is_direct else dq / rate),
+                time=lambda: self.t,
+                clock=self._clock,
+                period=self.period,
+                ahead=self._message.timing.min_trajectory_time,
+            )
+        return self._actions
+
+    def _refuse_lines(self) -> None:
+        """Refuse joint positions for a straight servo motion."""
+        if self._message.engine is wire.ServoEngine.LIN:
+            raise CommandRejected(
+                'arm.servo("lin") takes poses by set alone',
+                parameter="chunk",
+                hint='use arm.servo("pose"), whose poses are followed by the joints',
+            )
+
+    def _leave_chunks(self) -> None:
+        """Stop following chunks: the program sets targets itself, and corrects nothing."""
+        if self._actions is not None:
+            self._actions.leave()
+        if self._is_corrected:
+            self._correct(is_on=False)
+
+    def _correct(self, *, is_on: bool) -> None:
+        """Note in the journal where a person's correction begins and ends."""
+        if is_on != self._is_corrected:
+            self._is_corrected = is_on
+            self._connection.journal.add(CORRECTION, "begins" if is_on else "ends")
+
+
+class JointServo(TargetServo):
+    """A stream of joint positions."""
 
     def __enter__(self) -> JointServo:
         """Begin; see `Servo.__enter__`."""
@@ -800,59 +988,39 @@ class JointServo(Servo):
             CollisionForeseen: bodies of `keep_clear_of` are too near; the last good target was sent again, to rest at.
             CommandRejected: a velocity for the engine "direct", which takes none.
         """
-        began = self._clock.nanos()
-        if dq is not None and self._message.engine is wire.ServoEngine.DIRECT:
-            raise CommandRejected(
-                'the engine "direct" takes no velocity: the following targets define it',
-                parameter="dq",
-                hint='leave dq out, or use engine="smart"',
-            )
-        clamped = self._clamped
-        sent, target = self._clip(q)
-        if self._boundary is not None:
-            sent = self._inside(sent, self._boundary)
-            if sent.tolist() != target:
-                self._clamped = clamped + 1
-                dq = None if dq is None else np.zeros(7)  # it comes to rest at the wall
-            target = sent.tolist()
-        velocity = [] if dq is None else array(dq, 7, "dq").tolist()
-        if self._clear is not None and self._active:
-            try:
-                self._clear.check(sent, parameter="q")
-            except CollisionForeseen:
-                self._newest = self._clear.q
-                self._send(began, wire.ServoJoints, self._newest.tolist())
-                raise
-        self._newest = sent
-        self._send(began, wire.ServoJoints if dq is None else wire.ServoJointsVelocity, target + velocity)
-        return sent
+        if self._actions is not None or self._is_corrected:
+            self._leave_chunks()
+        return self._joint_target(q, dq)
 
-    def _clip(self, q: npt.ArrayLike) -> tuple[Array, list[float]]:
-        """Clip joint positions to the limits; returns them as an array and as a list."""
-        # with cold caches the number of different functions counts more than the number of calls
-        if not (type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,)):
-            q = array(q, 7, "q")
-        sent = q.copy()
-        target = sent.tolist()
-        if not (all(map(le, self._low, target)) and all(map(le, target, self._high))):  # nor is NaN
-            sent = array(sent, 7, "q").clip(self._low, self._high)
-            target = sent.tolist()
-            self._clamped += 1
-        return sent, target
+    def follow(self, chunk: npt.ArrayLike, *, at: npt.ArrayLike, rate: float | None = None) -> TakenChunk:
+        """Follow actions with time stamps, as a policy predicts them; a thread sends the targets.
 
-    def _inside(self, q: Array, boundary: Boundary) -> Array:
-        """The target inside the workspace.
+        The chunk replaces what is left of the last one, however late it comes: actions whose time has passed are left
+        out, and the path changes to the new actions without a stop, within the limits of the joints. Between two
+        actions it is a cubic spline. Actions that the joints cannot follow are smoothed as little as possible. Behind
+        the last action the arm brakes and rests. `set` and `correct` take over, and the next chunk begins there.
+
+        Args:
+            chunk: joint positions, shape (n, 7) [rad].
+            at: time of the first action on the clock of `t`, or of each, shape (n,) [s].
+            rate: actions per second, where `at` is one time [Hz]; None: that of the servo motion.
+
+        Returns:
+            From when on it is followed, how many actions were late, how long the change takes.
 
         Raises:
-            OutsideWorkspace: it is outside, and such targets are refused.
+            ShapeError: other shapes.
+            LimitError: a number that is not finite, times that do not ascend; all actions are late; or not even the
+                smoothed actions are within `speed` and `acceleration`. The last chunk goes on then.
+            CollisionForeseen: bodies of `keep_clear_of` were too near for a target of the last chunk, or
+                OutsideWorkspace: `arm.workspace` refused it. The arm rests before it.
         """
-        last = self.start.q if self._newest is None else self._newest
-        if boundary.refuses and boundary.excess(q) > max(boundary.excess(last), TOLERANCE):
-            raise boundary.refusal(q, "the target", parameter="q")
-        return boundary.clamped(q, last)
+        q = actions(chunk)
+        times = action_times(at, len(q), rate=1.0 / self.period if rate is None else rate)
+        return self._follow_actions(q, times)
 
 
-class PoseServo(Servo):
+class PoseServo(TargetServo):
     """A stream of poses of the motion frame in the base, followed by the joints."""
 
     def __init__(
@@ -897,6 +1065,10 @@ class PoseServo(Servo):
         """
         began = self._clock.nanos()
         check_pose(pose)
+        if self._actions is not None or self._is_corrected:
+            self._leave_chunks()
+            if self._newest is not None:  # chunks or corrections were followed until now
+                self._q, self._newest, self._newest_speed = self._newest, None, _STILL
         if not self._active:
             _ = self.start  # raises unless it has begun
             return pose
@@ -905,6 +1077,47 @@ class PoseServo(Servo):
         finally:
             self._follow(began)
         return self._pose
+
+    def follow(self, chunk: Sequence[Pose], *, at: npt.ArrayLike, rate: float | None = None) -> TakenChunk:
+        """Follow poses with time stamps, as a policy predicts them; see `JointServo.follow`.
+
+        The joints follow a smooth path through the solutions of the poses, with the elbow as `elbow` or `posture`
+        states; between the poses the motion frame is on no exact line.
+
+        Args:
+            chunk: poses of the motion frame in the base.
+            at: time of the first one on the clock of `t`, or of each, shape (n,) [s].
+            rate: poses per second, where `at` is one time [Hz]; None: that of the servo motion.
+
+        Raises:
+            ShapeError: not poses, or another number of times.
+            Unreachable: a pose has no joint positions; its index is in the text. The last chunk goes on.
+            LimitError: as `JointServo.follow`.
+        """
+        if isinstance(chunk, Pose) or not 1 <= len(chunk) <= MOST_ACTIONS:
+            raise ShapeError(
+                f"chunk must have 1 to {MOST_ACTIONS} poses, got {shown(chunk)}",
+                parameter="chunk",
+                value=chunk,
+            )
+        for index, pose in enumerate(chunk):
+            check_pose(pose, f"chunk[{index}]")
+        times = action_times(at, len(chunk), rate=1.0 / self.period if rate is None else rate)
+        self._refuse_lines()
+        rows, kept = [], self._q
+        self._q = self.target[0]
+        try:
+            for index, pose in enumerate(chunk):
+                with inside(f"chunk[{index}]"):
+                    self._q = self._joints(pose)
+                rows.append(self._q)
+        finally:
+            self._q = kept
+        return self._follow_actions(np.array(rows), times)
+
+    def _here(self) -> Array:
+        _ = self.start  # raises unless it has begun
+        return self._q
 
     def _follow(self, began: int) -> None:
         """Send the last good target."""

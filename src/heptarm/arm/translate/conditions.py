@@ -8,7 +8,9 @@ from typing import Any
 from heptarm.arm.translate.fields import NAMES, message_of
 from heptarm.values.condition.condition import AllOf, AnyOf, Condition, check_condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction, Retreat, check_reaction
+from heptarm.values.frames import BASE
 from heptarm.values.io import Signal, find_signal
+from heptarm.values.pose import Pose
 from heptarm.wire import messages as wire
 
 
@@ -47,6 +49,8 @@ def _node(node: Condition, signals: Sequence[Signal]) -> Any:
     given: dict[str, object] = {}
     if isinstance(node, AllOf | AnyOf):
         given["n"] = len(node.parts)
+    if isinstance(frame := getattr(node, "frame", None), Pose):
+        given |= {"frame": BASE, "axes": message_of(wire.Pose, frame)}
     if hasattr(node, "signal"):
         given["signal"] = find_signal(node.signal, signals).name
     return message_of(NAMES[type(node).__name__], node, **given)

@@ -9,8 +9,7 @@ import numpy as np
 
 from heptarm.errors import MissingExtra
 from heptarm.rl.sim import simulation
-from heptarm.rl.sim.episodes import ALL, Index, TaskBatch
-from heptarm.rl.sim.randomisation import NONE, Randomisation
+from heptarm.rl.sim.episodes import ALL, BatchSettings, Index, TaskBatch
 from heptarm.rl.task import ReachTask
 from heptarm.values.checks import Array
 
@@ -102,15 +101,10 @@ class BatchReach(TaskBatch):
 
     Args:
         task: the task.
-        envs: number of arms.
-        randomisation: what differs between them.
-        seed: of everything drawn.
-        threads: of the simulation.
-        starts: "staggered" or "together", see `TaskBatch`.
+        settings: how many arms, and what differs between them.
         engine: class of the simulation, `Engine` or one with its methods.
 
     Raises:
-        LimitError: no arms, or no threads.
         MissingExtra: the installed MuJoCo is too old.
     """
 
@@ -119,24 +113,14 @@ class BatchReach(TaskBatch):
     def __init__(
         self,
         task: ReachTask,
+        settings: BatchSettings | None = None,
         *,
-        envs: int = 512,
-        randomisation: Randomisation = NONE,
-        seed: int | np.random.SeedSequence = 0,
-        threads: int = 2,
-        starts: str = "staggered",
         engine: Any = Engine,
     ) -> None:
-        super().__init__(
-            task,
-            envs=envs,
-            randomisation=randomisation,
-            seed=seed,
-            threads=threads,
-            starts=starts,
-            sizes=(3, 7),
-        )
-        self.engine = engine(task, envs=envs, threads=threads)
+        chosen = settings or BatchSettings()
+        envs, randomisation = chosen.envs, chosen.randomisation
+        super().__init__(task, chosen, sizes=(3, 7))
+        self.engine = engine(task, envs=envs, threads=chosen.threads)
         if randomisation.payload[1] > 0:
             self.engine.payload(randomisation.draw_payload(self._random, envs))
         if simulation.is_compliant(randomisation.stiffness):

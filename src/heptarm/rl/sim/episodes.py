@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.rl.sim.randomisation import Randomisation
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.tasks import Task
-from heptarm.values.checks import Array
+from heptarm.values.checks import Array, instance, integer, word
 
 #: Numbers of arms.
 Index: TypeAlias = npt.NDArray[np.integer[Any]]
+#: Most arms, and threads.
+_MANY = 1_000_000
+_LARGEST_SEED = 2**63 - 1
 #: Selects every arm without a copy.
 ALL = slice(None)
 
@@ -45,6 +48,39 @@ class Step:
     final: Array
 
 
+@dataclass(frozen=True, slots=True)
+class BatchSettings:
+    """Settings of many simulated arms, of any task.
+
+    Attributes:
+        envs: number of arms.
+        randomisation: what differs between them.
+        seed: of everything drawn; the same seed gives the same run.
+        threads: of the simulation.
+        starts: "staggered": the first episodes begin somewhere in their time, so that not all end together;
+            "together": all begin at 0.
+
+    Raises:
+        LimitError: no arms, or no threads.
+        CommandRejected: other starts.
+    """
+
+    _: KW_ONLY
+    envs: int = 256
+    randomisation: Randomisation = NONE
+    seed: int | np.random.SeedSequence = 0
+    threads: int = 2
+    starts: str = "staggered"
+
+    def __post_init__(self) -> None:
+        instance(self.randomisation, Randomisation, "randomisation")
+        for name in ("envs", "threads"):
+            integer(getattr(self, name), name, 1, _MANY)
+        if not isinstance(self.seed, np.random.SeedSequence):
+            integer(self.seed, "seed", 0, _LARGEST_SEED)
+        word(self.starts, "starts", ("staggered", "together"))
+
+
 class TaskBatch(ABC):
     """A task on many simulated arms; episodes that end restart by themselves.
 
@@ -53,50 +89,25 @@ class TaskBatch(ABC):
 
     Args:
         task: the task.
-        envs: number of arms.
-        randomisation: what differs between them.
-        seed: of everything drawn; the same seed gives the same run.
-        threads: of the simulation.
-        starts: "staggered": the first episodes begin somewhere in their time, so that not all end together;
-            "together": all begin at 0.
+        settings: how many arms, and what differs between them.
         sizes: of a target and of a command.
 
     Attributes:
         target: what the episodes are about, shape (envs, n), as the task draws it.
         command: the last one of each arm, shape (envs, n).
         age: decisions since an episode began, shape (envs,).
-
-    Raises:
-        LimitError: no arms, or no threads.
-        CommandRejected: other starts.
     """
 
     task: Task
 
-    def __init__(
-        self,
-        task: Task,
-        *,
-        envs: int,
-        randomisation: Randomisation,
-        seed: int | np.random.SeedSequence,
-        threads: int,
-        starts: str,
-        sizes: tuple[int, int],
-    ) -> None:
-        for name, value in (("envs", envs), ("threads", threads)):
-            if value < 1:
-                raise LimitError(
-                    f"{name} must be at least 1, got {value}", code=2, parameter=name, value=value
-                )
-        if starts not in ("staggered", "together"):
-            raise CommandRejected(f"starts must be 'staggered' or 'together', got {starts!r}", value=starts)
+    def __init__(self, task: Task, settings: BatchSettings, *, sizes: tuple[int, int]) -> None:
+        envs, randomisation = settings.envs, settings.randomisation
         self.task, self.envs, self.randomisation = task, envs, randomisation
         self.target, self.command = (np.zeros((envs, size)) for size in sizes)
         self.age = np.zeros(envs, dtype=np.int64)
-        self._random = np.random.default_rng(seed)
+        self._random = np.random.default_rng(settings.seed)
         self._all = np.arange(envs)
-        self._staggered = starts == "staggered"
+        self._staggered = settings.starts == "staggered"
         self._latency = np.zeros(envs, dtype=np.int64)
         # commands, the newest first
         self._late = np.zeros((randomisation.latency[1] + 1, *self.command.shape))
@@ -177,7 +188,7 @@ class TaskBatch(ABC):
         task, random, count = self.task, self._random, len(which)
         starts, drawn = task.starts(random, count), task.targets(random, count)
         self.target[which] = drawn if targets is None else targets
-        self.command[which] = self._late[:, which] = starts
+        self.command[which] = self._late[:, which] = task.begin(starts)
         self.age[which] = 0
         self._latency[which] = self.randomisation.draw_latency(random, count)
         self._place(which, starts)

@@ -5,23 +5,31 @@ from __future__ import annotations
 from typing import Any
 
 from heptarm.errors import CommandRejected
-from heptarm.rl.peg import PegInHole
 from heptarm.rl.sim.batch import BatchReach, Engine
-from heptarm.rl.sim.episodes import TaskBatch
-from heptarm.rl.sim.peg_batch import BatchPeg
+from heptarm.rl.sim.contact_batch import BatchContact
+from heptarm.rl.sim.episodes import BatchSettings, TaskBatch
+from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import Task
 
 
-def simulate(task: Task, *, engine: Any = Engine, reveal: bool = False, **given: Any) -> TaskBatch:
-    """Many simulated arms in a task; the arguments are those of its class.
+def simulate(
+    task: Task, settings: BatchSettings | None = None, *, engine: Any = Engine, reveal: bool = False
+) -> TaskBatch:
+    """Many simulated arms in a task.
+
+    Args:
+        task: the task.
+        settings: how many, and what differs between them.
+        engine: class of the simulation's engine.
+        reveal: whether observations end with what only the value network of a training sees.
 
     Raises:
         CommandRejected: another engine than MuJoCo on the processor, for a task with contacts.
     """
-    if not isinstance(task, PegInHole):
-        return BatchReach(task, engine=engine, **given)
+    if isinstance(task, ReachTask):
+        return BatchReach(task, settings, engine=engine)
     if engine is not Engine:
         raise CommandRejected(
             f"{task.name} is simulated by MuJoCo on the processor alone", parameter="engine"
         )
-    return BatchPeg(task, reveal=reveal, **given)
+    return BatchContact(task, settings, reveal=reveal)

@@ -9,15 +9,15 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, require
 from heptarm.rl.env import action_space, observation_space
-from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.episodes import TaskBatch
 
 require("stable_baselines3", extra="rl")
 
 from stable_baselines3.common.vec_env import VecEnv  # noqa: E402  after the check that it is there
 
 
-class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not looked into
-    """Many simulated robots in the reach task.
+class VectorArms(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not looked into
+    """Many simulated robots in a task.
 
     Args:
         arms: the simulation.
@@ -26,7 +26,7 @@ class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not loo
         MissingExtra: Stable-Baselines3 is not installed.
     """
 
-    def __init__(self, arms: BatchReach) -> None:
+    def __init__(self, arms: TaskBatch) -> None:
         self.arms = arms
         self._action: Any = None
         self.render_mode = None

@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY, asdict, dataclass, field
 from typing import Any
 
 from heptarm.errors import LimitError
-from heptarm.rl.peg import PegInHole
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import Task, task_from_dict
@@ -14,8 +14,8 @@ from heptarm.rl.train import ppo
 
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
-#: Likewise of the peg-in-hole task.
-_PEG_STEPS = 1_200_000
+#: Likewise of a task with contacts.
+_CONTACT_STEPS = 1_200_000
 #: Names of settings in checkpoints that were made before the settings had the names of the literature.
 _OLDER = {
     "rate": "learning_rate",
@@ -27,11 +27,11 @@ _OLDER = {
     "gradient": "max_grad_norm",
     "entropy": "entropy_coef",
 }
-#: Robots, environment steps with the teacher, and algorithm of the peg-in-hole task. The noise is small from the
+#: Robots, environment steps with the teacher, and algorithm of tasks with contacts. The noise is small from the
 #: beginning: the teacher has shown what to try.
-PEG = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
-PEG_TAUGHT = 100_000
-PEG_SETTINGS = ppo.PpoSettings(
+LATE = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
+TAUGHT = 100_000
+CONTACT_SETTINGS = ppo.PpoSettings(
     envs=256,
     horizon=16,
     gamma=0.97,
@@ -53,7 +53,7 @@ class Recipe:
         task: the task.
         steps: environment steps, of all workers; rounded up to whole updates; 0: `STEPS`.
         taught: of these steps so many, at the beginning, imitate the task's teacher; then rewards take over. Only tasks
-            with a teacher, see `PegInHole.teach`.
+            with a teacher, see `ContactTask.teach`.
         seed: of networks, simulation and shuffling.
         randomisation: what differs between the simulated robots.
         settings: numbers of the algorithm.
@@ -69,11 +69,11 @@ class Recipe:
 
     def __post_init__(self) -> None:
         if self.steps == 0:
-            enough = _PEG_STEPS if isinstance(self.task, PegInHole) else STEPS[self.task.feature]
+            enough = _CONTACT_STEPS if isinstance(self.task, ContactTask) else STEPS[self.task.feature]
             object.__setattr__(self, "steps", enough)
         if self.steps < 1:
             raise LimitError(f"steps must be at least 1, got {self.steps}", code=2, parameter="steps")
-        if self.taught and not isinstance(self.task, PegInHole):
+        if self.taught and not self.task.has_teacher:
             raise LimitError(
                 f"taught must be 0 for a task without a teacher, got {self.taught}",
                 code=2,
@@ -91,8 +91,9 @@ class Recipe:
     @classmethod
     def of(cls, task: Task, *, seed: int = 0) -> Recipe:
         """The settings that suit a task."""
-        if isinstance(task, PegInHole):
-            return cls(task, taught=PEG_TAUGHT, seed=seed, randomisation=PEG, settings=PEG_SETTINGS)
+        if isinstance(task, ContactTask):
+            taught = TAUGHT if task.has_teacher else 0
+            return cls(task, taught=taught, seed=seed, randomisation=LATE, settings=CONTACT_SETTINGS)
         return cls(task, seed=seed)
 
     def as_dict(self) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
 from heptarm.rl.policy import Policy
 from heptarm.rl.sim.batch import Engine
+from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.simulate import simulate
 from heptarm.values.checks import flag
 from heptarm.values.files import refuse_existing
@@ -137,10 +138,9 @@ class Training:
         )
         self.arms = simulate(
             task,
-            envs=settings.envs,
-            randomisation=recipe.randomisation,
-            seed=seeds,
-            threads=threads,
+            BatchSettings(
+                envs=settings.envs, randomisation=recipe.randomisation, seed=seeds, threads=threads
+            ),
             engine=engine,
             reveal=True,
         )

@@ -80,12 +80,12 @@ def move_pose(context: NodeContext, goal: Any) -> GoalWork:
         how["speed_mps"] = goal.speed_mps
     if goal.path == motions.LIN_REL:
         return _move(context, goal, motions.offset(goal.pose, how))
-    pose = motions.stamped_pose(goal.pose, context.driver)
     if goal.path == motions.PTP:
-        return _move(context, goal, ptp(pose, moving=moving))
+        return _move(context, goal, ptp(motions.target_of(goal.pose, context.driver), moving=moving))
     if goal.path == motions.LIN:
-        return _move(context, goal, lin(pose, **how))
+        return _move(context, goal, lin(motions.target_of(goal.pose, context.driver), **how))
     if goal.path == motions.CIRC:
+        pose = motions.stamped_pose(goal.pose, context.driver)
         return _move(context, goal, circ(motions.stamped_pose(goal.via, context.driver), pose, **how))
     raise CommandRejected(
         f"path must be 0 (PTP), 1 (LIN), 2 (CIRC) or 3 (LIN_REL), got {goal.path}",

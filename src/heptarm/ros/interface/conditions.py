@@ -1,6 +1,6 @@
 """Conditions as texts, with the names of heptarm.when: `(force.along('z') > 15) | io.user_button`.
 
-A text is parsed, never executed: it may contain signals, comparisons, and & | ^ ~.
+A text is parsed, never executed: it may contain signals, comparisons, & | ^ ~, and `Pose.xyz_abc(...)` as a frame.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.force import Component, Force, Torque, force, torque
 from heptarm.values.condition.reaction import Reaction, Retreat, check_reaction
 from heptarm.values.condition.signals import IoSignals, Path, SignalIs, io, path
+from heptarm.values.pose import Pose
 
 #: Most characters of a text.
 _LONGEST = 2000
@@ -142,6 +143,8 @@ def _call(node: ast.Call) -> Any:
             return abs(given[0])
     elif isinstance(called, ast.Name) and called.id in ("force", "torque"):
         return (force if called.id == "force" else torque)(*given, **named)
+    elif ast.unparse(called) == "Pose.xyz_abc":
+        return Pose.xyz_abc(*given, **named)
     elif isinstance(called, ast.Attribute):
         whole = _value(called.value)
         if called.attr in _METHODS.get(type(whole), ()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, isnan, nan
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from heptarm.values.motion.line import LinRel, lin, lin_rel
 from heptarm.values.motion.motion import Motion, hold
 from heptarm.values.motion.ptp import ptp, ptp_home
 from heptarm.values.motion.spline import Segment, spl, spline, spline_joints
-from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.pose import PartialPose, Pose, Redundancy
 
 
 def positions(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Array:
@@ -144,6 +144,28 @@ def stamped_pose(message: Any, driver: Driver) -> Pose:
     return pose if frame is None else frame @ pose
 
 
+def target_of(message: Any, driver: Driver) -> Pose | PartialPose:
+    """Convert a geometry_msgs/PoseStamped to the target of a PTP or a LIN.
+
+    A NaN keeps a coordinate of the position where the motion begins, four NaN keep the orientation.
+
+    Args:
+        message: the message; in the base, or in a taught frame of the project.
+        driver: of the arm.
+
+    Raises:
+        ShapeError: it is in another frame, or its quaternion is not a rotation.
+    """
+    place, turn = message.pose.position, message.pose.orientation
+    xyz, quat = (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
+    is_turn_kept = all(map(isnan, quat))
+    if not is_turn_kept and not any(map(isnan, xyz)):
+        return stamped_pose(message, driver)
+    target = PartialPose(*xyz, *((nan,) * 3 if is_turn_kept else Pose.of((0, 0, 0), quat).abc.tolist()))
+    frame = frame_in_base(message.header, driver)
+    return target if frame is None else target.placed(frame)
+
+
 def frame_in_base(header: Any, driver: Driver) -> Pose | None:
     """Pose in the base of the frame that a header names; None: it is the base itself.
 
@@ -229,13 +251,12 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
     if len(message.redundancy):
         near["redundancy"] = _redundancy(message.redundancy)
     if kind == PTP:
-        target = stamped_pose(message.pose, driver)
-        return ptp(target, moving=moving, **near, **plain, **blending)
+        return ptp(target_of(message.pose, driver), moving=moving, **near, **plain, **blending)
     how: dict[str, Any] = {**_given(message, _PATH), **joints, **blending, "moving": moving}
     if message.orientation:
         how["orientation"] = message.orientation
     if kind == LIN:
-        return lin(stamped_pose(message.pose, driver), **near, **how)
+        return lin(target_of(message.pose, driver), **near, **how)
     if kind == CIRC:
         via, frame = pose_of(message.via), frame_in_base(message.pose.header, driver)
         return circ(via if frame is None else frame @ via, stamped_pose(message.pose, driver), **near, **how)

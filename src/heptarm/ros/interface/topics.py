@@ -21,6 +21,7 @@ from heptarm.ros.interface.motions import (
     partial_joints,
     positions,
     stamped_pose,
+    target_of,
     velocities,
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
@@ -105,12 +106,12 @@ def command_joint(context: NodeContext, message: Any) -> None:
 
 def command_pose(context: NodeContext, message: Any) -> None:
     """Move to a geometry_msgs/PoseStamped."""
-    context.driver.start(ptp(stamped_pose(message, context.driver)))
+    context.driver.start(ptp(target_of(message, context.driver)))
 
 
 def command_lin(context: NodeContext, message: Any) -> None:
     """Move on a straight line to a geometry_msgs/PoseStamped."""
-    context.driver.start(lin(stamped_pose(message, context.driver)))
+    context.driver.start(lin(target_of(message, context.driver)))
 
 
 def joint_trajectory(context: NodeContext, message: Any, sent: PublishInfo) -> None:

@@ -657,7 +657,9 @@ class Interpolator:
         is_hold = isinstance(run.plan.motion, Hold)
         if self.action is not None and is_hold and not (run.cancelled or run.failure):
             run.phase = "overlaid"
-            self._command.after = self._held(run) if self.action.is_missing else self._overlaid(run, self.action)
+            self._command.after = (
+                self._held(run) if self.action.is_missing else self._overlaid(run, self.action)
+            )
             return 0.0, nan
         if run.phase == "overlaid":
             if not self._control.is_stiff:  # the spring that torques have wound would throw the arm

@@ -417,7 +417,7 @@ class Controller:
             return Superposition(q)
         if set_point.age <= max(COAST, 2 * self.configuration.receive_ms):
             return Superposition(q, self._tau, self._wrench)
-        set_point.stay(np.array(reading.q_cmd))  # the load would push forever
+        set_point.stay(np.array(reading.q))  # the load would push forever
         return Superposition(q, is_missing=True)
 
     def _end(self, cause: str, text: str) -> None:

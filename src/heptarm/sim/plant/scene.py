@@ -122,9 +122,8 @@ class Scene:
         if self.path.parent == FOLDER:
             return mujoco.MjSpec.from_file(str(self.path))
         _check_numbers(self.path)
-        ready = {path.name: path.read_bytes() for path in FOLDER.glob(f"*{_SUFFIX}")}
         try:
-            return mujoco.MjSpec.from_file(str(self.path), include=ready)
+            return mujoco.MjSpec.from_file(str(self.path), include=_ready())
         except (ValueError, mujoco.FatalError) as error:
             raise self.unreadable(error) from None
 
@@ -180,21 +179,7 @@ class Scene:
         Raises:
             ValueError: the file is not in MuJoCo's format.
         """
-        world = self.read()
-        for element in (*world.texts, *world.keys):  # of the file as a whole, and of no meaning for the arm
-            world.delete(element)
-        for name in _CONTACT_OPTIONS:
-            setattr(arm.option, name, getattr(world.option, name))
-        tool = _top_level(world, TOOL)
-        if tool is not None:
-            alone = world.copy()
-            adopt(alone, arm)
-            world.delete(tool)
-            arm.site(flange).attach_body(alone.body(TOOL), PREFIX, "")
-            _rename_assets(world)  # the tool has brought its copies
-        adopt(world, arm)
-        frame = arm.worldbody.add_frame(pos=at.xyz, quat=np.roll(at.quat, 1))
-        arm.attach(world, frame=frame, prefix=PREFIX)
+        attach(self.read(), arm, at=at, flange=flange)
 
     def place_of(self, name: str) -> Pose | None:
         """Where the scene has a site of that name, such as the base of another arm; None: it has none."""
@@ -235,6 +220,47 @@ def _has_no_number(text: str) -> bool:
         return not all(isfinite(float(part)) for part in text.split())
     except ValueError:  # a word
         return False
+
+
+def attach(world: mujoco.MjSpec, arm: mujoco.MjSpec, *, at: Pose = ORIGIN, flange: str = "flange") -> None:
+    """Add what a scene describes to the description of an arm, see `Scene.attach_to`."""
+    for element in (*world.texts, *world.keys):  # of the file as a whole, and of no meaning for the arm
+        world.delete(element)
+    for name in _CONTACT_OPTIONS:
+        setattr(arm.option, name, getattr(world.option, name))
+    tool = _top_level(world, TOOL)
+    if tool is not None:
+        alone = world.copy()
+        adopt(alone, arm)
+        world.delete(tool)
+        arm.site(flange).attach_body(alone.body(TOOL), PREFIX, "")
+        _rename_assets(world)  # the tool has brought its copies
+    adopt(world, arm)
+    frame = arm.worldbody.add_frame(pos=at.xyz, quat=np.roll(at.quat, 1))
+    arm.attach(world, frame=frame, prefix=PREFIX)
+
+
+def attach_text(arm: mujoco.MjSpec, text: str, *, what: str) -> None:
+    """Add a scene that is a text in MuJoCo's format to the description of an arm.
+
+    Args:
+        arm: the description.
+        text: the scene; it may include ready scenes and the ready gripper by their file names.
+        what: its name in errors.
+
+    Raises:
+        CommandRejected: it is not in MuJoCo's format.
+    """
+    try:
+        attach(mujoco.MjSpec.from_string(text, include=_ready()), arm)
+    except (ValueError, mujoco.FatalError) as error:
+        why = " ".join(str(error).removeprefix("Error: ").split())
+        raise CommandRejected(f"{what} cannot be read: {why}", parameter="scene") from None
+
+
+def _ready() -> dict[str, bytes]:
+    """Ready scenes and parts of them by their file names."""
+    return {path.name: path.read_bytes() for path in FOLDER.glob(f"*{_SUFFIX}")}
 
 
 def names() -> tuple[str, ...]:

@@ -14,10 +14,13 @@ from dataclasses import dataclass, field
 from math import isnan, nan
 from typing import ClassVar
 
+import numpy as np
+
 from heptarm.errors import LimitError
 from heptarm.values.checks import shown, within, word
 from heptarm.values.condition.condition import Condition, band_text, check_band
 from heptarm.values.frames import TOOL, check_name
+from heptarm.values.pose import Pose
 
 #: Largest force [N], torque [Nm] and joint torque [Nm] of a threshold.
 FORCE, TORQUE, JOINT = 1000.0, 1000.0, 500.0
@@ -30,13 +33,13 @@ class _Estimated(Condition):
     """Base of conditions on the cabinet's estimate of the external force and torque.
 
     Attributes:
-        frame: where it is measured and in whose axes; see `heptarm.when.force`.
+        frame: the frame whose axes count, or its pose in the base; see `heptarm.when.force`.
         tolerance: largest inaccuracy of the estimate that is accepted [N], of a torque [Nm]; NaN: any.
     """
 
     UNIT: ClassVar[str] = "N"
 
-    frame: str = field(default=TOOL, kw_only=True)
+    frame: str | Pose = field(default=TOOL, kw_only=True)
     tolerance: float = field(default=nan, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -84,7 +87,7 @@ class _AxisAbove(_Estimated):
         _check_axis(self.axis)
 
     def __str__(self) -> str:
-        return f"force {self.PART} {self.axis} of {self.frame} > {self.threshold:g} N"
+        return f"force {self.PART} {self.axis} of {_named(self.frame)} > {self.threshold:g} N"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +127,7 @@ class _AxisOutside(_Estimated):
 
     def __str__(self) -> str:
         band = band_text(self.low, self.high, self.LIMIT, self.UNIT)
-        return f"{self.COMPONENT} {self.axis} of {self.frame} {band}"
+        return f"{self.COMPONENT} {self.axis} of {_named(self.frame)} {band}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,9 +164,17 @@ def _check_joint(joint: int) -> None:
         )
 
 
-def _check_estimate(frame: str, tolerance: float, unit: str) -> None:
+def _named(frame: str | Pose) -> str:
+    """A frame in a text: its name, or how its axes are turned."""
+    if isinstance(frame, str):
+        return frame
+    return "axes at a {:.4g} b {:.4g} c {:.4g} deg".format(*np.degrees(frame.abc).tolist())
+
+
+def _check_estimate(frame: str | Pose, tolerance: float, unit: str) -> None:
     """Refuse what is no frame, or no tolerance of an estimate."""
-    check_name(frame, "frame")
+    if not isinstance(frame, Pose):
+        check_name(frame, "frame", hint='for example "tool" or "base", or the pose of any frame in the base')
     if not (isinstance(tolerance, float) and isnan(tolerance)):
         within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
 
@@ -236,18 +247,19 @@ class Force:
     """External force that the cabinet estimates at the motion frame [N]; `> threshold` compares its magnitude.
 
     Attributes:
-        frame: the frame whose axes count: "tool" (the motion frame), "flange" or "base".
+        frame: the frame whose axes count: "tool" (the motion frame), "flange", "base", the name of a frame, or the
+            pose of any frame in the base; the force stays the one at the motion frame.
         tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any. A worse estimate, as near a
             singularity, counts as above the threshold.
     """
 
-    frame: str = TOOL
+    frame: str | Pose = TOOL
     tolerance: float = nan
 
     def __post_init__(self) -> None:
         _check_estimate(self.frame, self.tolerance, "N")
 
-    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Force:
+    def __call__(self, *, frame: str | Pose = TOOL, tolerance: float = nan) -> Force:
         """The same force with other axes, or with a tolerance."""
         return Force(frame, tolerance)
 
@@ -288,13 +300,13 @@ class Torque:
         tolerance: see `Force`; for `about` [Nm].
     """
 
-    frame: str = TOOL
+    frame: str | Pose = TOOL
     tolerance: float = nan
 
     def __post_init__(self) -> None:
         _check_estimate(self.frame, self.tolerance, "Nm")
 
-    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Torque:
+    def __call__(self, *, frame: str | Pose = TOOL, tolerance: float = nan) -> Torque:
         """The same torque with other axes, or with a tolerance."""
         return Torque(frame, tolerance)
 

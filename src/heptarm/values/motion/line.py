@@ -13,7 +13,7 @@ from heptarm.values.checks import Array, array, shown
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
-from heptarm.values.pose import Pose, Redundancy, check_pose, given_in, near_of
+from heptarm.values.pose import PartialPose, Pose, Redundancy, check_target, given_in, near_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -24,7 +24,7 @@ class Lin(PathMotion):
     """Straight line of the motion frame to a pose.
 
     Attributes:
-        target: pose in `frame`.
+        target: pose in `frame`; of a partial one the rest is as where the motion begins.
         near: joint positions whose E1 (the angle of A3) the target takes, shape (7,) [rad]; None: the current one.
         redundancy: E1 (the angle of A3) and Status of the target; given instead of `near`.
         moving: the motion frame.
@@ -32,7 +32,7 @@ class Lin(PathMotion):
         frame: the frame of the target: "base", or a taught frame.
     """
 
-    target: Pose
+    target: Pose | PartialPose
     near: Array | None = None
     redundancy: Redundancy | None = None
     moving: str = TOOL
@@ -40,7 +40,7 @@ class Lin(PathMotion):
     frame: str = BASE
 
     def __post_init__(self) -> None:
-        check_pose(self.target)
+        check_target(self.target)
         object.__setattr__(self, "near", near_of(self.near, self.redundancy))
         check_name(self.moving, "moving")
         check_name(self.frame, "frame")
@@ -73,7 +73,7 @@ class LinRel(PathMotion):
 
 @keywords(PathSettings)
 def lin(
-    pose: Pose,
+    pose: Pose | PartialPose,
     *,
     near: npt.ArrayLike | None = None,
     redundancy: Redundancy | None = None,
@@ -86,7 +86,7 @@ def lin(
     """Straight line of the motion frame to a pose.
 
     Args:
-        pose: target of the motion frame, in `frame`.
+        pose: target of the motion frame, in `frame`; with a `PartialPose` the rest stays as where the line begins.
         near: joint positions whose E1 (the angle of A3) the target takes, shape (7,) [rad].
         redundancy: E1 (the angle of A3) and Status of the target, instead of `near`.
         moving: the motion frame: "tool" (the tool frame, without a tool the flange), "flange" or the name of a frame.

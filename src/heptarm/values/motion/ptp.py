@@ -12,7 +12,7 @@ from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.checks import Array, array
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.motion.dynamics import Blended, JointSettings, keywords, settings
-from heptarm.values.pose import Pose, Redundancy, check_pose, deg, given_in, near_of
+from heptarm.values.pose import PartialPose, Pose, Redundancy, check_target, deg, given_in, near_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -55,7 +55,7 @@ class PtpPose(Blended):
     """Point-to-point motion to a pose of the motion frame.
 
     Attributes:
-        target: pose in `frame`.
+        target: pose in `frame`; of a partial one the rest is as where the motion begins.
         near: joint positions whose E1 (the angle of A3) and Status the target keeps, shape (7,) [rad]; None: the
             current ones.
         redundancy: E1 (the angle of A3), Status and Turn of the target; given instead of `near`.
@@ -63,14 +63,14 @@ class PtpPose(Blended):
         frame: the frame of the target: "base", or a taught frame.
     """
 
-    target: Pose
+    target: Pose | PartialPose
     near: Array | None = None
     redundancy: Redundancy | None = None
     moving: str = TOOL
     frame: str = BASE
 
     def __post_init__(self) -> None:
-        check_pose(self.target)
+        check_target(self.target)
         object.__setattr__(self, "near", near_of(self.near, self.redundancy))
         check_name(self.moving, "moving")
         check_name(self.frame, "frame")
@@ -78,7 +78,7 @@ class PtpPose(Blended):
 
 @keywords(JointSettings)
 def ptp(
-    target: npt.ArrayLike | Pose,
+    target: npt.ArrayLike | Pose | PartialPose,
     *,
     near: npt.ArrayLike | None = None,
     redundancy: Redundancy | None = None,
@@ -90,8 +90,9 @@ def ptp(
 
     Args:
         target: joint positions, shape (7,) [rad], or a pose of the motion frame in `frame`. A NaN keeps this joint's
-            set-point, as in `ptp([nan, nan, nan, nan, nan, nan, 0.3])`; `arm.move` refuses it where the
-            set-point at the start is not known yet: behind a running motion, or one to a pose.
+            set-point, as in `ptp([nan, nan, nan, nan, nan, nan, 0.3])`; a `PartialPose` keeps coordinates. `arm.move`
+            refuses both where the set-point at the start is not known yet: behind a running motion, one to home or by
+            an offset, or, for joints, one to a pose.
         near: for a pose: joint positions whose E1 (the angle of A3) and Status it keeps, shape (7,) [rad].
         redundancy: for a pose: E1 (the angle of A3), Status and Turn, instead of `near`.
         moving: for a pose: the motion frame: "tool", "flange" or the name of a frame.
@@ -112,7 +113,7 @@ def ptp(
             `redundancy`, or dynamics with limits along a path.
     """
     chosen = settings("ptp", JointSettings, limits)
-    if isinstance(target, Pose):
+    if isinstance(target, Pose | PartialPose):
         name, (pose,) = given_in(frame, target)
         return PtpPose(pose, near_of(near, redundancy), redundancy, moving, name, **chosen)
     check_name(moving, "moving")

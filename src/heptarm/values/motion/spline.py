@@ -29,7 +29,7 @@ from heptarm.values.motion.dynamics import (
 from heptarm.values.motion.line import Lin
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.motion.ptp import Ptp, PtpPose
-from heptarm.values.pose import Pose, check_pose, given_in
+from heptarm.values.pose import PartialPose, Pose, check_pose, given_in, placed_target
 from heptarm.values.robot import RobotModel
 from heptarm.values.text import described
 
@@ -192,7 +192,7 @@ def placed(motion: _Aimed, frame: Pose) -> _Aimed:
         return replace(motion, via=frame @ motion.via, end=frame @ motion.end, frame=BASE)
     if isinstance(motion, Spl):
         return replace(motion, target=frame @ motion.target)
-    return replace(motion, target=frame @ motion.target, frame=BASE)
+    return replace(motion, target=placed_target(frame, motion.target), frame=BASE)
 
 
 def _listed(values: Sequence[object], name: str) -> Sequence[object]:
@@ -225,6 +225,7 @@ def _segment(segment: object, index: int) -> Segment:
         ("redundancy", segment.redundancy is not None),
         ("moving", segment.moving != TOOL),
         ("frame", segment.frame != BASE),
+        ("a partial target", isinstance(segment, Lin) and isinstance(segment.target, PartialPose)),
         ("blending", segment.blending != EXACT),
         ("joint limits", any(limit.startswith("joint_") for limit in segment.dynamics.given())),
         ("triggers", bool(segment.triggers)),

@@ -30,6 +30,7 @@ import heptarm.wire.JointTorqueOutside;
 import heptarm.wire.NormalForceAbove;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
+import heptarm.wire.Pose;
 import heptarm.wire.ShearForceAbove;
 import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
@@ -118,33 +119,33 @@ final class BreakConditions {
     private static ICondition leaf(ConditionNode node, AbstractFrame moved, SunriseTools tools, SunriseSignals signals) throws CommandRejected {
         if (node instanceof ForceAbove) {
             ForceAbove one = (ForceAbove) node;
-            AbstractFrame axes = axes(one.frame, moved, tools);
+            AbstractFrame axes = axes(one.frame, one.axes, moved, tools);
             return Double.isNaN(one.tolerance) ? ForceCondition.createSpatialForceCondition(moved, axes, one.threshold)
                     : ForceCondition.createSpatialForceCondition(moved, axes, one.threshold, one.tolerance);
         }
         if (node instanceof NormalForceAbove) {
             NormalForceAbove one = (NormalForceAbove) node;
-            AbstractFrame axes = axes(one.frame, moved, tools);
+            AbstractFrame axes = axes(one.frame, one.axes, moved, tools);
             return Double.isNaN(one.tolerance)
                     ? ForceCondition.createNormalForceCondition(moved, axes, axis(one.axis), one.threshold)
                     : ForceCondition.createNormalForceCondition(moved, axes, axis(one.axis), one.threshold, one.tolerance);
         }
         if (node instanceof ShearForceAbove) {
             ShearForceAbove one = (ShearForceAbove) node;
-            AbstractFrame axes = axes(one.frame, moved, tools);
+            AbstractFrame axes = axes(one.frame, one.axes, moved, tools);
             return Double.isNaN(one.tolerance)
                     ? ForceCondition.createShearForceCondition(moved, axes, axis(one.axis), one.threshold)
                     : ForceCondition.createShearForceCondition(moved, axes, axis(one.axis), one.threshold, one.tolerance);
         }
         if (node instanceof ForceOutside) {
             ForceOutside one = (ForceOutside) node;
-            AbstractFrame axes = axes(one.frame, moved, tools);
+            AbstractFrame axes = axes(one.frame, one.axes, moved, tools);
             return Double.isNaN(one.tolerance) ? new ForceComponentCondition(moved, axes, axis(one.axis), one.low, one.high)
                     : new ForceComponentCondition(moved, axes, axis(one.axis), one.low, one.high, one.tolerance);
         }
         if (node instanceof TorqueOutside) {
             TorqueOutside one = (TorqueOutside) node;
-            AbstractFrame axes = axes(one.frame, moved, tools);
+            AbstractFrame axes = axes(one.frame, one.axes, moved, tools);
             return Double.isNaN(one.tolerance) ? new TorqueComponentCondition(moved, axes, axis(one.axis), one.low, one.high)
                     : new TorqueComponentCondition(moved, axes, axis(one.axis), one.low, one.high, one.tolerance);
         }
@@ -161,8 +162,8 @@ final class BreakConditions {
                 Convert.toMillimetres(one.distance), Math.round(one.delay * 1000));
     }
 
-    private static AbstractFrame axes(String name, AbstractFrame moved, SunriseTools tools) throws CommandRejected {
-        AbstractFrame found = tools.reference(name);
+    private static AbstractFrame axes(String name, Pose given, AbstractFrame moved, SunriseTools tools) throws CommandRejected {
+        AbstractFrame found = tools.reference(name, given);
         return found == null ? moved : found;
     }
 

@@ -16,6 +16,7 @@ import heptarm.core.CommandRejected;
 import heptarm.core.robot.Sensors;
 import heptarm.core.robot.SimulatorProbe;
 import heptarm.wire.JointState;
+import heptarm.wire.Pose;
 import heptarm.wire.PoseState;
 import heptarm.wire.Redundancy;
 import heptarm.wire.TorqueState;
@@ -76,10 +77,10 @@ final class SunriseSensors implements Sensors {
         return wrench(data, stamp);
     }
 
-    public WrenchState readWrench(String axes, long stamp) {
+    public WrenchState readWrench(String frame, Pose axes, long stamp) {
         AbstractFrame reference;
         try {
-            reference = tools.reference(axes);
+            reference = tools.reference(frame, axes);
         } catch (CommandRejected e) {
             throw new IllegalArgumentException(e.getMessage());
         }

@@ -7,6 +7,7 @@ import java.util.Map;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.LoadData;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
@@ -338,6 +339,11 @@ final class SunriseTools implements ToolPort {
             return robot.getRootFrame();
         }
         return taught.containsKey(name) ? taught.get(name) : motionFrame(name);
+    }
+
+    /** A frame that provides axes: those of a pose in the base, or without one those of a named frame; null for the motion frame. */
+    AbstractFrame reference(String name, Pose axes) throws CommandRejected {
+        return axes == null ? reference(name) : new Frame(robot.getRootFrame(), Convert.transformation(axes));
     }
 
     private synchronized ObjectFrame own(String name) {

@@ -8,11 +8,14 @@ public final class ForceAbove extends ConditionNode {
     public final double threshold;
     /** largest inaccuracy of the estimate [N] */
     public final double tolerance;
+    /** a pose in the base whose axes count; absent: those of frame */
+    public final Pose axes;
 
-    public ForceAbove(String frame, double threshold, double tolerance) {
+    public ForceAbove(String frame, double threshold, double tolerance, Pose axes) {
         this.frame = frame;
         this.threshold = threshold;
         this.tolerance = tolerance;
+        this.axes = axes;
     }
 
     public int tag() {
@@ -28,18 +31,26 @@ public final class ForceAbove extends ConditionNode {
         out.putStr(frame);
         out.putF64(threshold);
         out.putF64(tolerance);
+        out.putBool(axes != null);
+        if (axes != null) {
+            axes.write(out);
+        }
     }
 
     public static ForceAbove read(Decoder in) throws WireException {
         String frame = in.getStr();
         double threshold = in.getF64();
         double tolerance = in.getF64();
-        return new ForceAbove(frame, threshold, tolerance);
+        Pose axes = in.getBool() ? Pose.read(in) : null;
+        return new ForceAbove(frame, threshold, tolerance, axes);
     }
 
     public void validate(String path) throws Violation {
         Check.length(Encoder.utf8(frame).length, path + "frame", 0, 128);
         Check.number(threshold, path + "threshold", 0.0, 1000.0, false, false);
         Check.number(tolerance, path + "tolerance", 0.0, 1000.0, true, true);
+        if (axes != null) {
+            axes.validate(path + "axes.");
+        }
     }
 }

@@ -9,12 +9,14 @@ public final class NormalForceAbove extends ConditionNode {
     public final double threshold;
     /** [N] */
     public final double tolerance;
+    public final Pose axes;
 
-    public NormalForceAbove(String frame, Axis axis, double threshold, double tolerance) {
+    public NormalForceAbove(String frame, Axis axis, double threshold, double tolerance, Pose axes) {
         this.frame = frame;
         this.axis = axis;
         this.threshold = threshold;
         this.tolerance = tolerance;
+        this.axes = axes;
     }
 
     public int tag() {
@@ -31,6 +33,10 @@ public final class NormalForceAbove extends ConditionNode {
         out.putU8(axis.value());
         out.putF64(threshold);
         out.putF64(tolerance);
+        out.putBool(axes != null);
+        if (axes != null) {
+            axes.write(out);
+        }
     }
 
     public static NormalForceAbove read(Decoder in) throws WireException {
@@ -38,12 +44,16 @@ public final class NormalForceAbove extends ConditionNode {
         Axis axis = Axis.fromValue(in.getU8());
         double threshold = in.getF64();
         double tolerance = in.getF64();
-        return new NormalForceAbove(frame, axis, threshold, tolerance);
+        Pose axes = in.getBool() ? Pose.read(in) : null;
+        return new NormalForceAbove(frame, axis, threshold, tolerance, axes);
     }
 
     public void validate(String path) throws Violation {
         Check.length(Encoder.utf8(frame).length, path + "frame", 0, 128);
         Check.number(threshold, path + "threshold", 0.0, 1000.0, false, false);
         Check.number(tolerance, path + "tolerance", 0.0, 1000.0, true, true);
+        if (axes != null) {
+            axes.validate(path + "axes.");
+        }
     }
 }

@@ -11,13 +11,15 @@ public final class TorqueOutside extends ConditionNode {
     public final double high;
     /** [Nm] */
     public final double tolerance;
+    public final Pose axes;
 
-    public TorqueOutside(String frame, Axis axis, double low, double high, double tolerance) {
+    public TorqueOutside(String frame, Axis axis, double low, double high, double tolerance, Pose axes) {
         this.frame = frame;
         this.axis = axis;
         this.low = low;
         this.high = high;
         this.tolerance = tolerance;
+        this.axes = axes;
     }
 
     public int tag() {
@@ -45,6 +47,10 @@ public final class TorqueOutside extends ConditionNode {
         out.putF64(low);
         out.putF64(high);
         out.putF64(tolerance);
+        out.putBool(axes != null);
+        if (axes != null) {
+            axes.write(out);
+        }
     }
 
     public static TorqueOutside read(Decoder in) throws WireException {
@@ -53,7 +59,8 @@ public final class TorqueOutside extends ConditionNode {
         double low = in.getF64();
         double high = in.getF64();
         double tolerance = in.getF64();
-        return new TorqueOutside(frame, axis, low, high, tolerance);
+        Pose axes = in.getBool() ? Pose.read(in) : null;
+        return new TorqueOutside(frame, axis, low, high, tolerance, axes);
     }
 
     public void validate(String path) throws Violation {
@@ -61,5 +68,8 @@ public final class TorqueOutside extends ConditionNode {
         Check.number(low, path + "low", -1000.0, 1000.0, false, false);
         Check.number(high, path + "high", -1000.0, 1000.0, false, false);
         Check.number(tolerance, path + "tolerance", 0.0, 1000.0, true, true);
+        if (axes != null) {
+            axes.validate(path + "axes.");
+        }
     }
 }

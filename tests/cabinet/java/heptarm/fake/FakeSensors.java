@@ -4,6 +4,7 @@ import java.util.Arrays;
 
 import heptarm.core.robot.Sensors;
 import heptarm.wire.JointState;
+import heptarm.wire.Pose;
 import heptarm.wire.PoseState;
 import heptarm.wire.Redundancy;
 import heptarm.wire.TorqueState;
@@ -60,14 +61,20 @@ final class FakeSensors implements Sensors {
     @Override
     public WrenchState readWrench(long stamp) {
         faults.read(1);
-        return readWrench("base", stamp);
+        return readWrench("base", null, stamp);
     }
 
-    /** The same spring pushes along the axis of the flange, which is x of the base. */
+    /** The same spring pushes along the axis of the flange, which is x of the base; other axes are turned about z. */
     @Override
-    public WrenchState readWrench(String axes, long stamp) {
+    public WrenchState readWrench(String frame, Pose axes, long stamp) {
         double[] force = new double[3];
-        force["base".equals(axes) ? 0 : 2] = torque();
+        if (axes == null) {
+            force["base".equals(frame) ? 0 : 2] = torque();
+        } else {
+            double turn = 2 * Math.atan2(axes.quat[2], axes.quat[3]);
+            force[0] = Math.cos(turn) * torque();
+            force[1] = -Math.sin(turn) * torque();
+        }
         return new WrenchState(stamp, force, new double[3], new double[] {INACCURACY, 0, 0}, new double[3]);
     }
 

@@ -12,6 +12,7 @@ import heptarm.wire.JointTorqueOutside;
 import heptarm.wire.NormalForceAbove;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
+import heptarm.wire.Pose;
 import heptarm.wire.ShearForceAbove;
 import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
@@ -21,11 +22,12 @@ import heptarm.wire.TorqueOutside;
  * A condition for {@link Move#until} and {@link Move#trigger}, in SI units; combine conditions with {@link #and}, {@link #or} and
  * {@link #not}.
  *
- * <p>Forces and torques are external ones at the motion frame, in its own axes; {@link #of} takes leaves with another frame or a
- * tolerance for the inaccuracy of the estimate.
+ * <p>Forces and torques are external ones at the motion frame, in its own axes; {@link #of} takes leaves with another frame, with
+ * the axes of a pose in the base, or with a tolerance for the inaccuracy of the estimate.
  */
 public final class StopCondition {
     private static final double ANY = Double.NaN;
+    private static final Pose OWN = null;
 
     private final ConditionNode[] nodes; // postfix
 
@@ -40,27 +42,27 @@ public final class StopCondition {
 
     /** The force is above a threshold [N]. */
     public static StopCondition force(double newtons) {
-        return of(new ForceAbove("", newtons, ANY));
+        return of(new ForceAbove("", newtons, ANY, OWN));
     }
 
     /** The force along an axis, in either direction, is above a threshold [N]. */
     public static StopCondition normalForce(Axis axis, double newtons) {
-        return of(new NormalForceAbove("", axis, newtons, ANY));
+        return of(new NormalForceAbove("", axis, newtons, ANY, OWN));
     }
 
     /** The force perpendicular to an axis is above a threshold [N]. */
     public static StopCondition shearForce(Axis axis, double newtons) {
-        return of(new ShearForceAbove("", axis, newtons, ANY));
+        return of(new ShearForceAbove("", axis, newtons, ANY, OWN));
     }
 
     /** A component of the force is outside [low, high] [N]. */
     public static StopCondition force(Axis axis, double low, double high) {
-        return of(new ForceOutside("", axis, low, high, ANY));
+        return of(new ForceOutside("", axis, low, high, ANY, OWN));
     }
 
     /** A component of the torque is outside [low, high] [Nm]. */
     public static StopCondition torque(Axis axis, double low, double high) {
-        return of(new TorqueOutside("", axis, low, high, ANY));
+        return of(new TorqueOutside("", axis, low, high, ANY, OWN));
     }
 
     /** The external torque of a joint, 1 to 7, is outside [low, high] [Nm]. */

@@ -1,6 +1,7 @@
 package heptarm.core.robot;
 
 import heptarm.wire.JointState;
+import heptarm.wire.Pose;
 import heptarm.wire.PoseState;
 import heptarm.wire.TorqueState;
 import heptarm.wire.WrenchState;
@@ -19,8 +20,8 @@ public interface Sensors {
     /** Read the external wrench at the motion frame, in the axes of the base. */
     WrenchState readWrench(long stamp);
 
-    /** Read it in the axes of another frame: "" or "tool" (the motion frame), "flange", "base" or a frame's name. */
-    WrenchState readWrench(String axes, long stamp);
+    /** Read it in the axes of another frame: "" or "tool" (the motion frame), "flange", "base" or a frame's name; or of a pose in the base. */
+    WrenchState readWrench(String frame, Pose axes, long stamp);
 
     /** Read the progress of the current motion in [0, 1] and its remaining time [s]; NaN where the robot provides none. */
     void readProgress(double[] progressAndRemaining);

@@ -1,5 +1,6 @@
 package heptarm.core.state;
 
+import java.util.Arrays;
 import java.util.HashMap;
 import java.util.Map;
 
@@ -15,6 +16,7 @@ import heptarm.wire.ForceOutside;
 import heptarm.wire.Inverted;
 import heptarm.wire.JointTorqueOutside;
 import heptarm.wire.NormalForceAbove;
+import heptarm.wire.Pose;
 import heptarm.wire.ShearForceAbove;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.SignalIs;
@@ -63,27 +65,27 @@ public final class ConditionReadings {
     private boolean leaf(ConditionNode node) {
         if (node instanceof ForceAbove) {
             ForceAbove one = (ForceAbove) node;
-            WrenchState seen = wrench(one.frame);
+            WrenchState seen = wrench(one.frame, one.axes);
             return norm(seen.force) > one.threshold || vague(seen.force_inaccuracy, one.tolerance);
         }
         if (node instanceof NormalForceAbove) {
             NormalForceAbove one = (NormalForceAbove) node;
-            WrenchState seen = wrench(one.frame);
+            WrenchState seen = wrench(one.frame, one.axes);
             return Math.abs(seen.force[one.axis.value()]) > one.threshold || vague(seen.force_inaccuracy, one.tolerance);
         }
         if (node instanceof ShearForceAbove) {
             ShearForceAbove one = (ShearForceAbove) node;
-            WrenchState seen = wrench(one.frame);
+            WrenchState seen = wrench(one.frame, one.axes);
             return across(seen.force, one.axis) > one.threshold || vague(seen.force_inaccuracy, one.tolerance);
         }
         if (node instanceof ForceOutside) {
             ForceOutside one = (ForceOutside) node;
-            WrenchState seen = wrench(one.frame);
+            WrenchState seen = wrench(one.frame, one.axes);
             return outside(seen.force[one.axis.value()], one.low, one.high) || vague(seen.force_inaccuracy, one.tolerance);
         }
         if (node instanceof TorqueOutside) {
             TorqueOutside one = (TorqueOutside) node;
-            WrenchState seen = wrench(one.frame);
+            WrenchState seen = wrench(one.frame, one.axes);
             return outside(seen.torque[one.axis.value()], one.low, one.high) || vague(seen.torque_inaccuracy, one.tolerance);
         }
         if (node instanceof JointTorqueOutside) {
@@ -99,11 +101,12 @@ public final class ConditionReadings {
         return false; // a point on the path: only the robot itself knows it
     }
 
-    private WrenchState wrench(String frame) {
-        WrenchState seen = wrenches.get(frame);
+    private WrenchState wrench(String frame, Pose axes) {
+        String key = axes == null ? frame : Arrays.toString(axes.quat);
+        WrenchState seen = wrenches.get(key);
         if (seen == null) {
-            seen = sensors.readWrench(frame, stamp);
-            wrenches.put(frame, seen);
+            seen = sensors.readWrench(frame, axes, stamp);
+            wrenches.put(key, seen);
         }
         return seen;
     }

@@ -49,11 +49,11 @@ public final class StateReader {
         return read(Groups.WRENCH).wrench;
     }
 
-    /** The current external wrench in the axes of another frame, see {@link Sensors#readWrench(String, long)}. Any thread. */
+    /** The current external wrench in the axes of another frame, see {@link Sensors#readWrench(String, Pose, long)}. Any thread. */
     public WrenchState wrench(String axes) {
         clock.hold(clock.nanos());
         try {
-            return sensors.readWrench(axes, clock.stamp());
+            return sensors.readWrench(axes, null, clock.stamp());
         } finally {
             clock.release();
         }

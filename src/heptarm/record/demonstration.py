@@ -1,0 +1,286 @@
+"""Episodes read back: everything in equal steps of the robot's clock, for learning.
+
+At each step stands what was the newest then, of states, streams and pictures alike; what is older than a step counts as
+dropped. The first step is the one at which everything has arrived once.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import overload
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected
+from heptarm.record.episodes import (
+    ACTION,
+    FASTEST,
+    LABEL,
+    LABELS,
+    NUMBER,
+    RATE,
+    REASON,
+    TASK,
+    Label,
+    episode_files,
+    label_filter,
+)
+from heptarm.record.recording import Recording, load
+from heptarm.values.checks import Array, frozen, instance, within
+from heptarm.values.files import path_of
+from heptarm.values.text import lines
+
+#: Signals of the states that steps have, with their numbers.
+SIGNALS = {"q": 7, "dq": 7, "tau_ext": 7, "pose": 7, "wrench": 6}
+#: A sample at the end of a step still belongs to it [s].
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """An episode in equal steps; made by `load_episodes`.
+
+    Attributes:
+        path: the file.
+        number: of the episode in its folder.
+        task: what was done, in words.
+        label: "success", "failure", "unlabelled", or "unfinished" if it was cut off.
+        reason: of the label, in words.
+        robot: model, such as "iiwa14".
+        rate: steps per second [Hz].
+        t: times of the steps, shape (n,) [s].
+        signals: "q", "dq", "tau_ext", "pose" and "wrench" of the states, as far as they were recorded, and the streams,
+            by name, shape (n, m) each.
+        action: what was commanded at each step: by `Episode.act`, otherwise the joints' set-points of the next step,
+            shape (n, m).
+        corrected: whether a person corrected a policy then, shape (n,).
+        views: pictures at each step as JPEG files, by the name of the camera.
+        dropped: steps at which there was nothing new, by the name of the stream or camera; "state" for the states.
+    """
+
+    path: Path
+    number: int
+    task: str
+    label: Label
+    reason: str
+    robot: str
+    rate: float
+    t: Array
+    signals: Mapping[str, Array]
+    action: Array
+    corrected: npt.NDArray[np.bool_]
+    views: Mapping[str, tuple[bytes, ...]]
+    dropped: Mapping[str, int]
+
+    def __len__(self) -> int:
+        """Number of steps."""
+        return len(self.t)
+
+    def __getitem__(self, name: str) -> Array:
+        """Signal or stream by its name; raises CommandRejected, and lists them, if there is none."""
+        if name in self.signals:
+            return self.signals[name]
+        known = ", ".join(self.signals)
+        raise CommandRejected(f"name must be one of {known}, got {name!r}", parameter="name", value=name)
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last step [s]."""
+        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+
+    def __str__(self) -> str:
+        """One line."""
+        drops = ", ".join(f"{name} {count}" for name, count in self.dropped.items() if count)
+        fixes = f", {int(self.corrected.sum())} corrected" if self.corrected.any() else ""
+        why = f" ({self.reason})" if self.reason else ""
+        return (
+            f"{self.path.name}  {self.label}{why}  {self.duration:.1f} s, {len(self)} steps"
+            f"{f', dropped: {drops}' if drops else ''}{fixes}  {self.task}"
+        )
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<Demonstration {self.path.name}, {self.label}, {len(self)} steps>"
+
+
+class Demonstrations(Sequence[Demonstration]):
+    """Episodes of a folder; made by `load_episodes`.
+
+    Attributes:
+        folder: where they are.
+    """
+
+    def __init__(self, folder: Path, episodes: Iterable[Demonstration]) -> None:
+        self.folder, self._episodes = folder, tuple(episodes)
+
+    def __len__(self) -> int:
+        """Number of episodes."""
+        return len(self._episodes)
+
+    @overload
+    def __getitem__(self, index: int) -> Demonstration: ...
+    @overload
+    def __getitem__(self, index: slice) -> Demonstrations: ...
+    def __getitem__(self, index: int | slice) -> Demonstration | Demonstrations:
+        """An episode by its place, or several."""
+        if isinstance(index, slice):
+            return Demonstrations(self.folder, self._episodes[index])
+        return self._episodes[index]
+
+    @property
+    def labels(self) -> dict[str, int]:
+        """Number of episodes by label."""
+        counts = Counter(episode.label for episode in self._episodes)
+        return {label: counts[label] for label in LABELS if counts[label]}
+
+    def __str__(self) -> str:
+        """A few lines: how many of which label, how long, what was dropped."""
+        steps, dropped = sum(map(len, self._episodes)), Counter[str]()
+        for episode in self._episodes:
+            dropped.update(episode.dropped)
+        durations = [episode.duration for episode in self._episodes]
+        rows = {
+            "episodes": ", ".join(f"{count} {label}" for label, count in self.labels.items()),
+            "duration": f"{sum(durations):.1f} s, median {np.median(durations):.1f} s" if durations else "",
+            "steps": str(steps),
+            "dropped": ", ".join(f"{name} {count}" for name, count in dropped.items() if count),
+            "corrected": str(sum(int(episode.corrected.sum()) for episode in self._episodes) or ""),
+            "tasks": "; ".join(dict.fromkeys(episode.task for episode in self._episodes if episode.task)),
+        }
+        return lines(f"{len(self)} episodes in {self.folder}", rows)
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<Demonstrations {self.folder}, {len(self)} episodes>"
+
+
+def load_episodes(
+    folder: str | Path, *, labels: Iterable[str] = LABELS, rate: float | None = None
+) -> Demonstrations:
+    """Read the episodes that `Arm.episodes` has recorded to a folder.
+
+    Args:
+        folder: of the files.
+        labels: which ones: "success", "failure", "unlabelled", "unfinished".
+        rate: steps per second [Hz]; None: that with which each was recorded.
+
+    Raises:
+        CommandRejected: there is no such folder, it has no episodes, a file cannot be read; or no such label.
+        LimitError: a rate outside its range.
+        MissingExtra: the package mcap is not installed.
+    """
+    where, chosen = path_of(folder, "folder"), label_filter(labels)
+    steps = None if rate is None else within(rate, "rate", 0.0, FASTEST, above=True, unit="Hz")
+    files = episode_files(where)
+    if not files:
+        raise CommandRejected(
+            f"{where} has no episodes",
+            parameter="folder",
+            value=str(where),
+            hint="arm.episodes(folder) records them as episode-00000.mcap and so on",
+        )
+    found = (in_steps(load(path), rate=steps) for _, path in files)
+    return Demonstrations(where, (episode for episode in found if episode.label in chosen))
+
+
+def in_steps(recording: Recording, *, rate: float | None = None) -> Demonstration:
+    """The equal steps of an episode.
+
+    Args:
+        recording: of the episode.
+        rate: steps per second [Hz]; None: that with which it was recorded.
+
+    Raises:
+        CommandRejected: it is no episode.
+    """
+    run = instance(recording, Recording, "recording")
+    facts = run.facts
+    if RATE not in facts:
+        raise CommandRejected(
+            f"{run.path} must be an episode, it is another recording",
+            parameter="recording",
+            value=str(run.path),
+            hint="arm.episodes(folder) records episodes",
+        )
+    steps = float(facts[RATE]) if rate is None else rate
+    times = {"state": run.t[np.isfinite(run["q"]).all(axis=1)] if "q" in run and len(run) else np.zeros(0)}
+    times |= {name: stream.t for name, stream in run.streams.items() if name != ACTION}
+    times |= {name: view.t for name, view in run.views.items()}
+    grid = _grid(times, steps)
+    places = {name: newest(t, grid, period=1.0 / steps) for name, t in times.items()}
+    rows = (
+        np.flatnonzero(np.isfinite(run["q"]).all(axis=1))[places["state"][0]]
+        if len(grid)
+        else np.zeros(0, int)
+    )
+    signals = {
+        name: frozen(run[name][rows])
+        for name, size in SIGNALS.items()
+        if name in run and run[name].shape[1:] == (size,) and np.isfinite(run[name][rows]).any()
+    }
+    for name, stream in run.streams.items():
+        if name != ACTION:
+            signals[name] = frozen(stream.values[places[name][0]] if len(grid) else stream.values[:0])
+    corrected = np.zeros(len(grid), bool)
+    for begin, end in run.corrections:
+        corrected |= (grid >= begin) & (grid <= end)
+    label: Label = "unfinished"
+    for known in LABELS:
+        if run.complete and run.outcome.get(LABEL) == known:
+            label = known
+    return Demonstration(
+        run.path,
+        int(facts.get(NUMBER, "0")),
+        facts.get(TASK, ""),
+        label,
+        run.outcome.get(REASON, ""),
+        facts.get("robot", ""),
+        steps,
+        frozen(grid),
+        signals,
+        frozen(_actions(run, rows, grid)),
+        corrected,
+        {
+            name: tuple(view.files[index] for index in places[name][0]) if len(grid) else ()
+            for name, view in run.views.items()
+        },
+        {name: count for name, (_, count) in places.items()},
+    )
+
+
+def _grid(times: Mapping[str, Array], rate: float) -> Array:
+    """Times of the steps: from when everything has arrived once to the last state [s]."""
+    if not all(len(t) for t in times.values()):
+        return np.zeros(0)
+    begin, end = max(float(t[0]) for t in times.values()), float(times["state"][-1])
+    return begin + np.arange(max(0, int((end - begin) * rate + _ROUNDING) + 1)) / rate
+
+
+def newest(t: Array, grid: Array, *, period: float) -> tuple[npt.NDArray[np.intp], int]:
+    """Index of the newest sample at each step, and at how many steps it is older than a period.
+
+    Args:
+        t: times of the samples, ascending, shape (n,) [s].
+        grid: times of the steps, shape (m,) [s].
+        period: time between two steps [s].
+    """
+    index = np.maximum(np.searchsorted(t, grid + _ROUNDING, side="right") - 1, 0)
+    if not len(grid):
+        return index, 0
+    return index, int((grid - t[index] > period + _ROUNDING).sum())
+
+
+def _actions(run: Recording, rows: npt.NDArray[np.intp], grid: Array) -> Array:
+    """What was commanded at each step, shape (n, m)."""
+    given = run.streams.get(ACTION)
+    if not len(grid):
+        return np.zeros((0, 7 if given is None else given.values.shape[1]))
+    if given is not None:
+        return np.asarray(given.values[newest(given.t, grid, period=1.0)[0]])
+    commanded = run["q_cmd"][rows] if "q_cmd" in run else run["q"][rows]
+    commanded = np.where(np.isfinite(commanded), commanded, run["q"][rows])
+    return np.vstack([commanded[1:], commanded[-1:]])

@@ -1,0 +1,558 @@
+"""Episodes: demonstrations and trials of a task, each a recording of its own with a label, for learning.
+
+An episode is a recording of the arm as any other, and beside it what cameras, sensors and the program gave, each at
+its own time and rate. Nothing is aligned here: `heptarm.record.demonstration` does so when an episode is read, so that
+nothing is lost, and another rate can be chosen afterwards.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import re
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Literal, Protocol, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, StaleState, require
+from heptarm.record.mcap_file import RecordingFile
+from heptarm.record.recorder import Recorder, RecordSource
+from heptarm.values.camera import Picture
+from heptarm.values.checks import finite_entries, instance, numbers, shown, within
+from heptarm.values.files import unwritable
+from heptarm.values.frames import check_printable
+from heptarm.values.sealed import Sealed
+
+_log = logging.getLogger("heptarm.record")
+
+Label: TypeAlias = Literal["success", "failure", "unlabelled", "unfinished"]
+#: Labels of an episode; an unfinished one was cut off.
+LABELS: tuple[Label, ...] = ("success", "failure", "unlabelled", "unfinished")
+#: What is recorded of a sensor: a function that returns numbers, or None where there is nothing new.
+NumberSource: TypeAlias = Callable[[], Any]
+#: Name of the stream of what the program commands; see `Episode.act`.
+ACTION = "action"
+#: Facts at the beginning of an episode's file, and at its end.
+TASK, RATE, NUMBER, LABEL, REASON = "episode_task", "episode_rate", "episode_number", "label", "reason"
+#: A stream or camera that is silent for so long during an episode has stalled [s].
+STALL = 2.0
+#: Fastest steps [Hz], quality of the pictures as JPEG files, most numbers of a stream, longest text.
+FASTEST, _QUALITY, _MOST, _LONGEST = 500.0, 92, 1000, 1000
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+_FILE = re.compile(r"episode-(\d{5,})\.mcap")
+
+
+class PictureStream(Protocol):
+    """Live pictures; a `CameraStream` is one."""
+
+    def read(self, *, timeout: float = ...) -> Picture:
+        """The next picture; raises Timeout."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+        ...
+
+
+def episode_files(folder: Path) -> list[tuple[int, Path]]:
+    """Numbers and files of the episodes in a folder, in order."""
+    found = [(match, path) for path in folder.glob("episode-*.mcap") if (match := _FILE.fullmatch(path.name))]
+    return sorted((int(match.group(1)), path) for match, path in found)
+
+
+class _Feed:
+    """What arrives beside the states, each with its time; written while an episode runs.
+
+    Args:
+        name: of the camera or the stream.
+        clock: reads our clock [ns].
+        write: writes one piece of it.
+    """
+
+    def __init__(
+        self, name: str, clock: Callable[[], int], write: Callable[[RecordingFile, int, Any], None]
+    ) -> None:
+        self.name, self._clock, self._write = name, clock, write
+        self._arrived: deque[tuple[int, Any]] = deque()
+        self._begin: int | None = None
+        self._last = 0
+        self.longest = 0.0
+        self.failure: Exception | None = None
+
+    def begin(self) -> None:
+        """Begin an episode: what arrived before is not its."""
+        self._arrived.clear()
+        self._begin = self._last = self._clock()
+        self.longest = 0.0
+
+    def end(self) -> None:
+        """End the episode."""
+        self.look()
+        self._begin = None
+
+    def look(self) -> float:
+        """The longest silence of this episode so far [s]."""
+        if self._begin is not None:
+            self.longest = max(self.longest, (self._clock() - self._last) * 1e-9)
+        return self.longest
+
+    def add(self, at: int, content: Any) -> None:
+        """Take something that is of a time of our clock [ns]."""
+        if self._begin is not None and at >= self._begin:
+            now = self._clock()
+            self.longest = max(self.longest, (now - self._last) * 1e-9)
+            self._last = now
+            self._arrived.append((at, content))
+
+    def write(self, file: RecordingFile) -> None:
+        """Write what has arrived."""
+        for _ in range(len(self._arrived)):
+            at, content = self._arrived.popleft()
+            self._write(file, at, content)
+
+
+class _Watcher:
+    """A thread that reads a camera or a function, from the opening of the set to its end."""
+
+    def __init__(self, feed: _Feed, read: Callable[[], None], *, pause: float) -> None:
+        self._feed, self._read, self._pause = feed, read, pause
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="heptarm-episodes", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ending.wait(self._pause):
+            try:
+                self._read()
+            except Exception as error:  # of a function that is yours; the episode reports it
+                if not self._ending.is_set():
+                    self._feed.failure = error
+                    _log.warning("%s gives nothing any more: %s", self._feed.name, error)
+                return
+
+    def close(self) -> None:
+        """End it; a function that waits for its sensor is left alone."""
+        self._ending.set()
+        self._thread.join(1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeTerms:
+    """How the episodes of a set are recorded.
+
+    Attributes:
+        rate: steps per second of the robot's clock [Hz].
+        task: what is done, in words.
+        cameras: opens each of them, by its name.
+        streams: reads each of them, by its name; None: the program pushes it.
+        reset: called before each episode.
+        factor: seconds of the robot's clock per second of ours.
+    """
+
+    rate: float
+    task: str
+    cameras: Mapping[str, Callable[[], PictureStream]] = field(default_factory=dict)
+    streams: Mapping[str, NumberSource | None] = field(default_factory=dict)
+    reset: Callable[[], object] | None = None
+    factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        within(self.rate, "rate", 0.0, FASTEST, above=True, unit="Hz")
+        _text(self.task, "task")
+        for kind, names in (("cameras", self.cameras), ("streams", self.streams)):
+            for name in names:
+                check_stream_name(name, kind)
+        twice = set(self.cameras) & set(self.streams)
+        if twice:
+            raise CommandRejected(
+                f"streams must have other names than cameras, got {min(twice)!r} in both", parameter="streams"
+            )
+        for name, source in self.streams.items():
+            if source is not None and not callable(source):
+                raise ShapeError(
+                    f"streams[{name!r}] must be a function or None, got {shown(source)}", parameter="streams"
+                )
+        if self.reset is not None and not callable(self.reset):
+            raise ShapeError(f"reset must be a function, got {shown(self.reset)}", parameter="reset")
+
+
+def check_stream_name(name: str, parameter: str) -> None:
+    """Refuse a name that is no word of lower case letters, digits and underscores, or is taken.
+
+    Raises:
+        CommandRejected: it is none.
+    """
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or name in _TAKEN:
+        raise CommandRejected(
+            f"names in {parameter} must have lower case letters, digits and _, and not be one of "
+            f"{', '.join(sorted(_TAKEN))}; got {shown(name)}",
+            parameter=parameter,
+            value=name,
+        )
+
+
+#: Names that the steps of an episode have already.
+_TAKEN = {
+    ACTION,
+    "state",
+    "t",
+    "q",
+    "dq",
+    "tau_ext",
+    "pose",
+    "wrench",
+    "correction",
+    "task",
+    "reward",
+    "done",
+}
+
+
+def _text(value: str, name: str) -> str:
+    text = instance(value, str, name)
+    if len(text) > _LONGEST:
+        raise CommandRejected(
+            f"{name} must have at most {_LONGEST} characters, got {len(text)}", parameter=name
+        )
+    check_printable(text, name)
+    return text
+
+
+class EpisodeSet(Sealed):
+    """Episodes of one task, each in a file of its own in a folder; made by `Arm.episodes`, used in a `with` block.
+
+    A folder that has episodes gets more. What is complete stays, whatever happens to the program.
+
+    Attributes:
+        folder: of the files.
+    """
+
+    folder: Final[Path]
+
+    def __init__(self, source: RecordSource, folder: Path, terms: EpisodeTerms) -> None:
+        self.folder = folder
+        self._source, self._terms = source, terms
+        self._stack = ExitStack()
+        self._feeds: dict[str, _Feed] = {}
+        self._running: Episode | None = None
+        self._is_open = False
+
+    def __enter__(self) -> EpisodeSet:
+        """Open folder, cameras and streams.
+
+        Raises:
+            CommandRejected: the folder cannot be written; or a camera cannot be opened.
+            MissingExtra: a package that cameras or recordings need is not installed.
+        """
+        require("mcap.writer", extra="record")
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise unwritable(self.folder, error) from error
+        clock = self._source.nanos
+        with ExitStack() as stack:
+            for name, opened in self._terms.cameras.items():
+                stream = opened()
+                stack.callback(stream.close)
+                feed = self._feeds[name] = _Feed(name, clock, _view_writer(name))
+                stack.callback(
+                    _Watcher(feed, _picture_reader(feed, stream, self._source.to_ours), pause=0.0).close
+                )
+            for name, source in (*self._terms.streams.items(), (ACTION, None)):
+                feed = self._feeds[name] = _Feed(name, clock, _number_writer(name))
+                if source is not None:
+                    pause = 0.5 / (self._terms.rate * self._terms.factor)  # one that is late misses no step
+                    stack.callback(_Watcher(feed, _number_reader(feed, source, clock), pause=pause).close)
+            self._stack = stack.pop_all()
+        self._is_open = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close cameras and streams."""
+        self._is_open = False
+        self._stack.close()
+
+    @property
+    def count(self) -> int:
+        """Number of episodes in the folder."""
+        return len(episode_files(self.folder))
+
+    def episode(self, task: str | None = None) -> Episode:
+        """The next episode, to be used in a `with` block.
+
+        Args:
+            task: what is done, in words; None: that of the set.
+
+        Raises:
+            ShapeError: no text.
+        """
+        return Episode(self, self._terms.task if task is None else _text(task, "task"))
+
+    def push(self, name: str, values: npt.ArrayLike) -> None:
+        """Add numbers of a stream that the program pushes, such as a callback of ROS, at the time of the call.
+
+        Raises:
+            CommandRejected: there is no such stream, or it has a function.
+            ShapeError: no numbers.
+        """
+        if self._terms.streams.get(name, name) is not None:
+            known = ", ".join(key for key, source in self._terms.streams.items() if source is None) or "none"
+            raise CommandRejected(
+                f"name must be one of {known}, got {shown(name)}",
+                parameter="name",
+                value=name,
+                hint="name the stream in arm.episodes(..., streams={name: None})",
+            )
+        self._feeds[name].add(self._source.nanos(), row_of(values, "values"))
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<EpisodeSet {self.folder}, {self.count} episodes>"
+
+
+def row_of(values: npt.ArrayLike, name: str) -> list[float]:
+    """Numbers as a list, at most 1000.
+
+    Raises:
+        ShapeError: others.
+        LimitError: one is not finite.
+    """
+    found = np.atleast_1d(finite_entries(numbers(values, name), name))
+    if found.ndim != 1 or not 1 <= found.size <= _MOST:
+        raise ShapeError(
+            f"{name} must have shape (n,) with n from 1 to {_MOST}, got {found.shape}", parameter=name
+        )
+    return [float(value) for value in found]
+
+
+def _number_writer(name: str) -> Callable[[RecordingFile, int, Any], None]:
+    return lambda file, at, values: file.numbers(name, at, values)
+
+
+def _view_writer(name: str) -> Callable[[RecordingFile, int, Any], None]:
+    image = require("PIL.Image", extra="record")
+
+    def write(file: RecordingFile, at: int, pixels: Any) -> None:
+        data = io.BytesIO()
+        image.fromarray(pixels).save(data, "JPEG", quality=_QUALITY)
+        file.view(name, at, data.getvalue())
+
+    return write
+
+
+def _number_reader(feed: _Feed, source: NumberSource, clock: Callable[[], int]) -> Callable[[], None]:
+    def read() -> None:
+        given = source()
+        if given is not None:
+            feed.add(clock(), row_of(given, feed.name))
+
+    return read
+
+
+def _picture_reader(feed: _Feed, stream: PictureStream, to_ours: Callable[[int], int]) -> Callable[[], None]:
+    def read() -> None:
+        picture = stream.read(timeout=1e6)
+        feed.add(to_ours(picture.stamp), picture.pixels)
+
+    return read
+
+
+class Episode(Sealed):
+    """One episode; made by `EpisodeSet.episode`, recorded while its `with` block runs.
+
+    An error that ends the block labels it a failure, with the error as the reason.
+
+    Attributes:
+        task: what is done, in words.
+    """
+
+    task: Final[str]
+
+    def __init__(self, owner: EpisodeSet, task: str) -> None:
+        self._set, self.task = owner, task
+        self._path = owner.folder
+        self._label: Label = "unlabelled"
+        self._reason = ""
+        self._is_discarded = False
+        self._recorder: Recorder | None = None
+
+    def __enter__(self) -> Episode:
+        """Reset, then begin to record.
+
+        Raises:
+            LocalProtocolError: the set is not open, or another episode runs.
+            HeptarmError: of the reset, or the file cannot be written. Then there is no episode.
+        """
+        owner, terms = self._set, self._set._terms
+        if not owner._is_open or owner._running is not None or self._recorder is not None:
+            raise LocalProtocolError(
+                "an episode needs the with block of its set, and no other episode in it",
+                hint='with arm.episodes("insert") as episodes: with episodes.episode() as episode: ...',
+            )
+        if terms.reset is not None:
+            terms.reset()
+        files = episode_files(owner.folder)
+        number = files[-1][0] + 1 if files else 0
+        self._path = owner.folder / f"episode-{number:05d}.mcap"
+        self._recorder = Recorder(
+            {"": owner._source},
+            self._path,
+            rate=min(2.0 * terms.rate, 1000.0),
+            feeds=tuple(owner._feeds.values()),
+            facts={TASK: self.task, RATE: repr(terms.rate), NUMBER: str(number)},
+        )
+        for feed in owner._feeds.values():
+            feed.begin()
+        self._recorder.start()
+        owner._running = self
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """End the file with its label.
+
+        Raises:
+            StaleState: a camera or a stream has stalled, or failed; the episode is a failure.
+        """
+        owner, recorder = self._set, self._recorder
+        assert recorder is not None
+        stalled = self._stalled()
+        for feed in owner._feeds.values():
+            feed.end()
+        owner._running = None
+        if error is not None and self._label != "failure":
+            self.fail(" ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST])
+        elif stalled:
+            self.fail(stalled)
+        recorder.conclude({LABEL: self._label, REASON: self._reason})
+        try:
+            recorder.close()
+        except HeptarmError as failure:
+            if error is None:
+                raise
+            _log.warning("%s", failure)
+        if self._is_discarded:
+            self._path.unlink(missing_ok=True)
+        elif stalled and error is None:
+            raise StaleState(
+                f"the episode {self._path.name} is a failure: {stalled}",
+                hint="look after the camera or sensor, and record the episode again",
+            )
+
+    def _stalled(self) -> str:
+        """Which camera or stream has given nothing for long; "": none."""
+        for name, feed in self._set._feeds.items():
+            if name == ACTION:
+                continue
+            if feed.failure is not None:
+                return f"{name} failed: {feed.failure}"[:_LONGEST]
+            if feed.look() > STALL:
+                return f"{name} gave nothing for {feed.longest:.1f} s"
+        return ""
+
+    @property
+    def path(self) -> Path:
+        """The file; before the block its folder."""
+        return self._path
+
+    @property
+    def label(self) -> Label:
+        """Its label so far."""
+        return self._label
+
+    def check(self) -> None:
+        """Raise if a camera or a stream has stalled: call it in long episodes.
+
+        Raises:
+            StaleState: one has.
+        """
+        if stalled := self._stalled():
+            raise StaleState(stalled, hint="look after the camera or sensor, and record the episode again")
+
+    def act(self, action: npt.ArrayLike) -> None:
+        """Record what the program commands, shape (n,): joints and a gripper for example.
+
+        Without it the actions of an episode are the joints' set-points of the next step.
+
+        Raises:
+            ShapeError: no numbers.
+            LimitError: one is not finite.
+        """
+        feed = self._set._feeds.get(ACTION)
+        row = row_of(action, "action")
+        if feed is not None:
+            feed.add(self._set._source.nanos(), row)
+
+    def note(self, text: str) -> None:
+        """Put a mark on the time line; see `Recorder.note`."""
+        if self._recorder is None:
+            raise LocalProtocolError("the episode has not begun", hint="use it in a with block")
+        self._recorder.note(text)
+
+    def succeed(self, reason: str = "") -> None:
+        """Label it a success."""
+        self._reason, self._label = _text(reason, "reason"), "success"
+
+    def fail(self, reason: str = "") -> None:
+        """Label it a failure, for a reason in words."""
+        self._reason, self._label = _text(reason, "reason"), "failure"
+
+    def discard(self) -> None:
+        """Delete it at the end of the block."""
+        self._is_discarded = True
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<Episode {self._path.name}, {self._label}>"
+
+
+def named_cameras(cameras: object) -> dict[str, Any]:
+    """Cameras by their names: a mapping as it is, of a list "camera", or "camera_0", "camera_1".
+
+    Raises:
+        ShapeError: neither.
+    """
+    if isinstance(cameras, Mapping):
+        return dict(cameras)
+    if isinstance(cameras, Sequence) and not isinstance(cameras, (str, bytes)):
+        if len(cameras) == 1:
+            return {"camera": cameras[0]}
+        return {f"camera_{index}": camera for index, camera in enumerate(cameras)}
+    raise ShapeError(
+        f"cameras must be a list, or a mapping from names, got {shown(cameras)}",
+        parameter="cameras",
+        value=cameras,
+        hint='for example cameras={"wrist": heptarm.Camera(frame="flange")}',
+    )
+
+
+def label_filter(labels: Iterable[str]) -> tuple[str, ...]:
+    """Labels that are chosen.
+
+    Raises:
+        ShapeError: no words.
+        CommandRejected: there is no such label.
+    """
+    given: object = labels
+    if not isinstance(given, Iterable):
+        raise ShapeError(f"labels must be words, got {shown(given)}", parameter="labels", value=given)
+    chosen = (labels,) if isinstance(labels, str) else tuple(labels)
+    for label in chosen:
+        if not isinstance(label, str) or label not in LABELS:
+            allowed = ", ".join(LABELS)
+            raise CommandRejected(
+                f"labels must be among {allowed}, got {shown(label)}",
+                parameter="labels",
+                value=label,
+                allowed=allowed,
+            )
+    return chosen

@@ -1,0 +1,387 @@
+"""Deployment of a policy of a task with contacts on an arm, with the observations and set-points of training.
+
+The policy decides at the task's rate; between two decisions the set-point of the Cartesian impedance moves in small
+steps over a servo motion. All times are of the robot's clock, so that a simulator may run at any speed. The task's
+leash and box bound the forces, and the largest force of the impedance, which the cabinet keeps. Nothing here needs
+torch or MuJoCo.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, LimitError, ShapeError, StaleState, StreamError, Timeout
+from heptarm.rl.contact.task import ContactTask, Moment
+from heptarm.rl.policy import Policy
+from heptarm.rl.report import EpisodeReport
+from heptarm.values.checks import Array, instance, within
+from heptarm.values.condition.force import ForceAbove
+from heptarm.values.frames import check_name
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.pose import Pose, check_pose
+from heptarm.values.result import Cause
+
+if TYPE_CHECKING:
+    from heptarm.arm.motion.servo import PoseServo
+    from heptarm.arm.verbs import ArmVerbs
+    from heptarm.skills.gripper import Gripper
+    from heptarm.values.state import State
+
+#: Ticks of the servo motion a decision: 100 a second at 20 decisions.
+_FINE = 5
+#: Damping ratio of the impedance, as in training.
+_RATIO = 0.7
+#: The tip is brought so far above where an episode begins, and at the end [m].
+_CLEAR = 0.02
+#: Speeds to the start and back [m/s].
+_APPROACH, _RETREAT = 0.1, 0.05
+#: The zero of the wrench is the mean of so many seconds at rest: a single reading is as uncertain as what it measures.
+_ZEROING = 0.5
+#: Longest wait for these [s].
+_PATIENCE = 30.0
+#: A tick that is so late on the robot's clock is counted [ns].
+_LATE = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSettings:
+    """Settings of a deployment.
+
+    Attributes:
+        frame: of the tool or workpiece, where the site `tip` of the task's scene is.
+        force: largest that the control exerts in each direction [N]; the arm is held compliant at it.
+        peak: a larger force on the tip ends the deployment: the arm stops [N].
+        speed: largest of the set-point [m/s].
+        latency: added between seeing and commanding [s].
+        stale: without a newer state for so long the deployment ends, and without a target the arm stops [s].
+    """
+
+    _: KW_ONLY
+    frame: str = "tip"
+    force: float = 25.0
+    peak: float = 60.0
+    speed: float = 0.25
+    latency: float = 0.0
+    stale: float = 0.25
+
+    def __post_init__(self) -> None:
+        check_name(self.frame, "frame")
+        within(self.force, "force", 1.0, 100.0, unit="N")
+        within(self.peak, "peak", 1.0, 1000.0, unit="N")
+        within(self.speed, "speed", 0.0, 1.0, above=True, unit="m/s")
+        within(self.latency, "latency", 0.0, 0.5, unit="s")
+        within(self.stale, "stale", 0.02, 2.0, unit="s")
+
+
+#: Poses of the free bodies of a task's scene by their names, in the base: of a camera, or of the virtual cabinet.
+Bodies = Callable[[], Mapping[str, Pose]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Episode:
+    poses: Array
+    joints: Array
+    forces: Array
+    missing: Array
+    late: int
+    ended: str
+
+
+def deploy_contact(
+    arm: ArmVerbs,
+    policy: Policy[Any],
+    origins: Pose | Sequence[Pose],
+    targets: npt.ArrayLike | None = None,
+    *,
+    settings: ContactSettings | None = None,
+    bodies: Bodies | None = None,
+    gripper: Gripper | None = None,
+    progress: Callable[[int, float], object] | None = None,
+) -> EpisodeReport:
+    """Run a policy of a task with contacts on an arm, one episode for each target.
+
+    An episode begins with the tip above the middle of the task's starts, and ends with it back there. One that meets a
+    force above `ContactSettings.peak` ends there, with the arm at rest, and counts as failed.
+
+    Args:
+        arm: in control, with what the task needs in its gripper; the start can be reached in a line.
+        policy: of a task with contacts, for this robot.
+        origins: frame of the task in the base, one for all episodes or one each, such as `PegInHole.presumed`.
+        targets: what the episodes are about, as the task draws them, shape (n, k); None: one episode, all numbers 0.
+        settings: frame, force and so on.
+        bodies: where the free bodies of the scene are; for tasks that look at them.
+        gripper: for tasks that use one.
+        progress: called after each episode with its number and what is missing [m].
+
+    Returns:
+        The report; forces are those of the arm's own estimate. Its facts have the interventions of the guard.
+
+    Raises:
+        CommandRejected: a policy of another task, no such frame, or bodies or a gripper that the task needs and lacks;
+            an action that is not finite, upon which the arm stops.
+        LimitError: a robot that is not the task's, or a set-point that could be faster than the guard allows.
+        ShapeError: targets of another shape, or not finite.
+        StaleState: no more states arrived; the arm was stopped.
+        StreamError: the servo stream ended early.
+    """
+    task, chosen = instance(policy, Policy, "policy").task, settings or ContactSettings()
+    _check(arm, task, chosen, bodies, gripper)
+    goals = _goals(task, targets)
+    frames = [origins] * len(goals) if isinstance(origins, Pose) else list(origins)
+    for frame in frames:
+        check_pose(frame, "origins")
+    if len(frames) != len(goals):
+        raise ShapeError(
+            f"origins must be one pose or one for each of {len(goals)} targets, got {len(frames)}",
+            parameter="origins",
+        )
+    arm.subscribe(rate=2.0 * _FINE * task.rate)
+    arm.pose(chosen.frame)  # refuses a frame that is not there before anything moves
+    run = _Run(arm, policy, chosen, bodies, gripper)
+    episodes = []
+    for number, (origin, goal) in enumerate(zip(frames, goals, strict=True)):
+        episodes.append(run.episode(origin, goal))
+        if progress is not None:
+            progress(number, float(episodes[-1].missing[-1]))
+    facts = {
+        "engine": "arm",
+        "robot": arm.robot.title,
+        "virtual": arm.is_virtual,
+        "latency": chosen.latency,
+        "late_ticks": sum(episode.late for episode in episodes),
+        "guard": {"force": sum(episode.ended == "force" for episode in episodes)},
+    }
+    return EpisodeReport(
+        task,
+        goals,
+        np.array([episode.missing for episode in episodes]),
+        np.array([episode.poses[:, :3] for episode in episodes]),
+        joints=np.array([episode.joints for episode in episodes]),
+        forces=np.array([episode.forces for episode in episodes]),
+        facts=facts,
+    )
+
+
+def _check(
+    arm: ArmVerbs, task: Any, settings: ContactSettings, bodies: Bodies | None, gripper: Gripper | None
+) -> None:
+    """Refuse, before anything moves, what cannot be deployed."""
+    if not isinstance(task, ContactTask):
+        raise CommandRejected(
+            f"the policy must be of a task with contacts, got one of {task.name}",
+            parameter="policy",
+            value=task.name,
+            hint="heptarm.rl.deploy deploys it",
+        )
+    if arm.robot.name != task.model.name:
+        raise LimitError(
+            f"the policy was trained for the {task.model.title}; this is a {arm.robot.title}",
+            parameter="policy",
+            value=task.robot,
+            hint=f"train one with --robot {arm.robot.name}",
+        )
+    if task.has_gripper and gripper is None:
+        raise CommandRejected(f"gripper must be given: the task {task.name} uses it", parameter="gripper")
+    if task.look_size and bodies is None:
+        raise CommandRejected(f"bodies must be given: the task {task.name} looks at them", parameter="bodies")
+    fastest = task.step * task.rate * np.sqrt(3.0)
+    if fastest > settings.speed:
+        raise LimitError(
+            f"speed must be at least {fastest:.3g} m/s for the task {task.name}, got {settings.speed:g} m/s",
+            parameter="speed",
+            value=settings.speed,
+            hint="a set-point of this task can be so fast; allow it, or train with a smaller step",
+        )
+
+
+def _goals(task: ContactTask, targets: npt.ArrayLike | None) -> Array:
+    size = task.targets(np.random.default_rng(0), 1).shape[1]
+    goals = np.zeros((1, size)) if targets is None else np.atleast_2d(np.asarray(targets, dtype=np.float64))
+    if goals.shape[1:] != (size,) or not len(goals) or not np.isfinite(goals).all():
+        raise ShapeError(
+            f"targets must have shape (n, {size}) and be finite, got shape {goals.shape}", parameter="targets"
+        )
+    return goals
+
+
+class _Run:
+    """Episodes of a policy on an arm."""
+
+    def __init__(
+        self,
+        arm: ArmVerbs,
+        policy: Policy[Any],
+        settings: ContactSettings,
+        bodies: Bodies | None,
+        gripper: Gripper | None,
+    ) -> None:
+        self._arm, self._policy, self._settings = arm, policy, settings
+        self._bodies, self._gripper = bodies, gripper
+        self._task: ContactTask = policy.task
+        stiffness = np.repeat([self._task.stiffness, self._task.turn_stiffness], 3)
+        self._spring = CartesianImpedance(stiffness, damping=_RATIO, max_force={"xyz": settings.force})
+
+    def episode(self, origin: Pose, target: Array) -> _Episode:
+        """One episode: to its start, the policy, and back."""
+        arm, task, frame = self._arm, self._task, self._settings.frame
+        begins = task.starts(np.random.default_rng(0), 100)
+        start = origin @ Pose.from_rotvec(begins[:, :3].mean(axis=0), begins[:, 3:].mean(axis=0))
+        above = start.shifted(z=-_CLEAR, frame="tool")
+        arm.move([lin(place, moving=frame, speed_mps=_APPROACH) for place in (above, start)])
+        arm.wait_for_rest()
+        tip = _Tip(arm, origin, frame)
+        tip.zero(_ZEROING)
+        with arm.servo(
+            "lin",
+            rate=task.rate * _FINE * arm.real_time_factor,
+            watchdog=self._settings.stale,
+            mode=self._spring,
+            moving=frame,
+            until=ForceAbove(self._settings.peak, frame=frame),
+        ) as servo:
+            found = self._decide(servo, tip, origin, target)
+        height = float(found.poses[-1][2]) - float(begins[:, 2].mean())
+        arm.move(
+            lin_rel(z=-max(height, 0.0) - _CLEAR, frame=origin, moving=frame, speed_mps=_RETREAT),
+            mode=self._spring,
+        )
+        if servo.result is not None and servo.result.cause is Cause.CONDITION:
+            return replace(found, ended="force")
+        if found.ended:
+            raise StreamError(
+                "the servo stream ended before the episode did", hint="look at the cabinet's log"
+            )
+        return found
+
+    def _decide(self, servo: PoseServo, tip: _Tip, origin: Pose, target: Array) -> _Episode:
+        """Let the policy decide until the episode, or the servo motion, ends."""
+        task = self._task
+        state = servo.start
+        pose = tip.pose(state)
+        now = self._moment(origin, pose, task.begin(pose), np.zeros(6), target)
+        delay = round(self._settings.latency * task.rate * _FINE)
+        waiting = deque([now.command] * (delay + 1), maxlen=delay + 1)
+        frames = deque([task.frame(now)] * (max(task.history) + 1))
+        poses, joints, forces, missing, late = [pose], [state.q], [], [], 0
+        for step in range(task.steps):
+            last = now.command
+            command = task.advance(last, pose, self._action(np.array(frames)))
+            wrenches = []
+            for part in range(1, _FINE + 1):
+                waiting.append(last + (command - last) * part / _FINE)
+                servo.set(origin @ Pose.from_rotvec(waiting[0][:3], waiting[0][3:6]))
+                reached = tip.wait(servo, (step * _FINE + part) / (task.rate * _FINE))
+                if reached is None:
+                    break
+                state, is_late = reached
+                late += is_late
+                wrenches.append(tip.wrench(state))
+            if len(wrenches) < _FINE:
+                break
+            self._grip(last, command)
+            pose, wrench = tip.pose(state), np.mean(wrenches, axis=0)
+            now = replace(self._moment(origin, pose, command, wrench, target), memory=now.memory)
+            now = replace(now, memory=task.remember(now), time=np.array((step + 1) / task.rate))
+            frames.appendleft(task.frame(now))
+            frames.pop()
+            poses.append(pose)
+            joints.append(state.q)
+            forces.append(float(np.linalg.norm(wrench[:3])))
+            missing.append(float(task.left(now)))
+        left = task.steps - len(missing)
+        never = [float(task.left(now)) + task.radius] * left  # one that ended early has failed
+        return _Episode(
+            np.array(poses + [poses[-1]] * left),
+            np.array(joints + [joints[-1]] * left),
+            np.array(forces + [0.0] * left),
+            np.array(missing + never),
+            late,
+            ended="early" if left else "",
+        )
+
+    def _action(self, frames: Array) -> Array:
+        """What the policy decides.
+
+        Raises:
+            CommandRejected: that is not finite; the arm stops.
+        """
+        action = np.asarray(self._policy(self._task.observe(frames)), dtype=np.float64)
+        if not np.isfinite(action).all():
+            raise CommandRejected(
+                f"an action of the policy must be finite, got {action.tolist()}",
+                parameter="policy",
+                hint="train it again, or evaluate it with `heptarm rl eval`",
+            )
+        return action
+
+    def _moment(self, origin: Pose, pose: Array, command: Array, wrench: Array, target: Array) -> Moment:
+        seen = {} if self._bodies is None else self._bodies()
+        to_task = origin.inverse()
+        bodies = {name: _numbers(to_task @ place) for name, place in seen.items()}
+        memory = np.zeros(self._task.memory_size)
+        return Moment(pose, command, wrench, target, bodies=bodies, memory=memory)
+
+    def _grip(self, last: Array, command: Array) -> None:
+        """Close or open the gripper where the policy has changed its mind."""
+        if self._gripper is not None and self._task.has_gripper and last[6] != command[6]:
+            self._gripper.close() if command[6] > 0.0 else self._gripper.open()
+
+
+class _Tip:
+    """Pose of the tip and wrench on it in the frame of the task, by the robot's clock."""
+
+    def __init__(self, arm: ArmVerbs, origin: Pose, frame: str) -> None:
+        self._arm, self._frame = arm, frame
+        self._to_task, self._axes = origin.inverse(), origin.rotation
+        self._zero = np.zeros(6)
+
+    def zero(self, seconds: float) -> None:
+        """Zero the wrench by its mean over a time, the arm at rest."""
+        seen: dict[int, Array] = {}
+
+        def is_enough(state: State) -> bool:
+            seen[state.stamp] = self.wrench(state)
+            return state.stamp - min(seen) >= seconds * 1e9
+
+        self._arm.wait_until(is_enough, timeout=_PATIENCE)
+        self._zero = np.mean(list(seen.values()), axis=0)
+
+    def wait(self, servo: PoseServo, time: float) -> tuple[State, bool] | None:
+        """The first state from a time since the start on [s], and whether it is late; None: the motion has ended.
+
+        Raises:
+            StaleState: no states arrive.
+        """
+        due = servo.start.stamp + round(time * 1e9)
+        try:
+            state = self._arm.wait_until(
+                lambda seen: seen.stamp >= due or not servo.active, timeout=servo.watchdog
+            )
+        except Timeout:
+            raise StaleState(
+                f"no newer state within {servo.watchdog:.2f} s",
+                allowed=f"[0, {servo.watchdog:g}] s",
+                hint="check the connection and the load of this machine",
+            ) from None
+        return (state, state.stamp - due > _LATE) if servo.active else None
+
+    def pose(self, state: State) -> Array:
+        """Shape (6,) [m, rad]."""
+        return _numbers(self._to_task @ self._arm.pose(self._frame, state=state))
+
+    def wrench(self, state: State) -> Array:
+        """Shape (6,) [N, Nm]."""
+        load = self._arm.wrench(self._frame, state=state)
+        result: Array = np.concatenate([load.force @ self._axes, load.torque @ self._axes]) - self._zero
+        return result
+
+
+def _numbers(pose: Pose) -> Array:
+    return np.concatenate([pose.xyz, pose.rotvec])

@@ -1,0 +1,136 @@
+"""Each task with contacts: it can be solved, nothing is done by itself, Gymnasium and Stable-Baselines3 accept it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+
+import gymnasium
+
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.rl.contact.polish import Polish
+from heptarm.rl.contact.push import Push
+from heptarm.rl.contact.task import ContactTask, Moment
+from heptarm.rl.evaluate import evaluate
+from heptarm.rl.sim.contact_batch import BatchContact
+from heptarm.rl.sim.episodes import BatchSettings
+from heptarm.rl.sim.simulate import simulate
+from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import TASKS, environment, task_named
+
+CONTACT = [name for name, kind in TASKS.items() if issubclass(kind, ContactTask)]
+TWO = BatchSettings(envs=2, starts="together", seed=3, threads=1)
+
+
+@pytest.mark.parametrize("name", CONTACT)
+def test_who_knows_everything_succeeds_and_who_does_nothing_does_not(name: str) -> None:
+    task = task_named(name)
+    assert isinstance(task, ContactTask)
+    arms = BatchContact(task, TWO)
+    _, left = arms.outcome()
+    assert left.min() > 2.0 * task.radius
+    force = np.zeros(2)
+    for _ in range(task.steps - 1):
+        step = arms.step(arms.teach())
+        force = np.maximum(force, step.force)
+    assert step.distance.max() <= task.radius
+    assert step.reward.min() > 0.2
+    assert force.max() <= 40.0
+
+
+@pytest.mark.parametrize("kind", TASKS.values(), ids=list(TASKS))
+def test_gymnasium_and_stable_baselines_find_nothing_to_complain_of(kind: type) -> None:
+    from gymnasium.utils.env_checker import check_env
+
+    env = gymnasium.make(environment(kind), task=kind(steps=8)).unwrapped
+    check_env(env)
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        checker.check_env(env)
+    many = gymnasium.make_vec(environment(kind), num_envs=2, task=kind(steps=8))
+    seen, _ = many.reset(seed=1)
+    assert many.observation_space.contains(seen)
+    for index in range(8):
+        seen, reward, terminated, truncated, info = many.step(many.action_space.sample())
+        assert many.observation_space.contains(seen)
+        assert reward.shape == info["distance"].shape == (2,)
+        assert not terminated.any() and truncated.all() == (index == 7)
+    assert env.spec is None or env.spec.id == environment(kind)
+
+
+def test_a_batch_goes_on_after_a_load_as_if_nothing_had_been() -> None:
+    task = PickPlace(steps=20)
+    arms = BatchContact(task, TWO)
+    for _ in range(5):
+        arms.step(arms.teach())
+    other = BatchContact(task, BatchSettings(envs=2, seed=9, threads=2))
+    other.load(arms.save())
+    action = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 4))
+    for _ in range(10):
+        assert (arms.step(action).observation == other.step(action).observation).all()
+
+
+def test_bodies_are_seen_where_they_are_placed() -> None:
+    task = Push()
+    arms = BatchContact(task, TWO)
+    assert arms.bodies()["puck"][:, :2] == pytest.approx(arms.target[:, :2])
+    turned = np.array([[0.01, 0.02, -0.1, 0.3, -0.2, 0.5]])
+    assert arms._seen_from_origin(arms._in_base(turned)) == pytest.approx(turned)
+
+
+def test_what_was_polished_is_remembered_where_the_force_was_right() -> None:
+    task = Polish()
+    target = np.array([0.0, 0.0, 0.0, 10.0])
+    rest = np.zeros(6)
+    now = Moment(rest, rest, np.array([0, 0, -10.0, 0, 0, 0]), target, memory=np.zeros(task.memory_size))
+    assert task.remember(now).sum() == 1.0
+    weak = Moment(rest, rest, np.array([0, 0, -5.0, 0, 0, 0]), target, memory=task.remember(now))
+    moved = Moment(np.array([0, 0.03, 0, 0, 0, 0]), rest, weak.wrench, target, memory=weak.memory)
+    assert task.remember(moved).sum() == 1.0
+    assert task.missing(moved) == pytest.approx(task.length * 23 / 24)
+
+
+def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
+    with pytest.raises(CommandRejected, match=r"task must be one of reach, .*got 'juggle'"):
+        gymnasium.make("heptarm/Push-v0", task="juggle")
+    with pytest.raises(ShapeError, match="task must be a"):
+        gymnasium.make("heptarm/Push-v0", task=3)
+
+    class Broken(Push):
+        name = "broken"
+
+        def scene(self) -> str:
+            return "<mujoco><worldbody><geom size='none'/></worldbody></mujoco>"
+
+    class Handless(Push):
+        name = "handless"
+
+        def scene(self) -> str:
+            return "<mujoco><worldbody/></mujoco>"
+
+    with pytest.raises(CommandRejected, match="the scene of broken cannot be read"):
+        simulate(Broken(), TWO)
+    with pytest.raises(CommandRejected, match="a body `tool` with a site `tip`"):
+        simulate(Handless(), TWO)
+    with pytest.raises(CommandRejected, match="no teacher"):
+        ContactTask.teach(Push(), Moment(*(np.zeros(6),) * 4))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in TASKS.values() if kind is not ReachTask])
+def test_numbers_outside_their_range_are_refused(kind: type) -> None:
+    for number in fields(kind):
+        if number.metadata.get("unit"):
+            with pytest.raises(LimitError, match=rf"{number.name} must be .*{number.metadata['unit']}"):
+                kind(**{number.name: -1.0})
+
+
+def test_any_function_of_observations_is_evaluated() -> None:
+    report = evaluate(lambda seen: np.zeros((len(seen), 2)), 2, task=Push(steps=5))
+    assert report.success_rate == 0.0 and report.targets.shape == (2, 4)

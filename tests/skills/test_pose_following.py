@@ -1,0 +1,190 @@
+"""An arm follows poses: by UDP, of a second arm that is guided; clutch, scale, walls; what is no pose is counted."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import devices, skills
+from heptarm.devices.pose_stream import PoseInput, PoseStream
+from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
+from tests.cli.running import refused
+from tests.conftest import RunningCabinet
+from tests.simulators import FASTER
+
+SPEED = FASTER
+
+HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
+
+
+class Sender:
+    """A program that sends poses."""
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect(("127.0.0.1", port))
+
+    def send(self, xyz: list[float], *buttons: str, **more: object) -> None:
+        content = {"position": xyz, "quaternion": [0, 0, 0, 1], "buttons": list(buttons)} | more
+        self.socket.send(json.dumps(content).encode())
+
+    def close(self) -> None:
+        self.socket.close()
+
+
+class Clock:
+    """A clock that a test moves on."""
+
+    def __init__(self) -> None:
+        self.now = 1_000_000_000
+
+    def nanos(self) -> int:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        raise AssertionError
+
+    def sleep_until(self, due: int) -> None:
+        raise AssertionError
+
+
+def test_the_newest_pose_counts_and_silence_releases_the_buttons() -> None:
+    clock = Clock()
+    with PoseStream(0, host="127.0.0.1", silence=0.2, clock=clock) as stream:
+        assert stream.read() == PoseInput()
+        sender = Sender(stream.port)
+        sender.send([0.1, 0.2, 0.3], "clutch", t=5.0)
+        sender.send([0.5, 0.2, 0.3], "clutch", t=5.2)
+        sender.send([0.4, 0.2, 0.3], t=5.1)  # overtaken
+        seen = stream.read()
+        assert seen.pose is not None and seen.pose.x == 0.5 and seen.buttons == {"clutch"}
+        clock.now += 210_000_000
+        assert stream.read().buttons == frozenset() and stream.read().pose == seen.pose
+        sender.send([0.0, 0.0, 0.1], "clutch", t=0.1)  # a sender that began again
+        seen = stream.read()
+        assert seen.pose is not None and seen.pose.z == 0.1 and seen.buttons == {"clutch"}
+        bad: list[tuple[bytes, str]] = [
+            (b"\xff\xfe", "codec"),
+            (b"[1, 2]", "object of JSON"),
+            (b'{"position": [1, 2, 3]}', "quaternion"),
+            (b"[" * 4000, "recursion"),
+            (b"x" * 5000, "at most 4096"),
+            (b'{"position": [1, 2, NaN], "quaternion": [0, 0, 0, 1]}', "finite"),
+            (b'{"position": [1, 2, 3e9], "quaternion": [0, 0, 0, 1]}', "within 1000 m"),
+            (b'{"position": [1, 2, true], "quaternion": [0, 0, 0, 1]}', "3 numbers"),
+            (b'{"position": [1, 2, 3], "quaternion": [0, 0, 0, 2]}', "norm 1"),
+            (b'{"position": [1, 2, 3], "quaternion": [0, 0, 0, 1], "buttons": "a"}', "list of up to 32"),
+            (b'{"position": [1, 2, 3], "quaternion": [0, 0, 0, 1], "t": null}', "t must"),
+        ]
+        for number, (data, text) in enumerate(bad, 1):
+            sender.socket.send(data)
+            assert stream.read().pose == seen.pose
+            assert stream.refused == number and (text in stream.error or text == "recursion"), stream.error
+        with pytest.raises(NotReady, match="cannot be received at 127"):
+            devices.pose_stream(stream.port)
+        sender.close()
+    assert stream.read() == PoseInput()
+    with pytest.raises(LimitError, match="port must be"):
+        devices.pose_stream(-1)
+    with pytest.raises(LimitError, match="silence must be"):
+        devices.pose_stream(0, silence=0.0)
+
+
+@pytest.fixture(scope="module")
+def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
+        yield arm
+
+
+@pytest.mark.slow
+def test_an_arm_follows_while_the_clutch_is_held_scaled_turned_and_inside_its_walls(arm: ha.Arm) -> None:
+    arm.move(ha.ptp(HOME), speed=1.0)
+    start = arm.state.pose
+    arm.workspace = ha.Workspace((start.xyz - 0.3, start.xyz + [0.3, 0.3, 0.02]), mode="clamp")
+    axes = ha.Pose.from_rotvec([0, 0, 0], [0, 0, np.pi / 2])  # the sender's x is the arm's y
+    with devices.pose_stream(0) as stream:
+        sender = Sender(stream.port)
+        hand, phase = np.zeros(3), [0]
+
+        def person(_: PoseInput) -> bool:
+            """Move without the clutch; with it; let go and reach back; jump; press up against the wall."""
+            now = arm.state.pose
+            if phase[0] == 0:
+                hand[0] += 0.005
+                if hand[0] > 0.06:
+                    assert now.distance_to(start) < 1e-3, "without the clutch nothing moves"
+                    phase[0] = 1
+            elif phase[0] == 1:
+                hand[0] = min(hand[0] + 0.002, 0.16)
+                phase[0] += hand[0] == 0.16 and now.y > start.y + 0.045
+            elif phase[0] == 2:
+                hand[0] = max(hand[0] - 0.02, 0.0)
+                phase[0] += hand[0] == 0.0
+            elif phase[0] == 3:
+                hand[:] = [0.0, 0.0, 0.9]  # the tracking has jumped
+                phase[0] = 4
+            elif phase[0] == 4:
+                hand[2] += 0.002
+                phase[0] += hand[2] > 1.0 and now.z > start.z + 0.015
+            held = phase[0] in (1, 3, 4)
+            sender.send(hand.tolist(), *(["clutch"] if held else []), *(["quit"] if phase[0] == 5 else []))
+            return True
+
+        sender.send([0, 0, 0])
+        stats = skills.follow_poses(
+            arm, stream, scale=0.5, axes=axes, while_true=person, watchdog=2.0, duration=90.0, speed=1.0
+        )
+        sender.close()
+    end = arm.wait_for_rest().pose
+    assert phase[0] == 5, stats
+    assert abs(end.y - start.y - 0.05) < 3e-3 and abs(end.x - start.x) < 3e-3, (
+        "half of 0.1 m, along the arm's y"
+    )
+    assert 0.015 < end.z - start.z < 0.022, "the wall is 20 mm above"
+    assert stats.refused == 0 and stats.clamped > 0
+    arm.workspace = None
+    with pytest.raises(ShapeError, match="must be a device that knows its pose"):
+        skills.follow_poses(arm, 3)  # type: ignore[arg-type]
+    with devices.pose_stream(0) as other, pytest.raises(LimitError, match="scale must be"):
+        skills.follow_poses(arm, other, scale=0.0)
+    with pytest.raises(CommandRejected, match="NoSuchSignal"):
+        skills.LeaderArm(arm, clutch="NoSuchSignal")
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_an_arm_follows_a_second_one_that_is_pushed(arm: ha.Arm, tmp_path: Path) -> None:
+    arm.move(ha.ptp(HOME), speed=1.0)
+    start = arm.state.pose
+    with ha.connect("sim://iiwa7", watchdog=10.0, timeout=60.0) as leader:
+        leader.move(ha.ptp(HOME), speed=1.0)
+        began = leader.pose()
+        with skills.LeaderArm(leader) as guided:
+            leader.operator.start_push([0, 15, 0], duration=300.0)
+
+            def goes_on(_: PoseInput) -> bool:
+                return leader.pose().y < began.y + 0.1
+
+            skills.follow_poses(
+                arm, guided, scale=0.5, while_true=goes_on, watchdog=2.0, duration=90.0, speed=1.0
+            )
+            leader.operator.start_push([0, 0, 0], duration=0.0)
+    assert 0.02 < arm.wait_for_rest().pose.y - start.y < 0.08
+
+
+def test_the_command_refuses_what_does_not_fit() -> None:
+    cases: list[tuple[tuple[str, ...], str]] = [
+        ((), "one of --leader, --device and --poses, got none"),
+        (("--poses", "0", "--device", "keyboard"), "got device, poses"),
+        (("--poses", "0", "--reflect", "0.5"), "reflect needs a leader"),
+        (("--poses", "0", "--workspace", "1,2"), "workspace must be X,Y,Z,X,Y,Z"),
+        (("--poses", "0", "--for", "-1"), "for must be"),
+    ]
+    for options, text in cases:
+        assert text in refused("teleop", *options).stderr
