@@ -39,6 +39,7 @@ CONNECTED = (
 #: Values whose methods are called, by the name in a report.
 OBJECTS: dict[str, object] = {
     "Pose": POSE,
+    "PartialPose": heptarm.PartialPose(z=0.3),
     "Dynamics": heptarm.Dynamics(),
     "Ptp": heptarm.ptp(HOME),
     "Lin": heptarm.lin(POSE),
@@ -77,8 +78,10 @@ EXPECTED: dict[str, type[Exception]] = {
     "load_episodes": heptarm.CommandRejected,
     "save_lerobot": heptarm.CommandRejected,
     "mesh": heptarm.CommandRejected,
+    "CollisionModel.color": heptarm.CommandRejected,
     "CollisionModel.remove": heptarm.CommandRejected,
     "CollisionModel.seen_by": heptarm.CommandRejected,
+    "CollisionModel.set_color": heptarm.CommandRejected,
     "CollisionModel.set_arm": heptarm.CommandRejected,
     "law_from": heptarm.CommandRejected,
     "export_model": heptarm.CommandRejected,

@@ -421,6 +421,7 @@ class PartialPose(Value):
 
     def placed(self, frame: Pose) -> PartialPose:
         """The same target in the frame in which `frame` is given."""
+        check_pose(frame, "frame")
         return replace(self, frame=frame @ self.frame)
 
     def completed(self, start: Pose) -> Pose:
