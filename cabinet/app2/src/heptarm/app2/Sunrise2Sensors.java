@@ -69,19 +69,24 @@ final class Sunrise2Sensors implements Sensors {
 
     @Override
     public WrenchState readWrench(long stamp) {
-        return readWrench("base", stamp);
+        return readWrench("base", null, stamp);
     }
 
     /** As in 1.x the cabinet is taken to measure in the axes of the frame; those of the base follow from its orientation. */
     @Override
-    public WrenchState readWrench(String axes, long stamp) {
+    public WrenchState readWrench(String frame, Pose axes, long stamp) {
         ForceData measured = lbr.getExternalForceTorque(lbr.getFlange());
         double[] force = array(measured.getForce());
         double[] torque = array(measured.getTorque());
-        if ("base".equals(axes)) {
+        if (axes != null || "base".equals(frame)) {
             double[] quat = quaternion(flange());
             force = rotate(quat, force);
             torque = rotate(quat, torque);
+        }
+        if (axes != null) {
+            double[] back = {-axes.quat[0], -axes.quat[1], -axes.quat[2], axes.quat[FORCE]};
+            force = rotate(back, force);
+            torque = rotate(back, torque);
         }
         return new WrenchState(stamp, force, torque, unknown(FORCE), unknown(FORCE));
     }
