@@ -206,6 +206,10 @@ _OPEN = "NaN keeps the default"
 _FREE = "infinite: no limit"
 #: Values with a documented meaning that their type does not show: function or parameter, the bad value, the meaning.
 ACCEPTED: dict[tuple[str, str], str] = {
+    **{
+        (f"CollisionModel.{name}.color", "array"): "red, green, blue"
+        for name in ("add", "add_points", "set_color")
+    },
     **{(f"PartialPose.{name}", "nan"): "keeps this coordinate" for name in "xyzabc"},
     **{("Dynamics", bad): _OPEN for bad in ("nan", "nan array")},
     ("PoseLimits", "inf"): _FREE,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Iterator
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -36,6 +38,28 @@ CONNECTED = (
     *("live", "LiveView", "record_client"),
     *("start_together", "states_together", "stop_all", "run"),
 )
+
+
+def forgetting(method: Any) -> Any:
+    """A method that adds bodies, after which they go again."""
+
+    @functools.wraps(method)
+    def add(world: heptarm.CollisionModel, *args: Any, **kwargs: Any) -> None:
+        known = world.bodies
+        method(world, *args, **kwargs)
+        for body in set(world.bodies) - set(known):
+            world.remove(body)
+
+    return add
+
+
+class Forgetful(heptarm.CollisionModel):
+    """A world that is the same for each call."""
+
+    add = forgetting(heptarm.CollisionModel.add)
+    add_points = forgetting(heptarm.CollisionModel.add_points)
+
+
 #: Values whose methods are called, by the name in a report.
 OBJECTS: dict[str, object] = {
     "Pose": POSE,
@@ -48,7 +72,7 @@ OBJECTS: dict[str, object] = {
     "Tool": heptarm.Tool("t", frames={"tip": POSE}),
     "Trajectory": bad_values.BY_ANNOTATION["Trajectory"],
     "CollisionGuard": heptarm.CollisionGuard.of(20.0),
-    "CollisionModel": heptarm.CollisionModel("iiwa14", scene="table"),
+    "CollisionModel": Forgetful("iiwa14", scene="table"),
     "CartesianImpedance": CartesianImpedance(),
     "timed": SineImpedance(),
     "force": force,
