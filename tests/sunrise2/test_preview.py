@@ -175,7 +175,7 @@ def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
             lambda: arm.set_override(0.5),
             arm.pause,
             lambda: arm.pad.process_data("x"),
-            lambda: arm.pad.ask("?"),
+            lambda: arm.pad.ask("Go on?", "Yes"),
             lambda: arm.move(ha.ptp(arm.state.q), mode=JointImpedance(stiffness=500.0)),
         ):
             with pytest.raises(CommandRejected, match=r"does not support"):
