@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -130,6 +131,18 @@ def test_episodes_have_labels_and_equal_steps_in_which_everything_is_new_or_coun
     check_data_set(data, found[1:])
     with pytest.raises(CommandRejected, match="folder must be empty or new"):
         ha.save_lerobot(found, data)
+    with pytest.MonkeyPatch.context() as full:
+
+        def no_space(*_: object, **__: object) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        full.setattr(parquet.ParquetWriter, "write_table", no_space)
+        with pytest.raises(CommandRejected, match="no space left"):
+            ha.save_lerobot(ha.load_episodes(folder, labels="success"), data, overwrite=True)
+    check_data_set(data, found[1:])
+    assert sorted(path.name for path in tmp_path.iterdir() if "data" in path.name) == ["data"], (
+        "half a data set"
+    )
     (folder / "episode-00001.mcap").unlink()
     with peer.arm() as arm, arm.episodes(folder, rate=25.0) as episodes, episodes.episode("Look") as last:
         assert last.path.name == "episode-00003.mcap", "numbers are not used again"

@@ -61,18 +61,25 @@ def save_lerobot(episodes: Demonstrations, folder: str | Path, *, overwrite: boo
     replaces = flag(overwrite, "overwrite")
     used = [episode for episode in episodes if len(episode)]
     features = _features(used)
-    if where.exists() and any(where.iterdir()):
-        if not (replaces and (where / "meta" / "info.json").is_file()):
-            raise CommandRejected(
-                f"folder must be empty or new, {where} has files",
-                parameter="folder",
-                value=str(where),
-                hint="choose another folder, or replace a data set with overwrite=True",
-            )
-        shutil.rmtree(where)
+    if (
+        where.exists()
+        and any(where.iterdir())
+        and not (replaces and (where / "meta" / "info.json").is_file())
+    ):
+        raise CommandRejected(
+            f"folder must be empty or new, {where} has files",
+            parameter="folder",
+            value=str(where),
+            hint="choose another folder, or replace a data set with overwrite=True",
+        )
+    new = where.with_name(f".{where.name}.new")  # what is there stays until the new one is complete
     try:
-        _write(arrow, parquet, used, where, features)
+        shutil.rmtree(new, ignore_errors=True)
+        _write(arrow, parquet, used, new, features)
+        shutil.rmtree(where, ignore_errors=True)
+        new.rename(where)
     except OSError as error:
+        shutil.rmtree(new, ignore_errors=True)
         raise unwritable(where, error) from error
     return where
 
