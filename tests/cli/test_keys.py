@@ -49,6 +49,7 @@ WITHOUT_A_CONNECTION = {
     "twin",
     "export",
     "calibrate board",
+    "episodes",
 }
 #: What else the commands must be given to get as far as their connection.
 ARGUMENTS = {
@@ -57,6 +58,7 @@ ARGUMENTS = {
     "plan ptp": "0 0 0 0 0 0 0",
     "plan lin": "0.5 0 0.5 0 0 0",
     "plan to": "0.5 0 0.5 0 0 0",
+    "teleop": "--poses 30310",
     "teach": "{folder}/taught.npz",
     "replay": "{folder}/recorded.npz",
     "bench": "--fri",

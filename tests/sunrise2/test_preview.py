@@ -183,7 +183,7 @@ def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
         assert "this cabinet reports no safety state" in str(arm.recover())
         with pytest.raises(StaleState, match="does not report the commanded pose"):
             _ = arm.state.pose_cmd
-    shown = run("doctor", "--target", address, "--json")
-    assert "a preview for Sunrise 2.x, never run on such a cabinet" in shown.stdout
-    assert "reports neither safety state nor readiness" in shown.stdout
+    verdict = run("doctor", "--target", address, "--json")
+    assert "a preview for Sunrise 2.x, never run on such a cabinet" in verdict.stdout
+    assert "reports neither safety state nor readiness" in verdict.stdout
     assert "readiness and stops unknown" in run("state", "--target", address).stdout

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
+from typing import Final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ from heptarm.record.episodes import (
 from heptarm.record.recording import Recording, load
 from heptarm.values.checks import Array, frozen, instance, within
 from heptarm.values.files import path_of
+from heptarm.values.sealed import Sealed
 from heptarm.values.text import lines
 
 #: Signals of the states that steps have, with their numbers.
@@ -107,12 +108,14 @@ class Demonstration:
         return f"<Demonstration {self.path.name}, {self.label}, {len(self)} steps>"
 
 
-class Demonstrations(Sequence[Demonstration]):
+class Demonstrations(Sealed, Sequence[Demonstration]):
     """Episodes of a folder; made by `load_episodes`.
 
     Attributes:
         folder: where they are.
     """
+
+    folder: Final[Path]
 
     def __init__(self, folder: Path, episodes: Iterable[Demonstration]) -> None:
         self.folder, self._episodes = folder, tuple(episodes)

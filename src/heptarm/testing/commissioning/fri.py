@@ -6,8 +6,10 @@ import itertools
 import math
 import statistics
 import time
+from contextlib import suppress
 
 from heptarm.arm.arm import Arm
+from heptarm.errors import MotionAborted, StreamError
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import Quality, SessionState
@@ -24,6 +26,7 @@ from heptarm.testing.commissioning.step import (
     step,
 )
 from heptarm.testing.measure import Unfit
+from heptarm.values.mode.impedance import JointImpedance
 
 #: Time between two messages [ms], and messages that are kept.
 _PERIOD, _HISTORY = 5, 4096
@@ -32,6 +35,8 @@ _HOLDS = Movement("Nothing but the approach", "0 deg", "then the arm holds its p
 _UNTIL_GOOD = 95
 #: Speed of A7 while an answer is held back [rad/s], and for how many periods it is.
 _SLOW, _HELD_BACK = 0.02, 2.4
+#: Torque on A7 [Nm], stiffness of its spring [Nm/rad], and by how much it is wound at least [rad].
+_TORQUE, _SPRING, _WOUND = 1.0, 50.0, 5e-3
 #: Time at which no answer is held back [s].
 _NEVER = 1e6
 
@@ -130,6 +135,39 @@ def lost_answer(arm: Arm, person: Person) -> tuple[Comparison, ...]:
         same("the session is", state.name if is_open else "closed", SessionState.COMMANDING_ACTIVE.name),
         at_most("largest change of the position between two messages", max(steps), 1e-3, "rad"),
     )
+
+
+def wind_up(state: FriState, out: Output, params: Params) -> None:
+    """A law that winds the spring of A7 by a torque, within 0.3 s.
+
+    Args:
+        state: the message.
+        out: the command.
+        params: `torque` [Nm].
+    """
+    out.tau[6] = params.torque * min(state.t / 0.3, 1.0)
+
+
+@step(
+    movement=Movement("A7", "by less than 2 deg", "a spring of 50 Nm/rad, wound by 1 Nm; then a stop"),
+    needs=("fri_torque",),
+)
+def torque_end(arm: Arm, person: Person) -> tuple[Comparison, ...]:
+    """Does the arm stay where it is when a stop ends the torques that have wound the spring of its impedance?"""
+    start = arm.state.q[6]
+    with (
+        suppress(MotionAborted, StreamError),
+        arm.fri(
+            "torque", mode=JointImpedance(_SPRING), period_ms=_PERIOD, law=wind_up, params={"torque": _TORQUE}
+        ) as session,
+    ):
+        session.wait(0.8)
+        wound = arm.state.q[6]
+        arm.stop()
+    if abs(wound - start) < _WOUND:
+        raise Unfit(f"{_TORQUE:g} Nm have turned A7 by {math.degrees(wound - start):.2f} deg only")
+    rest = arm.wait_for_rest().q[6]
+    return (at_most("A7 turns after the stop by", abs(rest - wound), 0.5 * abs(wound - start), "rad"),)
 
 
 @step(movement=Movement("A7", "by less than 1 deg", "1.2 deg/s, by FRI commands"), needs=("fri_position",))
