@@ -2,9 +2,9 @@
 
     .venv/bin/python -m venv build/mplib && build/mplib/bin/python -m pip install mplib==0.2.1
 
-Tesseract is left out. Its wheel installs (tesseract-robotics 0.5.1), and its environment loads the same URDF with Bullet's
-checks, but of its OMPL planner Python gets the settings (`OMPLRealVectorPlanProfile.solver_config`) as a pointer without
-members: neither time nor step nor simplification can be set, so that a search cannot be held to the same second.
+Tesseract is left out. Its wheel installs (tesseract-robotics 0.5.1), and its environment loads the same URDF with the
+checks of Bullet. But Python gets the settings of its OMPL planner (`OMPLRealVectorPlanProfile.solver_config`) as a
+pointer without members: neither time nor step can be set, so that a search cannot be held to the same second.
 
 mplib gets the shapes of heptarm's model one by one, and a capsule as a cylinder with two spheres. The two have
 to agree which postures are free; how many do is measured, too.
