@@ -10,21 +10,18 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
-import heptarm.core.robot.FailureTexts;
+import heptarm.core.robot.ContainerJob;
 import heptarm.core.robot.MotionJob;
 
-/** A motion container of Sunrise as a job of the core. It ends once, whichever callback comes first. */
-class SunriseJob implements MotionJob, IMotionContainerListener {
-    private final MotionJob.Listener listener;
+/** A motion container of Sunrise as a job of the core. */
+class SunriseJob extends ContainerJob implements IMotionContainerListener {
     /** Segments of a spline, which some cabinets report one by one. */
     final List<IMotion> segments = new ArrayList<IMotion>();
     private BreakConditions until;
     private IMotionContainer container;
-    private boolean cancelled;
-    private boolean ended;
 
     SunriseJob(MotionJob.Listener listener) {
-        this.listener = listener;
+        super(listener);
     }
 
     /** Let conditions end a motion. */
@@ -34,41 +31,14 @@ class SunriseJob implements MotionJob, IMotionContainerListener {
     }
 
     /** Set the container that moveAsync has returned. */
-    void set(IMotionContainer accepted) {
-        boolean late;
-        synchronized (this) {
-            container = accepted;
-            late = cancelled;
-        }
-        if (late) {
-            accepted.cancel();
-        }
+    void set(IMotionContainer moved) {
+        container = moved;
+        accepted();
     }
 
-    public void cancel() {
-        IMotionContainer accepted;
-        synchronized (this) {
-            cancelled = true;
-            accepted = ended ? null : container;
-        }
-        if (accepted != null) {
-            accepted.cancel();
-        }
-    }
-
-    void fail(String text) {
-        String why = text == null ? "the cabinet reports no reason" : text;
-        end(Outcome.FAILED, FailureTexts.code(why), why);
-    }
-
-    private void end(Outcome outcome, int code, String text) {
-        synchronized (this) {
-            if (ended) {
-                return;
-            }
-            ended = true;
-        }
-        listener.finished(outcome, code, text);
+    @Override
+    protected void cancelContainer() {
+        container.cancel();
     }
 
     public void onStateChanged(IExecutionContainer changed, ExecutionState state) {
@@ -77,19 +47,13 @@ class SunriseJob implements MotionJob, IMotionContainerListener {
     public void containerFinished(IMotionContainer finished) {
         if (finished.hasError()) {
             fail(finished.getErrorMessage());
-            return;
-        }
-        boolean wasCancelled;
-        synchronized (this) {
-            wasCancelled = cancelled;
-        }
-        if (finished.getFiredBreakConditionInfo() != null) {
+        } else if (finished.getFiredBreakConditionInfo() != null) {
             if (until != null) {
                 until.report(finished, listener);
             }
             end(Outcome.CONDITION, 0, "");
         } else {
-            end(wasCancelled ? Outcome.CANCELLED : Outcome.DONE, 0, "");
+            finish();
         }
     }
 
