@@ -85,16 +85,15 @@ prepared: $(STAMPS)/demo
 	$(MAKE) --no-print-directory native cabinet $(STAMPS)/browser; compiled=$$?; \
 	wait $$packages && exit $$compiled
 
-# The set-up of ROS, lint and what computes fill the time in which the others wait, and leave them the processor when they
-# want it, to the end: first those with virtual cabinets, then the ROS nodes. Each goes on when another fails; all are
-# shown at the end. What fails of the set-up is asked for again by the tests of ROS, and reported there.
+# What computes, and the ROS nodes after it, fill the time in which the others wait. What computes leaves them the
+# processor when they want it, and so does the set-up of ROS, to the end. Each goes on when another fails; all are shown
+# at the end. What fails of the set-up is asked for again by the tests of ROS, and reported there.
 test: prepared  ## everything; what takes long begins first
-	@nice -n 5 $(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-ros.log 2>&1 & ros=$$!; \
-	nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1 & beside=$$!; \
+	@( nice -n 5 $(MAKE) --no-print-directory --keep-going $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-ros-setup.log 2>&1 & \
+	nice -n 5 $(MAKE) --no-print-directory --keep-going lint check test-computing > build/test-beside.log 2>&1; failed=$$?; \
+	wait; $(MAKE) --no-print-directory test-ros ROS_JOBS=2 > build/test-ros.log 2>&1 || failed=1; exit $$failed ) & beside=$$!; \
 	$(PY) -m pytest $(PARALLEL) $(LONGEST) -m "not computing and not alone"; failed=$$?; \
-	wait $$ros; cat build/test-ros.log; \
-	$(MAKE) --no-print-directory test-ros ROS_JOBS=2 || failed=1; \
-	wait $$beside || failed=1; cat build/test-beside.log; exit $$failed
+	wait $$beside || failed=1; cat build/test-ros-setup.log build/test-ros.log build/test-beside.log; exit $$failed
 	$(PY) -m pytest $(LONGEST) -m alone $(ALONE)
 
 # Folders with tests that need no simulator; those in them that do are skipped as soon as they reach for it.
