@@ -405,6 +405,30 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
 
 
 @patient
+def test_a_block_whose_end_got_no_answer_is_left_all_the_same(
+    arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, request = arm.state.q, arm.connection.request
+
+    def unanswered(message: object, *rest: Any) -> Any:
+        if isinstance(message, wire.FriClose):
+            raise ha.Timeout("no answer")
+        return request(message, *rest)
+
+    with (
+        monkeypatch.context() as patch,
+        pytest.raises(ha.Timeout, match="no answer"),
+        arm.fri("position", period_ms=LONG) as rt,
+    ):
+        rt.command(q=rt.start.q_ipo)
+        patch.setattr(arm.connection, "request", unanswered)
+    # for want of answers the cabinet ends the session
+    with contextlib.suppress(ha.ConnectFailed, ha.MotionAborted):
+        arm.move(ha.ptp(home))
+    assert arm.move(ha.ptp(home)).arrived
+
+
+@patient
 def test_a_block_that_ends_in_a_safety_stop_raises_it() -> None:
     with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)

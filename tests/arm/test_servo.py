@@ -16,6 +16,7 @@ import heptarm as ha
 from heptarm.values.condition.force import force
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import Position
+from heptarm.wire import messages as wire
 from tests.conftest import RunningCabinet
 
 SPEED = 1.0  # streams by this machine's clock
@@ -311,3 +312,25 @@ def test_a_move_inside_the_block_is_refused_at_once_and_the_stream_goes_on(arm: 
         while sv.tick():
             sv.set(sv.start.q)
         assert arm.move(ha.ptp(home)).arrived  # the servo motion has ended, so this does not wait
+
+
+def test_a_block_whose_end_got_no_answer_is_left_all_the_same(
+    arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The motion of the block runs on until the watchdog time ends it; `move` is not refused as inside the block."""
+    home, request = arm.state.q, arm.connection.request
+
+    def unanswered(message: object, *rest: Any) -> Any:
+        if isinstance(message, wire.Cancel):
+            raise ha.Timeout("no answer")
+        return request(message, *rest)
+
+    with (
+        monkeypatch.context() as patch,
+        pytest.raises(ha.Timeout, match="no answer"),
+        arm.servo("joint", watchdog=1.0) as sv,
+    ):
+        sv.set(sv.start.q)
+        patch.setattr(arm.connection, "request", unanswered)
+    assert not sv.active
+    assert arm.move(ha.ptp(home)).arrived

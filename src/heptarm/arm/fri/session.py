@@ -237,6 +237,8 @@ class Fri(Block):
 
     def _end(self) -> None:
         client, self._closed = self.client, True
+        if self._handle is not None:
+            self._connection.leave_block(self._handle)  # first: the link may fail in what follows
         # taken now: the law runs once more when the overlay is off, and the guard limits that
         self._limited = client.limited
         try:
@@ -247,7 +249,6 @@ class Fri(Block):
                 with contextlib.suppress(CommandRejected):  # it has just ended by itself
                     self._connection.request(wire.FriClose(session=self._number))
             if self._handle is not None:
-                self._connection.leave_block(self._handle)
                 self._result = self._handle.wait(timeout=_PATIENCE)
         finally:
             self._take_events()

@@ -590,10 +590,10 @@ class Servo(Block):
         handle = self._handle
         if handle is None or self._result is not None:
             return
+        self._active = False
+        self._connection.leave_block(handle)  # first: the link may fail in what follows
         if not handle.done:
             self._connection.cancel(handle)
-        self._active = False
-        self._connection.leave_block(handle)
         self._result = handle.wait(timeout=_PATIENCE)
 
     def __repr__(self) -> str:
