@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from heptarm.planning.motion import ServoMotion
+from heptarm.planning.motion import TICK, ServoMotion
 from heptarm.planning.seam import ServoTiming
 from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.controller.interpolator import FAST_JERK
 from heptarm.sim.controller.safety import StopRequest
-from heptarm.sim.controller.servo import ServoLimits, SmartFollower
+from heptarm.sim.controller.servo import ServoLimits, SmartFollower, braking_axes
 from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import JointImpedance
@@ -468,3 +470,21 @@ def test_a_target_where_two_kinds_of_trajectory_meet_is_reached(sign: float) -> 
     for _ in range(401):
         there = follower.advance(1e-3)
     assert there == pytest.approx(start + sign * 0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_axis_that_was_pushed_towards_its_limit_brakes_as_hard_as_it_must(side: float) -> None:
+    """After torques of a session that ended, A6 came 0.3 degrees beyond its limit."""
+    arm = robot("iiwa14")
+    limit, room = side * arm.q_max[5], 0.01
+    here, speed = np.zeros(7), np.zeros(7)
+    here[5] = limit - side * room
+    for part in (0.5, 1.0, 2.0, 4.0):  # of the acceleration of planned motions
+        speed[5] = side * math.sqrt(2.0 * part * arm.ddq_max[5] * room)
+        braking = braking_axes(arm, here, speed, jerk=FAST_JERK)
+        points = [here]
+        while not braking.is_still:
+            points.append(braking.advance(TICK))
+        assert np.abs(points).max(axis=0)[5] <= abs(limit) + 1e-9
+        change = np.diff(np.diff([here - speed * TICK, *points], axis=0), axis=0) / TICK**2
+        assert np.abs(change).max() <= max(1.0, part + 0.1) * arm.ddq_max[5] * (1.0 + 1e-9)

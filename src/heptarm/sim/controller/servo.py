@@ -593,6 +593,8 @@ APPROACH = 0.01
 MARGIN = 0.999
 #: An axis that has passed its target brakes at the latest after this time [s].
 _BRAKES_LATER = 4.0 * TICK
+#: Before a limit an axis brakes with up to so many times the acceleration of planned motions.
+HARDEST = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -800,7 +802,8 @@ class SmartFollower:
     def brake(self, *, scale: float, rate: float, speed: Array | None = None) -> None:
         """Come to rest as fast as the axes may, ignoring further targets; ends when `is_still`.
 
-        An axis that would get beyond its range by the limit of its jerk brakes without that.
+        An axis that would get beyond its range by the limit of its jerk brakes without that, and harder than planned
+        motions do where that would not be enough: only one that was pushed is so fast there.
 
         Args:
             scale: speed as a fraction of full speed; the stop itself runs at full speed.
@@ -820,7 +823,9 @@ class SmartFollower:
         low, high = np.minimum(self._limits.lowest, q), np.maximum(self._limits.highest, q)
         outside = (end < low - _TINY) | (end > high + _TINY)
         if outside.any():
-            self._hard = _HardBrake(outside, here=q, speed=dq, acceleration=limit)
+            room = np.maximum(np.where(dq > 0.0, high - q, q - low), _TINY)
+            needed = np.clip(0.5 * dq**2 / room, limit, HARDEST * limit)
+            self._hard = _HardBrake(outside, here=q, speed=dq, acceleration=needed)
 
     @property
     def is_still(self) -> bool:
