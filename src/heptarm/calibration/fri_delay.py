@@ -28,11 +28,11 @@ _PERIODS, _CYCLE = 1.5, 0.5e-3
 #: An axis that moves less than this shows no delay [rad]; a session is used from this duration on [s].
 _SHOWS, _SHORTEST = 2e-3, 0.3
 #: Longest delay that is looked for, and the steps of the search [s]; then so many of Gauss and Newton.
-_LONGEST, _STEP, _STEPS = 0.15, 1e-3, 6
+_LONGEST, _STEP, _STEPS = 0.15, 5e-3, 6
 #: Behind lost answers the controller finds its way back to the commands in this time [s].
 _LOST = 0.1
 #: Speed below which friction of a joint turns round [rad/s].
-_TURNS = 0.02
+_TURNS = 0.03
 #: Duration of a part of the session whose residuals may depend on each other [s].
 _PART = 0.25
 #: Least standard deviation of a delay in set-points, and in measured positions, whose joints are wound [s].
@@ -237,8 +237,11 @@ def _fit(t: Array, seen: Array, at: Array, sent: Array, *, is_wound: bool) -> _F
     middle, speed = 0.5 * (at[1:] + at[:-1]), np.diff(sent, axis=0) / np.diff(at)[:, None]
     for axis in range(seen.shape[1]):
         fast = np.interp(t, middle, speed[:, axis])
-        rows = np.column_stack([np.ones(len(t)), *([np.tanh(fast / _TURNS)] if is_wound else [])])
+        rows = np.column_stack([np.ones(len(t)), *([np.sign(fast)] if is_wound else [])])
         both = np.column_stack([seen[:, axis] - np.interp(t, at, sent[:, axis]), fast])
+        if is_wound:  # what friction does where it turns round is not known here
+            is_slow = np.abs(fast) < _TURNS
+            rows[is_slow], both[is_slow] = 0.0, 0.0
         both -= rows @ np.linalg.lstsq(rows, both, rcond=None)[0]
         left[:, axis], slope[:, axis] = both.T
     return _Fit(left, slope)

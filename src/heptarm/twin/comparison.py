@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
+from heptarm.record.fri_commands import FriCommands
 from heptarm.record.mcap_file import merge
 from heptarm.record.plot.chart import Chart
 from heptarm.record.plot.content import Mark
@@ -292,17 +293,11 @@ def aligned_twin(
     by_id = {motion.id: motion for motion in simulated.motions}
     ran = [repetition for repetition in repetitions if repetition.number in by_id]
     last = float(simulated.t[-1])
-    begins = [by_id[repetition.number].begin for repetition in ran]
-    shifts = [
-        _shift(recorded, simulated, begin, repetition.section) if same_speed else 0.0
-        for repetition, begin in zip(ran, begins, strict=True)
+    onsets = [
+        _onset(recorded, simulated, by_id[repetition.number], repetition.section, same_speed=same_speed)
+        for repetition in ran
     ]
-    # one that waited for the end of the one before begins with its set-points
-    begins = [begin + max(shift, 0.0) for begin, shift in zip(begins, shifts, strict=True)]
-    wanted = [
-        repetition.section.motion.begin + max(-shift, 0.0)
-        for repetition, shift in zip(ran, shifts, strict=True)
-    ]
+    begins, wanted = [begin for begin, _ in onsets], [there for _, there in onsets]
     sources: list[float] = []
     targets: list[float] = []
     spans: list[tuple[float, float]] = []
@@ -359,6 +354,19 @@ class _TimeLine:
         inside = np.interp(given, self.sources, self.targets)
         early, late = np.minimum(given - self.sources[0], 0.0), np.maximum(given - self.sources[-1], 0.0)
         return np.asarray(inside + early + late)
+
+
+def _onset(
+    recorded: Recording, simulated: Recording, motion: RecordedMotion, section: Section, *, same_speed: bool
+) -> tuple[float, float]:
+    """Where both begin to do the same: time of the twin, and of the recording [s]."""
+    begin, there = motion.begin, section.motion.begin
+    if section.session is not None:  # when the commands became effective
+        own = [one.begin for one in FriCommands.of(simulated) if one.begin >= begin]
+        return (own[0], section.session.commands.begin) if own else (begin, there)
+    shift = _shift(recorded, simulated, begin, section) if same_speed else 0.0
+    # one that waited for the end of the one before begins with its set-points
+    return begin + max(shift, 0.0), there + max(-shift, 0.0)
 
 
 def _shift(recorded: Recording, simulated: Recording, begin: float, section: Section) -> float:

@@ -5,6 +5,8 @@ A file of its own: the process of the loop imports it, and nothing else of the t
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from heptarm.fri.loop.user_api import Output, Params, State
@@ -18,20 +20,21 @@ class RecordedLaw:
 
     Args:
         commands: what the client sent.
+        load: what it superposed: "tau" or "wrench".
         speed: what if: a factor on the speed of its time, (0, 1].
     """
 
-    def __init__(self, commands: FriCommands, *, speed: float) -> None:
+    def __init__(self, commands: FriCommands, load: Literal["tau", "wrench"], *, speed: float) -> None:
         answered = np.flatnonzero(commands.is_answered)
         ticks = np.round(commands.t[answered] / commands.period).astype(np.intp)
         last = np.searchsorted(ticks, np.arange(ticks[-1] + 1), side="right") - 1
         rows = answered[last.clip(0)]
         self._rate = speed / commands.period
-        self._q, self._tau, self._wrench = (
-            values[rows] for values in (commands.q_sent, commands.tau_sent, commands.wrench_sent)
-        )
+        sent = commands.tau_sent if load == "tau" else commands.wrench_sent
+        self._load, self._q, self._sent = load, commands.q_sent[rows], sent[rows]
 
     def __call__(self, state: State, out: Output, params: Params) -> None:
         """Command what was commanded at this time."""
         row = min(round(state.t * self._rate), len(self._q) - 1)
-        out.q, out.tau, out.wrench = self._q[row], self._tau[row], self._wrench[row]
+        out.q = self._q[row]
+        setattr(out, self._load, self._sent[row])
