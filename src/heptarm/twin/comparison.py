@@ -307,6 +307,8 @@ def aligned_twin(
         # the one before may have taken longer than it was recorded
         there = max([wanted[index], *targets[-1:]])
         length = min(moves + SETTLE, last - begin)
+        if repetition.section.session is not None:  # both clients close after it, each in its own time
+            length = min(length, float(repetition.section.session.commands.t[-1]) - _LASTING)
         if index + 1 < len(ran):  # the event of an end may come after the next begin
             length = min(length, begins[index + 1] - begin)
             if wanted[index + 1] > there:

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from math import inf, isnan
+from math import isnan
 from pathlib import Path
 from typing import Any, Literal
 
@@ -38,8 +38,9 @@ from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.tool import Tool
 from heptarm.wire import messages as wire
 
-#: Simulated seconds per second by default; a stream of set-points needs a state of the cabinet for each.
-_FASTER = 5.0
+#: Simulated seconds per second by default; a stream of set-points needs a state of the cabinet for each, and on a busy
+#: machine the client of an FRI session needs more time for its answers than the recorded one had.
+_FASTER, _SLOWER = 5.0, 0.5
 #: States of the twin per second of its clock [Hz].
 _RATE = 500.0
 #: Targets per second of a stream [Hz], and its watchdog [s].
@@ -50,6 +51,8 @@ _THERE = 1e-6
 _TIMES, _LONGER = 3.0, 10.0
 #: Longest wait for the first state of a motion, and between two looks at an FRI session [s].
 _BEGINS, _LOOKS = 30.0, 0.05
+#: A limit of loads and their rates that limits nothing [Nm, N, Nm/s, N/s].
+_ANY = 1e9
 
 
 def replay_in_sim(
@@ -139,7 +142,8 @@ def _target(target: str | None, commands: Commands) -> str:
     is_timed = any(step.word for step in commands.steps) or any(
         section.program is None for section in commands.sections
     )
-    speed = 1.0 if is_timed else _FASTER
+    has_session = any(section.session is not None for section in commands.sections)
+    speed = _SLOWER if has_session else 1.0 if is_timed else _FASTER
     if target is None:
         name, _, flange = commands.robot.name.partition("+")
         return f"sim://{name}?speed={speed:g}" + (f"&flange={flange}" if flange else "")
@@ -456,7 +460,7 @@ class _Run:
 def _unlimited(robot: RobotModel) -> Limits:
     """Limits of a guard that leaves what the guard of the recorded client let through."""
     least = Limits.of(robot, fraction=1.0, margin=0.0)
-    return replace(least, dtau_max=(inf,) * 7, wrench_max=(inf,) * 6, dwrench_max=(inf,) * 6)
+    return replace(least, dtau_max=(_ANY,) * 7, wrench_max=(_ANY,) * 6, dwrench_max=(_ANY,) * 6)
 
 
 def _with_mode(item: wire.Item, mode: wire.Mode | None) -> wire.Item:
