@@ -124,7 +124,9 @@ def test_keys_of_the_smartpad(arm: ha.Arm) -> None:
     end()
     end_later = arm.pad.on_key(lambda slot, down: later.append((slot, down)))
     arm.operator.press_key(2)
-    arm.wait_until(lambda state: len(later) == 2, timeout=20.0)  # the key comes on another way than the answer
+    arm.wait_until(
+        lambda state: len(later) == 2, timeout=20.0
+    )  # the key comes on another way than the answer
     end_later()
     arm.pad.set_key(2, "", enabled=False)
     with pytest.raises(ha.Timeout):
