@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.verbs import ArmVerbs
-from heptarm.calibration.proposal import agree, box_text, flange_box, swings
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings, unhindered
 from heptarm.errors import CollisionForeseen, CommandRejected, OutsideWorkspace
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.values.checks import Array, Value, array, frozen, instance, integer, within
@@ -279,7 +279,7 @@ def record_excitation(
         )
     recorder = arm.record(path, rate=_RATE, overwrite=overwrite)
     agree(made, confirm, "identifying the arm")
-    with recorder:
+    with recorder, unhindered("the arm"):
         for motion in made.motions:
             arm.move(motion, mode=Position())
         arm.wait_for_rest()

@@ -28,7 +28,7 @@ from heptarm.calibration.hand_eye_estimate import (
     first_matrix,
     roughly_estimated,
 )
-from heptarm.calibration.proposal import agree, box_text, flange_box, swings
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings, unhindered
 from heptarm.errors import CommandRejected, MissingExtra, NoPath, OutsideWorkspace, Unreachable
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
@@ -246,7 +246,8 @@ class _Mover:
             except NoPath as error:
                 _log.info("a posture is left out: %s", error)
                 continue
-            self._arm.move(motion, speed=self._speed, mode=Position())
+            with unhindered("the camera"):
+                self._arm.move(motion, speed=self._speed, mode=Position())
             look()
         self._arm.move(self._motion(start), speed=self._speed, mode=Position())
 
