@@ -29,7 +29,7 @@ _PERIODS, _CYCLE = 1.5, 0.5e-3
 _SHOWS, _SHORTEST = 2e-3, 0.3
 #: Longest delay that is looked for, and the steps of the search [s]; then so many of Gauss and Newton.
 _LONGEST, _STEP, _STEPS = 0.15, 5e-3, 6
-#: Behind lost answers the controller finds its way back to the commands in this time [s].
+#: Behind lost answers the controller returns to the commands in this time [s].
 _LOST = 0.1
 #: Distances that count, by the median one, and those that do in any case [rad].
 _USUAL, _EXACT = 8.0, 1e-7

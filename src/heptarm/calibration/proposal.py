@@ -58,7 +58,7 @@ def agree(plan: PlanT, confirm: Callable[[PlanT], bool] | None, what: str) -> No
 
 @contextlib.contextmanager
 def unhindered(what: str) -> Iterator[None]:
-    """A block of motions in which nothing should touch the arm; the error of one that was ended says what to do.
+    """A block of motions in which nothing should touch the arm; the error of one that was ended has a remedy.
 
     Args:
         what: is measured, such as "the load".

@@ -14,7 +14,7 @@ from heptarm.values.checks import Array, Value, frozen
 
 #: Arrays of a cycle that are taken, without the prefix of their names.
 _NAMES = ("q", "q_cmd", "q_sent", "tau_sent", "wrench_sent")
-#: So many lost messages end the commands of a session: an overlay that is started again begins anew.
+#: So many lost messages end the commands of a session: an overlay that is started again has its own.
 _LOST = 100
 
 
