@@ -60,7 +60,7 @@ def _camera(
         target_text = f"sim://iiwa14?speed=5&scene={file}"
         with ha.connect(target_text, watchdog=5.0, timeout=60.0) as arm, arm.camera(lens) as pictures:
             arm.move(ha.ptp(HOME))
-            found = calibration.hand_eye(arm, pictures, board, views=40 if bent else 16, speed=1.0, **unknown)
+            found = calibration.hand_eye(arm, pictures, board, views=16, speed=1.0, **unknown)
     detail: dict[str, Any] = {"views": len(found.residuals), "rms_pixels": found.rms}
     off = found.pose @ lens.pose.inverse()
     error = float(np.linalg.norm(found.pose.xyz - lens.pose.xyz))
