@@ -185,7 +185,7 @@ def commanded(
     late, shown = (
         round(1e3 * float(arm.value(name, 0.0)[0])) for name in ("fri_command_delay", "state_delay")
     )
-    t = 1e-3 * np.arange(ticks)
+    t: Array = 1e-3 * np.arange(ticks, dtype=np.float64)
     wanted, asked = np.tile(START, (ticks, 1)), t // (1e-3 * period_ms) * 1e-3 * period_ms
     for axis in (4, 6):
         size, speed = random.uniform(0.05, 0.1), random.uniform(2.5, 4.0)

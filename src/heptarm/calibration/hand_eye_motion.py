@@ -172,13 +172,12 @@ def hand_eye(
     )
     rough_lens = first_matrix(seen.views) if known is None else intrinsic(known)
     lens = camera.distortion if distortion is None else distortion
+    options = {"frame": camera.frame, "distortion": lens}
     # a lens that is not known bends the few pictures so far; they show where to look from all the same
-    rough = roughly_estimated(
-        seen.views, frame=camera.frame, matrix=rough_lens, distortion=lens, refine=False
-    )
+    rough = roughly_estimated(seen.views, matrix=rough_lens, refine=False, **options)  # type: ignore[arg-type]
     chosen = _chosen(arm.robot, seen.views, rough, board, start, wanted - len(seen.views))
     mover.visit("Look at the board from all sides", chosen, start, seen.look)
-    return estimate_hand_eye(seen.views, frame=camera.frame, matrix=known, distortion=lens, refine=refine)
+    return estimate_hand_eye(seen.views, matrix=known, refine=refine, **options)  # type: ignore[arg-type]
 
 
 class _Viewer:
