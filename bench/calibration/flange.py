@@ -25,10 +25,11 @@ PLACE, TURN, MASS, CENTRE, INERTIA = 0.3, 0.1, 0.02, 3.0, 0.15
 RUNS, ENOUGH = 100, 0.9
 #: Standard deviation of a person who brings a tip to a point [m].
 POINTING = 1e-4
-HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
+#: Where a measurement begins, and where with a long tool, which would reach the floor.
+HOME, HIGH = ha.deg(0, 30, 0, -90, 0, 60, 0), ha.deg(0, 0, 0, -70, 0, 60, 0)
 #: A part of 3 kg and a long tool of 4 kg as the scene's tool: edges, and where the middle is in the flange frame [m].
 EDGES, MIDDLE, WEIGHT = np.array([0.06, 0.08, 0.32]), np.array([0.01, -0.02, 0.16]), 3.0
-LONG_EDGES, LONG_MIDDLE, LONG_WEIGHT = np.array([0.05, 0.06, 0.6]), np.array([0.0, 0.02, 0.22]), 4.0
+LONG_EDGES, LONG_MIDDLE, LONG_WEIGHT = np.array([0.05, 0.06, 0.4]), np.array([0.0, 0.02, 0.205]), 4.0
 _PART = """<mujoco model="part"><worldbody><body name="tool">
   <geom type="box" size="{half}" pos="{middle}" mass="{mass}"/>
 </body></worldbody></mujoco>
@@ -69,18 +70,18 @@ def tip() -> Iterator[Figure]:
 @benchmark("load")
 def load() -> Iterator[Figure]:
     """Error of mass, centre and inertia of a part and a long tool that nobody declared, with noisy sensors."""
-    rests, swings = _measured(EDGES, MIDDLE, WEIGHT, ("rests", "full"))
+    rests, swings = _measured(HOME, EDGES, MIDDLE, WEIGHT, ("rests", "full"))
     detail = {"sigma_kg": rests.sigma_mass, "sigma_mm": (1e3 * rests.sigma_com).tolist()}
     yield Figure("load_mass", abs(rests.mass / WEIGHT - 1.0), "fraction", limit=MASS, detail=detail)
     off = 1e3 * float(np.linalg.norm(rests.com - MIDDLE))
     yield Figure("load_centre", off, "mm", limit=CENTRE, detail=detail)
     yield _inertia("load_inertia", swings, EDGES, WEIGHT)
-    (swings,) = _measured(LONG_EDGES, LONG_MIDDLE, LONG_WEIGHT, ("full",))
+    (swings,) = _measured(HIGH, LONG_EDGES, LONG_MIDDLE, LONG_WEIGHT, ("full",))
     yield _inertia("long_tool_inertia", swings, LONG_EDGES, LONG_WEIGHT)
 
 
 def _measured(
-    edges: Array, middle: Array, mass: float, excitations: tuple[Literal["rests", "full"], ...]
+    start: Array, edges: Array, middle: Array, mass: float, excitations: tuple[Literal["rests", "full"], ...]
 ) -> list[calibration.IdentifiedLoad]:
     """A box on the flange, measured by an arm with noisy sensors that does not know of it."""
     with tempfile.TemporaryDirectory() as folder:
@@ -89,7 +90,7 @@ def _measured(
         scene.write_text(_PART.format(half=half, middle=place, mass=mass), encoding="utf-8")
         target = f"sim://iiwa14?speed=5&sensors=noisy:7&scene={scene}"
         with ha.connect(target, state_rate=500.0, watchdog=5.0, timeout=60.0) as arm:
-            arm.move(ha.ptp(HOME))
+            arm.move(ha.ptp(start), speed=0.5)
             plans = [calibration.load_plan(arm, excitation=name, speed=0.5) for name in excitations]
             return [calibration.load(arm, plan=plan) for plan in plans]
 

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import math
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
+import heptarm as ha
 from bench.measure.figure import Figure, benchmark
 from heptarm import calibration
 from heptarm.calibration import FittedArm
-from tests.calibration.hidden_arm import HIDDEN, IIWA, TWO_SIGMA, computed, drawn, recorded, trajectory
+from heptarm.calibration.excitation import swing
+from heptarm.calibration.fri_delay import delay_of
+from tests.calibration.hidden_arm import (
+    HIDDEN,
+    IIWA,
+    START,
+    TWO_SIGMA,
+    commanded,
+    computed,
+    drawn,
+    number,
+    recorded,
+    trajectory,
+)
 
 #: Durations of the recording that identifies, and of the other one that is predicted [s].
 RECORDED, OTHER = 600.0, 30.0
@@ -17,6 +34,8 @@ RECORDED, OTHER = 600.0, 30.0
 RUNS, ENOUGH = 100, 0.9
 #: Speeds at which friction is compared, in both directions [rad/s].
 SPEEDS = (0.005, 0.02, 0.1, 0.3)
+#: Name of the delay of FRI commands, and what swings A7 by FRI.
+DELAY, SWING = "fri_command_delay", {"angle": 0.1, "seconds": 2.0, "count": 2}
 
 
 @benchmark("identification")
@@ -52,6 +71,41 @@ def identification_sigma() -> Iterator[Figure]:
         at_least=True,
         detail={"runs": RUNS, "worst": worst},
     )
+
+
+@benchmark("fri_delay")
+def fri_delay() -> Iterator[Figure]:
+    """Delay of FRI commands, hidden in a session of the virtual cabinet; and of 100 sessions, drawn at random."""
+    hidden = HIDDEN.with_numbers([number(DELAY, 0.004)])
+    with tempfile.TemporaryDirectory() as folder:
+        arm_file, run = Path(folder) / "hidden.toml", Path(folder) / "run.mcap"
+        hidden.save(arm_file)
+        with ha.connect(f"sim://iiwa14?fitted={arm_file}", watchdog=5.0, timeout=60.0) as arm:
+            arm.move(ha.ptp(START))
+            with arm.record(run), arm.fri("position", period_ms=2, law=swing, params=SWING) as session:
+                session.wait(4.0)
+        found = calibration.fri_command_delay(run, state_delay=float(hidden["state_delay"].value[0]))
+    detail = {"sigma_ms": 1e3 * found.sigma, "cycles": found.cycles, "hidden_ms": 4.0}
+    yield Figure("fri_delay", 1e3 * abs(found.delay - 0.004), "ms", limit=0.1, detail=detail)
+    inside = [[_delay_off(seed, has_set_points=known) for seed in range(RUNS)] for known in (True, False)]
+    each = (np.array(inside) <= 2.0).mean(axis=1)
+    yield Figure(
+        "fri_delay_within_two_sigma",
+        float(each.min()),
+        "fraction",
+        limit=ENOUGH,
+        at_least=True,
+        detail={"runs": RUNS, "each": each.tolist()},
+    )
+
+
+def _delay_off(seed: int, *, has_set_points: bool) -> float:
+    """Error of the delay of a session, with set-points or measured positions alone, by its standard deviation."""
+    delay = 1e-3 * (seed % 8)
+    arm = drawn(seed).with_numbers([number(DELAY, delay), number("state_delay", 0.002)])
+    seen = commanded(arm, seed=seed, period_ms=(1, 2, 5)[seed % 3], has_set_points=has_set_points)
+    found = delay_of([seen], state_delay=0.002)
+    return math.inf if found is None else abs(found.delay - delay) / found.sigma
 
 
 def _friction_off(arm: FittedArm) -> float:

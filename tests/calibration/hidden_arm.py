@@ -10,7 +10,9 @@ import numpy as np
 from heptarm import model
 from heptarm.calibration import ArmSamples, FittedArm, FittedNumbers
 from heptarm.calibration.excitation import next_posture
+from heptarm.record.fri_commands import FriCommands
 from heptarm.sim.controller.command import MotionCommand
+from heptarm.sim.fri.limits import CommandInterpolator
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.sensor_errors import sensor_errors
 from heptarm.values.checks import Array
@@ -165,3 +167,51 @@ def computed(arm: FittedArm, of: tuple[Array, Array, Array, Array, Array], *, se
     wound = (loss + rigid - without) / arm["stiffness"].value
     measured = q - wound + arm.value("position_noise", 0.0) * random.standard_normal(q.shape)
     return ArmSamples(t, measured, q, shown, without - shown, rigid + loss + arm["rotor"].value * ddq)
+
+
+def commanded(
+    arm: FittedArm, *, seed: int, period_ms: int = 2, seconds: float = 2.0, has_set_points: bool = True
+) -> FriCommands:
+    """What FRI cycles show of an arm whose client swings two axes; the joints are wound at once.
+
+    Args:
+        arm: its delays, friction, stiffness and noise act.
+        seed: draws the motion and the noise.
+        period_ms: of the client's answers; a message is sent every millisecond.
+        seconds: duration.
+        has_set_points: the version of FRI sends them.
+    """
+    random, ticks = np.random.default_rng(seed), round(1e3 * seconds)
+    late, shown = (
+        round(1e3 * float(arm.value(name, 0.0)[0])) for name in ("fri_command_delay", "state_delay")
+    )
+    t: Array = 1e-3 * np.arange(ticks, dtype=np.float64)
+    wanted, asked = np.tile(START, (ticks, 1)), t // (1e-3 * period_ms) * 1e-3 * period_ms
+    for axis in (4, 6):
+        size, speed = random.uniform(0.05, 0.1), random.uniform(2.5, 4.0)
+        wanted[:, axis] += 0.5 * size * (1.0 - np.cos(speed * asked))
+    interpolator = CommandInterpolator(IIWA, START.copy(), ticks=period_ms)
+    points = [START] * (late + 1)
+    for tick in range(ticks - late - 1):
+        if tick >= 1 and (tick - 1) % period_ms == 0:
+            interpolator.command(wanted[tick - 1], after=period_ms)
+        points.append(interpolator.tick())
+    q_cmd = np.array(points)
+    dq = np.gradient(q_cmd, 1e-3, axis=0)
+    friction, noise = arm.friction, arm.value("position_noise", 0.0) * random.standard_normal(q_cmd.shape)
+    wound = 0.0 if friction is None else friction.at(dq) / arm["stiffness"].value
+    q = np.roll(q_cmd - wound, shown, axis=0) + noise
+    q[:shown] = START
+    sent = np.where((np.arange(ticks) % period_ms == 0)[:, None], wanted, np.nan)
+    none = np.full_like(q, np.nan)
+    return FriCommands(
+        0.0,
+        1e-3,
+        t,
+        np.isfinite(sent[:, 0]),
+        q,
+        q_cmd if has_set_points else none,
+        sent,
+        none,
+        none[:, :6],
+    )

@@ -71,6 +71,22 @@ def test_a_load_beyond_the_rating_is_refused_before_it_moves(
     assert not moved
 
 
+def test_a_tool_that_touches_something_is_named_as_a_cause(
+    arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A drive trips where the arm is held; load data and tools are those of before."""
+
+    def trips(*given: object, **more: object) -> None:
+        raise ha.MotionAborted("drive error in A4: -2.9 deg behind its set-point", hint="clear its cause")
+
+    before = arm.load, dict(arm.tools)
+    plan = calibration.load_plan(arm)
+    monkeypatch.setattr(ha.Arm, "move", trips)
+    with pytest.raises(ha.MotionAborted, match=r"the load is not measured, .*touched something.*; clear its"):
+        calibration.load(arm, plan=plan)
+    assert (arm.load, dict(arm.tools)) == before
+
+
 def test_verify_load_warns_and_refuses(arm: ha.Arm, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, "heptarm.arm"):
         found = arm.verify_load()

@@ -31,8 +31,9 @@ Law = Callable[[m.Monitoring], m.Command]
 class Arm:
     """Follows its commands at once; external forces are only recorded."""
 
-    def __init__(self, model: str = "iiwa14") -> None:
+    def __init__(self, model: str = "iiwa14", *, command_delay: int = 0) -> None:
         self.robot: RobotModel = robot(model)
+        self.command_delay = command_delay
         self.q = self.q_ipo = np.array(READY)
         self.action: Superposition | None = None
         self.safety = m.Safety.NORMAL_OPERATION
@@ -127,12 +128,18 @@ class Rig:
     configuration: SessionConfiguration | None = None
     latency: int = 300_000
     silent: bool = False
+    command_delay: int = 0
 
     def __post_init__(self) -> None:
         self.configuration = self.configuration or SessionConfiguration(self.version)
         self.version = self.configuration.version
-        self.arm = Arm()
-        self.controller = Controller(self.configuration, self.arm.robot, epoch_ns=1_700_000_000 * 10**9)
+        self.arm = Arm(command_delay=self.command_delay)
+        self.controller = Controller(
+            self.configuration,
+            self.arm.robot,
+            epoch_ns=1_700_000_000 * 10**9,
+            command_delay=self.command_delay,
+        )
         self.client = Client(self.version, multiplier=self.configuration.multiplier)
         self.now = 0
         self.events: list[Event] = []

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast
 
 import numpy as np
 import pytest
 
 import heptarm as ha
 from heptarm.cli.twin import twin as command
-from heptarm.modes import JointImpedance
+from heptarm.fri.loop.shared_memory import S_PERIOD, S_TICKS, STATE_WORDS
+from heptarm.fri.loop.user_api import Output, Params, State
+from heptarm.modes import CartesianImpedance, JointImpedance
+from heptarm.record.fri_commands import FriCommands
 from heptarm.record.recording import Recording
 from heptarm.twin.commands import commands_of
 from heptarm.twin.comparison import deviations_of
+from heptarm.twin.fri_law import RecordedLaw
 from heptarm.values.checks import Array
+from heptarm.values.mode.mode import Mode
 from heptarm.when import path
 from heptarm.wire import messages as wire
 from tests.conftest import RunningCabinet
+from tests.long import few, longer
+from tests.retry import retry
 
 #: Motions are dated by the states that show them, which a busy machine misses.
 pytestmark = pytest.mark.alone
@@ -107,6 +115,86 @@ def test_a_stream_is_repeated_by_its_set_points(tmp_path: Path) -> None:
                 servo.set(HOME + 0.1 * np.sin(2.0 * servo.t) * np.eye(7)[5])
     twin = ha.replay_in_sim(file, bands={"dq": 1.0, "q": 0.02, "q_cmd": 0.02, "xyz": 0.01})
     assert twin["q"].is_inside and twin["q"].rms < 5e-3, str(twin)
+
+
+def twist(state: State, out: Output, params: Params) -> None:
+    """Torques that swing A2 and A6."""
+    out.tau[[1, 5]] = 3.0 * math.sin(5.0 * state.t), 2.0 * math.sin(8.0 * state.t)
+
+
+def push(state: State, out: Output, params: Params) -> None:
+    """A force along x that swings, and one up that grows."""
+    out.wrench[[0, 2]] = 10.0 * math.sin(6.0 * state.t), 10.0 * min(state.t, 1.0)
+
+
+def missed(outcome: ha.Twin | Exception) -> str:
+    """What this machine was too busy for: answers of the client that did not come in time."""
+    if isinstance(outcome, Exception):
+        return str(outcome) if isinstance(outcome, ha.QualityLost) else ""
+    runs = (outcome.recorded, outcome.simulated)
+    least = min(float(np.nanmin(run["fri.tracking"])) for run in runs)
+    return "" if least == 1.0 else f"{1.0 - least:.0%} of the answers came late"
+
+
+#: Kind of an FRI session, its control mode, its law, and what it superposes.
+SUPERPOSED: list[tuple[Literal["torque", "wrench"], Mode, Callable[..., None], str]] = [
+    ("torque", JointImpedance(stiffness=[200.0] * 7), twist, "tau_sent"),
+    ("wrench", CartesianImpedance(stiffness=(1000, 1000, 1000, 100, 100, 100)), push, "wrench_sent"),
+]
+
+
+@pytest.mark.parametrize(("kind", "mode", "law", "sent"), few(SUPERPOSED))
+def test_what_an_fri_client_superposes_is_superposed_again(
+    cabinet: RunningCabinet,
+    tmp_path: Path,
+    kind: Literal["torque", "wrench"],
+    mode: Mode,
+    law: Callable[..., None],
+    sent: str,
+) -> None:
+    """Positions of the twin are within 2 mrad, a fifth of the swing at most, and nothing is left out."""
+    file = tmp_path / "fri.mcap"
+
+    def attempt() -> ha.Twin:
+        with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0, state_rate=250) as arm:
+            arm.move(ha.ptp(HOME))
+            recorder = arm.record(file, overwrite=True)
+            with recorder, arm.fri(kind, period_ms=5, mode=mode, law=law) as session:
+                while session.active and session.state.t < longer(0.6, 2.0):
+                    session.wait(0.05)
+            arm.wait_for_rest()
+        return ha.replay_in_sim(file, target=cabinet.target, bands={"q": 2e-3, "q_cmd": 2e-3})
+
+    twin = retry(attempt, missed)
+    run = twin.recorded
+    assert twin.is_alike and not twin.notes, str(twin)
+    assert twin["q"].largest < 0.2 * float(np.ptp(run["q"], axis=0).max()), str(twin)
+    (again,) = FriCommands.of(twin.simulated)
+    assert float(np.nanmax(np.abs(getattr(again, sent)))) > 1.0
+
+    blind = {name: values for name, values in run.signals.items() if not name.startswith("fri.")}
+    (note,) = commands_of(replace(run, signals=blind)).notes
+    assert f"the {kind} that its FRI client superposed is left out: the recording has no cycles" in note
+    other = ha.replay_in_sim(run, target=cabinet.target, mode=ha.modes.Position())
+    assert "overlay needs" in other.motions[0].refusal and not other.is_alike
+
+
+def test_recorded_answers_are_given_at_their_time() -> None:
+    """Of a lost answer the one before is repeated; behind the last one the last."""
+    t: Array = np.array([0.0, 0.005, 0.015, 0.02])
+    q = np.tile(HOME, (4, 1)) + t[:, None]
+    commands = FriCommands(
+        0.0, 0.005, t, np.array([True, True, False, True]), q, q, q, 100.0 * q, np.full((4, 6), np.nan)
+    )
+    state, out = State(np.zeros(STATE_WORDS)), Output()
+    words = state.words.view(np.int64)
+    words[S_PERIOD] = 5_000_000
+    for speed, rows in ((1.0, (0, 1, 1, 1, 3, 3)), (0.5, (0, 0, 1, 1, 1, 1, 1, 3, 3))):
+        law = RecordedLaw(commands, "tau", speed=speed)
+        for tick, row in enumerate(rows):
+            words[S_TICKS] = tick
+            law(state, out, cast(Params, None))
+            assert (out.q == q[row]).all() and (out.tau == 100.0 * q[row]).all() and not out.wrench.any()
 
 
 def test_a_black_box_reproduces_its_stop() -> None:

@@ -5,11 +5,12 @@ each number. Nothing is changed by measuring: an estimate becomes a `Tool` by `t
 target or the file of a fitted arm by `save`.
 """
 
-from heptarm.calibration.arm_fit import ArmFit, Validation, simulator, validate
+from heptarm.calibration.arm_fit import ArmFit, Validation, fri_command_delay, simulator, validate
 from heptarm.calibration.arm_samples import ArmSamples
 from heptarm.calibration.base_parameters import BaseParameters, base_parameters
 from heptarm.calibration.board import Board, Sighting
 from heptarm.calibration.excitation import ExcitationPlan, excitation, record_excitation
+from heptarm.calibration.fri_delay import FriDelay
 from heptarm.calibration.hand_eye_estimate import (
     HandEyeEstimate,
     HandEyeView,
@@ -32,6 +33,7 @@ __all__ = [
     "ExcitationPlan",
     "FittedArm",
     "FittedNumbers",
+    "FriDelay",
     "HandEyeEstimate",
     "HandEyePlan",
     "HandEyeView",
@@ -49,6 +51,7 @@ __all__ = [
     "estimate_load",
     "estimate_touched_tcp",
     "excitation",
+    "fri_command_delay",
     "hand_eye",
     "kinematics",
     "load",

@@ -11,14 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.calibration.arm_estimate import LEAST_NOISE, estimate_arm
-from heptarm.calibration.arm_samples import ArmSamples, aligned_windows
+from heptarm.calibration.arm_samples import ArmSamples, aligned_windows, written
+from heptarm.calibration.fri_delay import FriDelay, delay_of
 from heptarm.errors import CommandRejected
 from heptarm.model.dynamics import GRAVITY, inverse_dynamics_rows
+from heptarm.record.fri_commands import FriCommands
 from heptarm.record.recorded import RecordedData
 from heptarm.record.recording import load as load_recording
-from heptarm.values.checks import Array, Value, array, frozen, instance
+from heptarm.values.checks import Array, Value, array, frozen, instance, within
 from heptarm.values.files import path_of, read_text
-from heptarm.values.fitted_arm import FittedArm
+from heptarm.values.fitted_arm import QUANTITIES, FittedArm
 from heptarm.values.robot import Body, RobotModel, known_robot, robot
 from heptarm.values.text import lines
 
@@ -95,17 +97,18 @@ class ArmFit(Value):
         arm: the numbers, for `sim://MODEL?fitted=FILE`.
         validation: how well they predict a recording: another one if it was given.
         remarks: what the recording does not determine, and why.
+        fri: how late FRI commands act; None: no FRI session shows it.
     """
 
     arm: FittedArm
     validation: Validation
     remarks: tuple[str, ...] = ()
+    fri: FriDelay | None = None
 
     def __str__(self) -> str:
-        """The numbers, the prediction, and the remarks."""
-        return "\n".join(
-            [str(self.arm), str(self.validation), *(f"  not known: {remark}" for remark in self.remarks)]
-        )
+        """The numbers, the prediction, the delay of FRI commands, and the remarks."""
+        parts = [str(self.arm), str(self.validation), *([] if self.fri is None else [str(self.fri)])]
+        return "\n".join([*parts, *(f"  not known: {remark}" for remark in self.remarks)])
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the file of the fitted arm; see `FittedArm.save`."""
@@ -117,6 +120,7 @@ def simulator(
     *,
     robot: RobotModel | str | None = None,
     validation: ArmRun | None = None,
+    fri: RecordedData | str | Path | None = None,
     declared: Body | None = None,
     commissioning: str | Path | None = None,
     acceleration: npt.ArrayLike = GRAVITY,
@@ -133,6 +137,8 @@ def simulator(
         robot: the robot; None: that of the recording.
         validation: another recording, of other motions, that the result has to predict; None: it is the same one, which
             proves less.
+        fri: another recording, of FRI sessions whose client moves the arm, for the delay of FRI commands; None: those
+            of `run`, if it has any.
         declared: load data that the cabinet used meanwhile; None: none.
         commissioning: JSON report of `heptarm check --commission`: what it found to differ is among the contradictions.
         acceleration: of gravity in the base frame, shape (3,) [m/s²]; another one for a tilted base.
@@ -142,16 +148,57 @@ def simulator(
             touches the arm all the time, or its robot is unknown.
         ShapeError: a wrong shape.
     """
+    run = run if isinstance(run, ArmSamples) else _recording(run, "run")
     samples, named = samples_of(run, "run")
     model = model_of(robot, named)
     fall = array(acceleration, 3, "acceleration")
     found = estimate_arm(samples, model, acceleration=fall)
+    arm, remarks, late = found.arm, found.remarks, None
+    state_delay = float(arm.value("state_delay", 0.0)[0])
+    if fri is not None:
+        late = fri_command_delay(fri, state_delay=state_delay)
+    elif isinstance(run, RecordedData):
+        late = _fri_delay(run, state_delay)
+    if late is None:
+        remarks += ("delay of FRI commands: no FRI session is recorded whose client moves the arm",)
+    else:
+        arm = arm.with_numbers([late.numbers])
     other = samples if validation is None else samples_of(validation, "validation")[0]
-    tried = validate(found.arm, other, declared=declared, acceleration=fall)
-    contradictions = (*found.arm.contradictions, *tried.contradictions)
+    tried = validate(arm, other, declared=declared, acceleration=fall)
+    contradictions = (*arm.contradictions, *tried.contradictions, *(late.contradictions if late else ()))
     if commissioning is not None:
         contradictions += _differences(path_of(commissioning, "commissioning"))
-    return ArmFit(replace(found.arm, contradictions=contradictions), tried, found.remarks)
+    return ArmFit(replace(arm, contradictions=contradictions), tried, remarks, late)
+
+
+def fri_command_delay(run: RecordedData | str | Path, *, state_delay: float = 0.0) -> FriDelay:
+    """Identify how late FRI commands act, from FRI sessions whose client moves the arm.
+
+    Args:
+        run: a recording of such sessions by `arm.record`, or of a client by `heptarm.record_client`.
+        state_delay: by which measured values come later than commanded ones [s].
+
+    Raises:
+        CommandRejected: in no session the arm follows a client that moves it.
+        LimitError: the delay is outside its range.
+    """
+    late = _fri_delay(
+        _recording(run, "run"),
+        within(state_delay, "state_delay", 0.0, QUANTITIES["state_delay"].high, unit="s"),
+    )
+    if late is None:
+        raise CommandRejected(
+            "the recording must have an FRI session whose client moves the arm for half a second or longer",
+            parameter="run",
+            hint="calibration.excitation(arm, fri_period_ms=2) moves it so; torques and poses do not show the delay",
+        )
+    return late
+
+
+def _fri_delay(run: RecordedData, state_delay: float) -> FriDelay | None:
+    return delay_of(
+        FriCommands.of(run), state_delay=state_delay, source=run.path.name, date=written(run.path)
+    )
 
 
 def validate(
@@ -203,8 +250,13 @@ def samples_of(run: ArmRun, name: str) -> tuple[ArmSamples, str]:
     """Samples of a recording, and the name of its robot; empty: unknown."""
     if isinstance(run, ArmSamples):
         return run, ""
-    recording = load_recording(path_of(run, name)) if isinstance(run, (str, Path)) else run
-    return ArmSamples.of(instance(recording, RecordedData, name)), recording.facts.get("robot", "")
+    recording = _recording(run, name)
+    return ArmSamples.of(recording), recording.facts.get("robot", "")
+
+
+def _recording(run: RecordedData | str | Path, name: str) -> RecordedData:
+    read = load_recording(path_of(run, name)) if isinstance(run, (str, Path)) else run
+    return instance(read, RecordedData, name)
 
 
 def model_of(given: RobotModel | str | None, named: str) -> RobotModel:

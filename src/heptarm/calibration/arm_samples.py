@@ -34,6 +34,8 @@ SLOWEST = 190.0
 _MOVED, MOVING = 3.0, 1e-3
 #: Shift by which the skew of the torques is found, and the largest skew [s].
 _SHIFT, _MOST_SKEW = 1e-3, 5e-3
+#: FRI cycles are taken in place of pushed states if they cover this part of their time.
+_FOLLOWED = 0.8
 #: Time for which an axis must have moved in one direction, so that its joint is wound [s].
 WOUND = 0.3
 
@@ -92,10 +94,9 @@ class ArmSamples(Value):
             CommandRejected: it lacks positions or torques, or the robot reports no commanded torques.
         """
         instance(run, RecordedData, "run")
-        cycles, states = (len(run[f"{prefix}t"]) if f"{prefix}t" in run else 0 for prefix in (FRI, ""))
-        prefix = FRI if cycles > states else ""
+        prefix = FRI if _is_followed(run) else ""
         lacking = [name for name in _NAMES if f"{prefix}{name}" not in run]
-        if lacking or not max(cycles, states):
+        if lacking or not len(run[f"{prefix}t"]):
             raise CommandRejected(
                 f"the recording must have {', '.join(_NAMES)}, it lacks {', '.join(lacking) or 'all states'}",
                 parameter="run",
@@ -115,7 +116,7 @@ class ArmSamples(Value):
             )
         q, q_cmd, tau, tau_ext, tau_cmd = (row[good] for row in rows)
         return ArmSamples(
-            times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=_written(run.path)
+            times[good], q, q_cmd, tau, tau_ext, tau_cmd, source=run.path.name, date=written(run.path)
         )
 
     @property
@@ -124,7 +125,16 @@ class ArmSamples(Value):
         return 1.0 / float(np.median(np.diff(self.t)))
 
 
-def _written(path: Path) -> str:
+def _is_followed(run: RecordedData) -> bool:
+    """Whether FRI cycles show more of a recording than its pushed states: more of them, over most of its time."""
+    if f"{FRI}q_cmd" not in run or np.isnan(run[f"{FRI}q_cmd"]).all():  # FRI 2 sends no set-points
+        return False
+    times = [run[f"{prefix}t"] for prefix in (FRI, "")]
+    spans = [len(t) * float(np.median(np.diff(t))) if len(t) > 1 else 0.0 for t in times]
+    return len(times[0]) > len(times[1]) and spans[0] > _FOLLOWED * spans[1]
+
+
+def written(path: Path) -> str:
     """When a file was written, ISO 8601; empty: it is gone."""
     try:
         seconds = path.stat().st_mtime

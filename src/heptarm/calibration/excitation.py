@@ -1,4 +1,7 @@
-"""Motions that show what an arm is like: through postures that differ in gravity, at speeds from very slow to fast."""
+"""Motions that show what an arm is like: through postures that differ in gravity, at speeds from very slow to fast.
+
+By FRI the client itself moves an axis at last, which shows how late its commands act.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.arm.fri.session import Fri
 from heptarm.arm.verbs import ArmVerbs
-from heptarm.calibration.proposal import agree, box_text, flange_box, swings
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings, unhindered
 from heptarm.errors import CollisionForeseen, CommandRejected, OutsideWorkspace
+from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.values.checks import Array, Value, array, frozen, instance, integer, within
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.mode.mode import Position
@@ -35,6 +40,10 @@ _ROOM = math.radians(5.0)
 _TRIES = 40
 #: Rate of the recording, the most that a cabinet pushes [Hz]; an FRI session beside it adds its cycles at 1 kHz.
 _RATE = 500.0
+#: By FRI A7 swings by this angle to one side [rad] and back, in this time [s], so many times.
+_SWING, _SWING_TIME, _SWINGS = math.radians(6.0), 2.0, 2
+#: Time for the last commands to act [s].
+_REST = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +58,7 @@ class ExcitationPlan(Value):
         low: lowest coordinates that the flange has in a posture, base frame, shape (3,) [m].
         high: highest ones, shape (3,) [m].
         is_checked: bodies that would touch were looked for.
+        fri_period_ms: period of the FRI session that swings A7 at last [ms]; 0: there is none.
     """
 
     robot: RobotModel
@@ -58,6 +68,7 @@ class ExcitationPlan(Value):
     low: Array
     high: Array
     is_checked: bool
+    fri_period_ms: int = 0
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -74,6 +85,12 @@ class ExcitationPlan(Value):
             "collisions": "none foreseen" if self.is_checked else "not checked: set arm.collision_check",
             "duration": f"{self.duration:.0f} s, {len(self.speeds)} motions",
         }
+        if self.fri_period_ms:
+            angle, seconds = math.degrees(_swing(self.robot, self.postures[0])), _SWINGS * _SWING_TIME
+            rows["FRI"] = (
+                f"A7 swings by {angle:+.0f} deg and back for {seconds:.0f} s at last, commanded every "
+                f"{self.fri_period_ms} ms"
+            )
         return lines(f"Identify the {self.robot.title}", rows)
 
 
@@ -113,6 +130,7 @@ def excitation(
     reach: npt.ArrayLike = REACH,
     collision_check: CollisionCheck | None = None,
     seed: int = 0,
+    fri_period_ms: int = 0,
 ) -> ExcitationPlan:
     """Plan motions that identify the arm, from where it rests. Nothing moves.
 
@@ -125,9 +143,11 @@ def excitation(
         reach: the most by which an axis moves from its position now, one number or shape (7,) [rad].
         collision_check: checks for collisions, such as a `heptarm.CollisionModel`; None: `arm.collision_check`.
         seed: other motions of the same kind, such as those for a validation.
+        fri_period_ms: at last an FRI session with this period swings A7, for the delay of FRI commands, 1 to 10 [ms];
+            0: there is none.
 
     Raises:
-        CommandRejected: there is no room for such motions.
+        CommandRejected: there is no room for such motions, or the cabinet has no FRI.
         MissingExtra: the planner is not installed.
         ModeConflict: a motion runs.
         LimitError: a value outside its range.
@@ -141,6 +161,8 @@ def excitation(
     for index, angle in enumerate(far.tolist()):
         within(angle, f"reach[{index}]", 0.05, 3.0, unit="rad")
     postures, speeds, duration = [np.asarray(arm.state.q_cmd)], list[float](), 0.0
+    if integer(fri_period_ms, "fri_period_ms", 0, 10):
+        _check_swing(arm, postures[0], fri_period_ms, collision_check)
     tried, goes_back = 0, False
     random = np.random.default_rng(integer(seed, "seed", 0, 2**31))
     while not goes_back or tried:
@@ -166,7 +188,10 @@ def excitation(
         duration += taken
     is_checked = collision_check is not None or arm.collision_check is not None
     box = flange_box(model, postures)
-    return ExcitationPlan(model, frozen(np.array(postures)), frozen(speeds), duration, *box, is_checked)
+    duration += _SWINGS * _SWING_TIME if fri_period_ms else 0.0
+    return ExcitationPlan(
+        model, frozen(np.array(postures)), frozen(speeds), duration, *box, is_checked, fri_period_ms
+    )
 
 
 def _duration(
@@ -180,6 +205,44 @@ def _duration(
     except (OutsideWorkspace, CollisionForeseen):
         return None
     return None if found.collisions else float(found.t[-1])
+
+
+def _swing(model: RobotModel, start: Array) -> float:
+    """By how much A7 swings: away from the nearer limit [rad]."""
+    return _SWING if start[6] < 0.5 * (model.q_min[6] + model.q_max[6]) else -_SWING
+
+
+def swing(state: State, out: Output, params: Params) -> None:
+    """Swing A7 to one side and back, a whole number of times; the law of an FRI session."""
+    t = min(state.t, params.seconds * params.count)
+    out.q[6] += 0.5 * params.angle * (1.0 - math.cos(2.0 * math.pi * t / params.seconds))
+
+
+def _swinging(arm: ArmVerbs, start: Array, period_ms: int) -> Fri:
+    """The session that swings A7; it is not open yet.
+
+    Raises:
+        CommandRejected: the cabinet has no FRI.
+    """
+    params = {"angle": _swing(arm.robot, start), "seconds": _SWING_TIME, "count": _SWINGS}
+    return arm.fri("position", period_ms=period_ms, mode=Position(), law=swing, params=params)
+
+
+def _check_swing(arm: ArmVerbs, start: Array, period_ms: int, collision_check: CollisionCheck | None) -> None:
+    """Refuse a swing that the cabinet cannot do, or for which there is no room.
+
+    Raises:
+        CommandRejected: it is.
+    """
+    _swinging(arm, start, period_ms)
+    goal = start + _swing(arm.robot, start) * np.eye(7)[6]
+    if _duration(arm, start, goal, speed=arm.speed, collision_check=collision_check) is None:
+        raise CommandRejected(
+            f"there is no room to swing A7 by {math.degrees(goal[6] - start[6]):+.0f} deg by FRI",
+            parameter="fri_period_ms",
+            value=period_ms,
+            hint="begin where the flange has more room around it, or leave fri_period_ms out",
+        )
 
 
 def record_excitation(
@@ -216,8 +279,13 @@ def record_excitation(
         )
     recorder = arm.record(path, rate=_RATE, overwrite=overwrite)
     agree(made, confirm, "identifying the arm")
-    with recorder:
+    with recorder, unhindered("the arm"):
         for motion in made.motions:
             arm.move(motion, mode=Position())
         arm.wait_for_rest()
+        if made.fri_period_ms:
+            with _swinging(arm, made.postures[0], made.fri_period_ms) as session:
+                while session.active and session.state.t < _SWINGS * _SWING_TIME + _REST:
+                    session.wait(0.1)
+            arm.wait_for_rest()
     return Path(path)

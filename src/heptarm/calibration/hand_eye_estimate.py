@@ -308,8 +308,32 @@ def estimate_hand_eye(
         MissingExtra: OpenCV or SciPy is not installed.
     """
     word(frame, "frame", FRAMES)
-    rest = lens_distortion(distortion)
     is_refined = matrix is None if refine is None else flag(refine, "refine")
+    found = roughly_estimated(views, frame=frame, matrix=matrix, distortion=distortion, refine=is_refined)
+    place, angle = float(found.sigma.max()), float(found.sigma_angle.max())
+    if not (place <= _LOST and angle <= _LOST_ANGLE):  # NaN, too
+        raise CommandRejected(
+            f"the views do not determine the camera: its standard deviation would be {1e3 * place:.1f} mm "
+            f"and {math.degrees(angle):.2f} deg, and {1e3 * _LOST:g} mm and "
+            f"{math.degrees(_LOST_ANGLE):g} deg are allowed",
+            parameter="views",
+            value=place,
+            allowed=f"at most {_LOST:g} m",
+            hint="take more views, from more directions, with the board larger in the pictures",
+        )
+    return found
+
+
+def roughly_estimated(
+    views: Sequence[HandEyeView],
+    *,
+    frame: Literal["flange", "base"],
+    matrix: npt.ArrayLike | None,
+    distortion: npt.ArrayLike,
+    refine: bool,
+) -> HandEyeEstimate:
+    """Compute what `estimate_hand_eye` does, however little the views determine it."""
+    rest, is_refined = lens_distortion(distortion), refine
     given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
     _check_turns([view.flange for view in given])
     lens = first_matrix(given) if matrix is None else intrinsic(matrix)
@@ -439,11 +463,7 @@ def _solved(model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int,
 def _judged(
     model: HandEyeModel, pixels: Array, guess: HandEyeGuess, count: int, frame: str
 ) -> HandEyeEstimate:
-    """The estimate with the results of a jackknife over the views.
-
-    Raises:
-        CommandRejected: the views do not determine the camera.
-    """
+    """The estimate with the results of a jackknife over the views."""
     seen, depth = model.seen(guess)
     off, slopes = seen - pixels, model.jacobian(guess, count)
     n, places = int(model.places[-1]) + 1, model.places
@@ -462,16 +482,6 @@ def _judged(
         on_board.append(math.sqrt(np.mean(np.square(metres)) * 2.0))
     apart = np.array(shifts) - np.mean(shifts, axis=0)
     sigma = student(n - 1) * np.sqrt((n - 1) / n * np.square(apart).sum(axis=0))
-    if not np.isfinite(sigma).all() or sigma[:3].max() > _LOST or sigma[3:6].max() > _LOST_ANGLE:
-        raise CommandRejected(
-            f"the views do not determine the camera: its standard deviation would be {1e3 * sigma[:3].max():.1f} mm "
-            f"and {math.degrees(sigma[3:6].max()):.2f} deg, and {1e3 * _LOST:g} mm and "
-            f"{math.degrees(_LOST_ANGLE):g} deg are allowed",
-            parameter="views",
-            value=float(sigma[:3].max()),
-            allowed=f"at most {_LOST:g} m",
-            hint="take more views, from more directions, with the board larger in the pictures",
-        )
     fx, fy, cx, cy = guess.lens[:4]
     turned = guess.camera.rotation[:, :2] * _DETECTOR / np.array([fy, fx])
     sigma[3:6] = np.sqrt(np.square(sigma[3:6]) + np.square(turned).sum(axis=1))

@@ -26,8 +26,9 @@ from heptarm.calibration.hand_eye_estimate import (
     board_pose,
     estimate_hand_eye,
     first_matrix,
+    roughly_estimated,
 )
-from heptarm.calibration.proposal import agree, box_text, flange_box, swings
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings, unhindered
 from heptarm.errors import CommandRejected, MissingExtra, NoPath, OutsideWorkspace, Unreachable
 from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
@@ -172,7 +173,8 @@ def hand_eye(
     rough_lens = first_matrix(seen.views) if known is None else intrinsic(known)
     lens = camera.distortion if distortion is None else distortion
     options = {"frame": camera.frame, "distortion": lens}
-    rough = estimate_hand_eye(seen.views, matrix=rough_lens, refine=False, **options)  # type: ignore[arg-type]
+    # a lens that is not known bends the few pictures so far; they show where to look from all the same
+    rough = roughly_estimated(seen.views, matrix=rough_lens, refine=False, **options)  # type: ignore[arg-type]
     chosen = _chosen(arm.robot, seen.views, rough, board, start, wanted - len(seen.views))
     mover.visit("Look at the board from all sides", chosen, start, seen.look)
     return estimate_hand_eye(seen.views, matrix=known, refine=refine, **options)  # type: ignore[arg-type]
@@ -243,7 +245,8 @@ class _Mover:
             except NoPath as error:
                 _log.info("a posture is left out: %s", error)
                 continue
-            self._arm.move(motion, speed=self._speed, mode=Position())
+            with unhindered("the camera"):
+                self._arm.move(motion, speed=self._speed, mode=Position())
             look()
         self._arm.move(self._motion(start), speed=self._speed, mode=Position())
 

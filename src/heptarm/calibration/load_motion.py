@@ -20,7 +20,7 @@ from heptarm.calibration.load_estimate import (
     load_regressor,
     predicted_sigma,
 )
-from heptarm.calibration.proposal import agree, box_text, flange_box, swings
+from heptarm.calibration.proposal import agree, box_text, flange_box, swings, unhindered
 from heptarm.errors import CollisionForeseen, CommandRejected, MissingExtra, StaleState
 from heptarm.model.dynamics import GRAVITY
 from heptarm.values.checks import Array, Value, frozen, instance, within, word
@@ -239,7 +239,7 @@ def load(
     agree(made, confirm, "measuring the load")
     moving: list[State] = []
     for index, leg in enumerate(made.legs):
-        with recorded(arm) as states:
+        with recorded(arm) as states, unhindered("the load"):
             arm.move(list(leg), speed=made.speed, mode=Position())
             arm.wait_for_rest()
         moving += states

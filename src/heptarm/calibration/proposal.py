@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from heptarm.arm.verbs import ArmVerbs
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError, MotionAborted
 from heptarm.model.kinematics import forward
 from heptarm.values.checks import Array, callback, frozen
 from heptarm.values.robot import RobotModel
@@ -54,6 +54,26 @@ def agree(plan: PlanT, confirm: Callable[[PlanT], bool] | None, what: str) -> No
     _log.info("%s", plan)
     if confirm is not None and not callback(confirm, "confirm")(plan):
         raise CommandRejected(f"{what} was not confirmed: nothing moves", parameter="confirm")
+
+
+@contextlib.contextmanager
+def unhindered(what: str) -> Iterator[None]:
+    """A block of motions in which nothing should touch the arm; the error of one that was ended has a remedy.
+
+    Args:
+        what: is measured, such as "the load".
+
+    Raises:
+        MotionAborted: a motion was ended.
+    """
+    try:
+        yield
+    except MotionAborted as error:
+        error.hint = (
+            f"{what} is not measured, and nothing is changed; if tool or arm touched something, begin with more room"
+            + (f"; {error.hint}" if error.hint else "")
+        )
+        raise
 
 
 @contextlib.contextmanager

@@ -229,6 +229,19 @@ def arm(
         Path | None,
         Parameter(help="Another recording, of other motions, that the result has to predict."),
     ] = None,
+    fri: Annotated[
+        Path | None,
+        Parameter(
+            help="Recording of FRI sessions that move the arm, for their delay. Default: those of RUN."
+        ),
+    ] = None,
+    fri_period: Annotated[
+        int,
+        Parameter(
+            help="An FRI session with this period swings A7 at last, so that the delay of FRI commands is found, "
+            "1 to 10 [ms]; 0: there is none."
+        ),
+    ] = 0,
     record: Annotated[Path, Parameter(help="File of the recording.")] = Path("excitation.mcap"),
     seconds: Annotated[float, Parameter(help="Least duration of the motions [s].")] = EXCITED,
     speed: Annotated[float, Parameter(help="Fraction of the full speed, (0, 1].")] = FASTEST,
@@ -250,7 +263,7 @@ def arm(
     ] = False,
     access: Access = _ACCESS,
 ) -> int:
-    """Identify the arm: friction, stiffness, rotors, delay, offset, gain and noise of its sensors.
+    """Identify the arm: friction, stiffness, rotors, errors of its sensors, delay of states and of FRI commands.
 
     All axes move around the present posture, and back; what moves is shown first. Bodies that would touch are looked
     for among the arm and the floor only.
@@ -258,6 +271,8 @@ def arm(
     For example:
 
         heptarm calibrate arm --target lab1 --save my-arm.toml
+
+        heptarm calibrate arm --fri-period 2 --target lab1 --save my-arm.toml
 
         heptarm calibrate arm run.mcap --validate other.mcap --save my-arm.toml
     """
@@ -267,7 +282,12 @@ def arm(
         with access.target.connect(control=not dry_run, state_rate=RATE) as one:
             world = CollisionModel(one.robot.name)
             plan = calibration.excitation(
-                one, seconds=seconds, speed=speed, reach=reach, collision_check=world
+                one,
+                seconds=seconds,
+                speed=speed,
+                reach=reach,
+                collision_check=world,
+                fri_period_ms=fri_period,
             )
             if dry_run:
                 print(plan)
@@ -279,7 +299,12 @@ def arm(
     else:
         declared = None
     found = calibration.simulator(
-        run, robot=model or None, validation=validate, declared=declared, commissioning=commissioning
+        run,
+        robot=model or None,
+        validation=validate,
+        fri=fri,
+        declared=declared,
+        commissioning=commissioning,
     )
     if save is not None:
         found.save(save, overwrite=overwrite)
@@ -290,6 +315,7 @@ def arm(
                 for numbers in found.arm.numbers
             }
             | {"ratio": found.validation.ratio.tolist(), "contradictions": list(found.arm.contradictions)}
+            | {"fri_cycles": None if found.fri is None else found.fri.cycles}
             | {"remarks": list(found.remarks), "saved": "" if save is None else str(save)}
         )
     else:

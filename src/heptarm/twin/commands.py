@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected
+from heptarm.record.fri_commands import FriCommands
 from heptarm.record.journal import REQUEST, restored
 from heptarm.record.recorded import FRI, RecordedData, RecordedEvent, RecordedMotion
 from heptarm.values.checks import Array
@@ -50,6 +51,19 @@ _LOADS = (wire.FriCommandMode.TORQUE, wire.FriCommandMode.WRENCH)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Session:
+    """An FRI session whose client superposed a load.
+
+    Attributes:
+        opened: the request that opened it.
+        commands: what the client sent.
+    """
+
+    opened: wire.FriOpen
+    commands: FriCommands
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Section:
     """A program of the recording.
 
@@ -58,8 +72,9 @@ class Section:
         sent: when its request was accepted [s]; of a stream when it began.
         until: when it ended, or the recording did [s].
         start: set-point at its begin, shape (7,) [rad].
-        program: as it was sent; None: the set-points are repeated as a stream.
-        stream: these set-points; None: of a program, or the arm did not move.
+        program: as it was sent; None: the set-points are repeated as a stream, or a session by its commands.
+        session: of FRI, with its commands; None: it is none, or they are not recorded.
+        stream: these set-points; None: of a program or a session, or the arm did not move.
         mode: control mode of a stream; None: position.
     """
 
@@ -68,6 +83,7 @@ class Section:
     until: float
     start: Array
     program: wire.Run | None = None
+    session: Session | None = None
     stream: Trajectory | None = None
     mode: wire.Mode | None = None
 
@@ -228,6 +244,7 @@ def _stream(
     """A section of set-points: of a stream of targets, an FRI session, another client, or one that began before."""
     name = "" if request is None else request.name
     mode: wire.Mode | None = None
+    session: Session | None = None
     t, q = run.t, run["q" if measured else "q_cmd"]
     if request is not None and name == "ServoOpen":
         mode = restored(request.content, wire.ServoOpen).mode
@@ -235,9 +252,14 @@ def _stream(
         opened = restored(request.content, wire.FriOpen)
         mode = opened.mode
         if opened.command in _LOADS:
-            notes.append(
-                f"motion {motion.id}: the {opened.command.name.lower()} that its FRI client superposed is left out"
-            )
+            sent = [one for one in FriCommands.of(run) if motion.begin <= one.begin <= until]
+            if sent and sent[0].is_answered.any():
+                session = Session(opened, sent[0])
+            else:
+                notes.append(
+                    f"motion {motion.id}: the {opened.command.name.lower()} that its FRI client superposed is left "
+                    "out: the recording has no cycles of the session"
+                )
         if f"{FRI}q_cmd" in run:
             t, q = run[f"{FRI}t"], run[f"{FRI}q_cmd"]
     elif not measured:
@@ -246,10 +268,10 @@ def _stream(
     times, rows = np.unique(t[inside], return_index=True)
     points = q[inside][rows]
     moves = len(times) > 1 and bool(np.ptp(points, axis=0).max() > _STILL)
-    stream = Trajectory.of(times, points, robot=run.facts["robot"]) if moves else None
+    stream = Trajectory.of(times, points, robot=run.facts["robot"]) if moves and session is None else None
     begin = int(np.searchsorted(run.t, motion.begin).clip(0, len(run.t) - 1))
     start = points[0] if len(points) else _row(run, "q_cmd", begin)
-    return Section(motion, motion.begin, until, start, None, stream, mode)
+    return Section(motion, motion.begin, until, start, session=session, stream=stream, mode=mode)
 
 
 def _row(run: RecordedData, name: str, index: int) -> Array:

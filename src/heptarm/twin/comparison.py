@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
+from heptarm.record.fri_commands import FriCommands
 from heptarm.record.mcap_file import merge
 from heptarm.record.plot.chart import Chart
 from heptarm.record.plot.content import Mark
@@ -292,17 +293,11 @@ def aligned_twin(
     by_id = {motion.id: motion for motion in simulated.motions}
     ran = [repetition for repetition in repetitions if repetition.number in by_id]
     last = float(simulated.t[-1])
-    begins = [by_id[repetition.number].begin for repetition in ran]
-    shifts = [
-        _shift(recorded, simulated, begin, repetition.section) if same_speed else 0.0
-        for repetition, begin in zip(ran, begins, strict=True)
+    onsets = [
+        _onset(recorded, simulated, by_id[repetition.number], repetition.section, same_speed=same_speed)
+        for repetition in ran
     ]
-    # one that waited for the end of the one before begins with its set-points
-    begins = [begin + max(shift, 0.0) for begin, shift in zip(begins, shifts, strict=True)]
-    wanted = [
-        repetition.section.motion.begin + max(-shift, 0.0)
-        for repetition, shift in zip(ran, shifts, strict=True)
-    ]
+    begins, wanted = [begin for begin, _ in onsets], [there for _, there in onsets]
     sources: list[float] = []
     targets: list[float] = []
     spans: list[tuple[float, float]] = []
@@ -312,6 +307,8 @@ def aligned_twin(
         # the one before may have taken longer than it was recorded
         there = max([wanted[index], *targets[-1:]])
         length = min(moves + SETTLE, last - begin)
+        if repetition.section.session is not None:  # both clients close after it, each in its own time
+            length = min(length, float(repetition.section.session.commands.t[-1]) - _LASTING)
         if index + 1 < len(ran):  # the event of an end may come after the next begin
             length = min(length, begins[index + 1] - begin)
             if wanted[index + 1] > there:
@@ -359,6 +356,19 @@ class _TimeLine:
         inside = np.interp(given, self.sources, self.targets)
         early, late = np.minimum(given - self.sources[0], 0.0), np.maximum(given - self.sources[-1], 0.0)
         return np.asarray(inside + early + late)
+
+
+def _onset(
+    recorded: Recording, simulated: Recording, motion: RecordedMotion, section: Section, *, same_speed: bool
+) -> tuple[float, float]:
+    """Where both begin to do the same: time of the twin, and of the recording [s]."""
+    begin, there = motion.begin, section.motion.begin
+    if section.session is not None:  # when the commands became effective
+        own = [one.begin for one in FriCommands.of(simulated) if one.begin >= begin]
+        return (own[0], section.session.commands.begin) if own else (begin, there)
+    shift = _shift(recorded, simulated, begin, section) if same_speed else 0.0
+    # one that waited for the end of the one before begins with its set-points
+    return begin + max(shift, 0.0), there + max(-shift, 0.0)
 
 
 def _shift(recorded: Recording, simulated: Recording, begin: float, section: Section) -> float:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from heptarm.arm.link.target import parse_target
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.translate.modes import mode_message, read_mode
 from heptarm.errors import CommandRejected, HeptarmError, MotionError
+from heptarm.fri.guard.joint_guard import Limits
 from heptarm.record.recording import Recording, load
-from heptarm.twin.commands import Commands, RepeatedStep, Section, commands_of
+from heptarm.twin.commands import Commands, RepeatedStep, Section, Session, commands_of
 from heptarm.twin.comparison import (
     SETTLE,
     Repetition,
@@ -28,16 +29,18 @@ from heptarm.twin.comparison import (
     bands_of,
     deviations_of,
 )
+from heptarm.twin.fri_law import RecordedLaw
 from heptarm.values.checks import instance, within
 from heptarm.values.frames import FLANGE
 from heptarm.values.mode.mode import HandGuiding, Mode, check_mode
 from heptarm.values.motion.ptp import ptp
-from heptarm.values.robot import known_robot
+from heptarm.values.robot import RobotModel, known_robot
 from heptarm.values.tool import Tool
 from heptarm.wire import messages as wire
 
-#: Simulated seconds per second by default; a stream of set-points needs a state of the cabinet for each.
-_FASTER = 5.0
+#: Simulated seconds per second by default; a stream of set-points needs a state of the cabinet for each, and on a busy
+#: machine the client of an FRI session needs more time for its answers than the recorded one had.
+_FASTER, _SLOWER = 5.0, 0.5
 #: States of the twin per second of its clock [Hz].
 _RATE = 500.0
 #: Targets per second of a stream [Hz], and its watchdog [s].
@@ -46,8 +49,10 @@ _STREAM_RATE, _STREAM_WATCHDOG = 100.0, 2.0
 _THERE = 1e-6
 #: A motion may take this many times as long as it was recorded, and so much longer, before the twin goes on [s].
 _TIMES, _LONGER = 3.0, 10.0
-#: Longest wait for the first state of a motion [s].
-_BEGINS = 30.0
+#: Longest wait for the first state of a motion, and between two looks at an FRI session [s].
+_BEGINS, _LOOKS = 30.0, 0.05
+#: A limit of loads and their rates that limits nothing [Nm, N, Nm/s, N/s].
+_ANY = 1e9
 
 
 def replay_in_sim(
@@ -65,9 +70,10 @@ def replay_in_sim(
     Programs are sent as they were sent, with their control modes, break conditions, triggers and tools; so are
     pauses, stops and changes of the override, at their times after the begin of the running motion. Emergency stops,
     opened safeguards and protective stops come when they came. What the arm does by itself, such as a break condition
-    that fires or a drive that trips, has to happen in the simulator as well. Where no program is in the file (a servo
-    stream, an FRI session, another client's motion, one that began before the file), the recorded set-points are
-    repeated as a stream, in the recorded control mode. Pauses between motions take no longer than the arm needs to
+    that fires or a drive that trips, has to happen in the simulator as well. Torques and wrenches that an FRI client
+    superposed are superposed again, by an FRI session. Where no program is in the file (a servo stream, other FRI
+    sessions, another client's motion, one that began before the file), the recorded set-points are repeated as a
+    stream, in the recorded control mode. Pauses between motions take no longer than the arm needs to
     come to rest.
 
     Args:
@@ -134,9 +140,10 @@ def replay_in_sim(
 def _target(target: str | None, commands: Commands) -> str:
     """The simulator; a private one is as fast as what it has to repeat allows."""
     is_timed = any(step.word for step in commands.steps) or any(
-        section.stream is not None for section in commands.sections
+        section.program is None for section in commands.sections
     )
-    speed = 1.0 if is_timed else _FASTER
+    has_session = any(section.session is not None for section in commands.sections)
+    speed = _SLOWER if has_session else 1.0 if is_timed else _FASTER
     if target is None:
         name, _, flange = commands.robot.name.partition("+")
         return f"sim://{name}?speed={speed:g}" + (f"&flange={flange}" if flange else "")
@@ -230,6 +237,8 @@ class _Run:
     def _begin(self, section: Section) -> None:
         if section.program is not None:
             self._send(section, section.program)
+        elif section.session is not None:
+            self._answer(section, section.session)
         elif section.stream is not None:
             self._stream(section)
         else:
@@ -288,6 +297,41 @@ class _Run:
         self._numbers[section.motion.id] = number
         self.repetitions.append(Repetition(section, number, refusal))
 
+    def _answer(self, section: Section, session: Session) -> None:
+        """Repeat what an FRI client superposed, by an FRI client."""
+        self._wait_for_rest()
+        self._approach(section)
+        opened, commands = session.opened, session.commands
+        mode = _mode_of(opened.mode) if self._mode is None and opened.mode is not None else self._mode
+        kind: Literal["torque", "wrench"]
+        load: Literal["tau", "wrench"]
+        kind, load = (
+            ("torque", "tau") if opened.command is wire.FriCommandMode.TORQUE else ("wrench", "wrench")
+        )
+        number, refusal = 0, ""
+        try:
+            with self._arm.fri(
+                kind,
+                period_ms=round(1e3 * opened.period),
+                multiplier=opened.receive_multiplier,
+                mode=mode,
+                law=RecordedLaw(commands, load, speed=self._speed),
+                limits=_unlimited(self._arm.robot),
+                timeout=_BEGINS,
+            ) as client:
+                motion, stamp = self._arm.state.motion, self._now()
+                number = 0 if motion is None else motion.id
+                for step in self._stops_within(section):
+                    self._schedule(step.word, stamp + (step.t - commands.begin) / self._speed)
+                while client.active and client.state.t < commands.t[-1] / self._speed:
+                    client.wait(_LOOKS)
+        except MotionError:
+            pass  # the twin's recording has its cause
+        except HeptarmError as error:
+            refusal = str(error)
+        self._numbers[section.motion.id] = number
+        self.repetitions.append(Repetition(section, number, refusal))
+
     def _stops_within(self, section: Section) -> list[RepeatedStep]:
         return [
             step
@@ -310,7 +354,7 @@ class _Run:
         running = self._running(step.t)
         if step.word:
             is_streamed = any(
-                section.stream is not None and section.motion.begin <= step.t <= section.until
+                section.program is None and section.motion.begin <= step.t <= section.until
                 for section in self._commands.sections
             )
             if is_streamed:
@@ -411,6 +455,12 @@ class _Run:
     def _wait_for_stamp(self, stamp: float, limit: float) -> None:
         with suppress(HeptarmError):
             self._arm.connection.wait_for(lambda state: state.stamp * 1e-9 >= stamp, limit)
+
+
+def _unlimited(robot: RobotModel) -> Limits:
+    """Limits of a guard that leaves what the guard of the recorded client let through."""
+    least = Limits.of(robot, fraction=1.0, margin=0.0)
+    return replace(least, dtau_max=(_ANY,) * 7, wrench_max=(_ANY,) * 6, dwrench_max=(_ANY,) * 6)
 
 
 def _with_mode(item: wire.Item, mode: wire.Mode | None) -> wire.Item:

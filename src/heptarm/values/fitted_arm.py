@@ -77,6 +77,7 @@ QUANTITIES: dict[str, Quantity] = {
     "torque_noise": Quantity("noise of the torque sensors", "Nm", 0.0, 10.0),
     "position_noise": Quantity("noise of the measured positions", "rad", 0.0, 0.01),
     "state_delay": Quantity("delay of the measured states", "s", 0.0, 0.05, 1),
+    "fri_command_delay": Quantity("delay of FRI commands, beyond their interpolation", "s", 0.0, 0.1, 1),
     "load": Quantity("load that the load data lacked", "kg, kg m, kg m²", -50.0, 50.0, 10),
 }
 

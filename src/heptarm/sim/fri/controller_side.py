@@ -108,6 +108,7 @@ class Controller:
         configuration: as the application set it up.
         robot: its limits hold.
         epoch_ns: UNIX time of the clock's zero, for the time stamps of messages [ns].
+        command_delay: of the client's commands, beyond their interpolation [ticks].
 
     Attributes:
         state: of the session.
@@ -119,7 +120,14 @@ class Controller:
         said: the last message; None before the first one.
     """
 
-    def __init__(self, configuration: SessionConfiguration, robot: RobotModel, *, epoch_ns: int = 0) -> None:
+    def __init__(
+        self,
+        configuration: SessionConfiguration,
+        robot: RobotModel,
+        *,
+        epoch_ns: int = 0,
+        command_delay: int = 0,
+    ) -> None:
         self.configuration = configuration
         self.state = m.SessionState.IDLE
         self.overlay: MotionOverlay | None = None
@@ -147,6 +155,7 @@ class Controller:
         self._fault = ""  # why the client is not synchronised
         self._limits: CommandLimits | None = None
         self._set_point: CommandInterpolator | None = None
+        self._late: deque[Superposition] = deque(maxlen=command_delay + 1)
         self._last: Array | None = None  # joints of the newest command
         self._last_number = 0
         self._a3 = 0.0
@@ -406,6 +415,7 @@ class Controller:
         self._last_number = self._heard
         self._a3 = reading.q_ipo[2]
         self._tau = self._wrench = None
+        self._late.clear()
         self._go(m.SessionState.COMMANDING_ACTIVE)
 
     def _superpose(self, reading: Reading) -> Superposition | None:
@@ -414,11 +424,17 @@ class Controller:
             return None
         q = set_point.tick()
         if self._tau is None and self._wrench is None:
-            return Superposition(q)
+            return self._delayed(Superposition(q))
         if set_point.age <= max(COAST, 2 * self.configuration.receive_ms):
-            return Superposition(q, self._tau, self._wrench)
+            return self._delayed(Superposition(q, self._tau, self._wrench))
         set_point.stay(np.array(reading.q))  # the load would push forever
+        self._late.clear()
         return Superposition(q, is_missing=True)
+
+    def _delayed(self, action: Superposition) -> Superposition:
+        """What was commanded before the delay; the first action while there is nothing older."""
+        self._late.append(action)
+        return self._late[0]
 
     def _end(self, cause: str, text: str) -> None:
         if self.overlay is None:

@@ -151,6 +151,10 @@ class OverlayTarget(Protocol):
     def robot(self) -> RobotModel:
         """Dimensions and limits."""
 
+    @property
+    def command_delay(self) -> int:
+        """Delay of a client's commands beyond their interpolation [ticks]."""
+
     def reading(self) -> Reading:
         """The state after the last tick."""
 

@@ -129,7 +129,9 @@ class Server:
         self._refusals: list[Event] = []
         self._reported: set[str] = set()
         self.strangers = 0
-        self.controller = Controller(configuration, arm.robot, epoch_ns=time.time_ns())
+        self.controller = Controller(
+            configuration, arm.robot, epoch_ns=time.time_ns(), command_delay=arm.command_delay
+        )
 
     def open(self) -> None:
         """Open the session and start to send.

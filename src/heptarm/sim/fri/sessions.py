@@ -54,6 +54,11 @@ class PlantArm:
         return self.plant.robot
 
     @property
+    def command_delay(self) -> int:
+        """Delay of a client's commands beyond their interpolation [ticks]."""
+        return self.plant.fri_command_delay
+
+    @property
     def shared(self) -> SharedState:
         """The plant's shared memory."""
         return self.plant.shared

@@ -212,13 +212,15 @@ class Plant:
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
         errors: of the sensors, and friction of the joints; None: ideal ones.
         limits: of safety functions that depend on the load; see `heptarm.sim.plant.safety_monitor`.
-        fitted: a measured arm: its stiffness, rotors and load are this one's. Its sensors and friction are `errors`.
+        fitted: a measured arm: its stiffness, rotors, load and delay of FRI commands are this one's. Its sensors and
+            friction are `errors`.
 
     Raises:
         LimitError: the fitted arm is too stiff to be simulated with its rotors.
 
     Attributes:
         bodies: the free bodies of the scene, which can be placed.
+        fri_command_delay: of FRI clients' commands, beyond their interpolation [ticks].
         submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
     """
 
@@ -236,8 +238,9 @@ class Plant:
     ) -> None:
         self.robot: RobotModel = robot(model)
         self.model = compiled(model, boxes, scene, room=True)
-        gains = GAINS
+        gains, self.fri_command_delay = GAINS, 0
         if fitted is not None:
+            self.fri_command_delay = round(float(fitted.value("fri_command_delay", 0.0)[0]) / TICK)
             gains = fitted_gains(fitted)
             _fit(self.model, fitted)
         self.data = mujoco.MjData(self.model)
