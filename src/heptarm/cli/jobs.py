@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -72,19 +73,21 @@ class JobOptions:
         """
         facts = {id(job): case for case, job in cases}
         rows: dict[int, dict[str, object]] = {}
+        out = sys.stdout
 
         def show(outcome: Outcome[Any]) -> None:
             found = {} if outcome.error else figures(outcome.job, outcome.value)
             about = {"seconds": outcome.seconds, "attempts": outcome.attempts, "worker": outcome.worker}
             row = rows[id(outcome.job)] = {**facts[id(outcome.job)], **found, **about, "error": outcome.error}
             if as_json:
-                emit(row)
+                emit(row, file=out)
             else:
                 shown = {name: _text(name, value) for name, value in found.items()}
                 how = outcome.error or ", ".join(f"{name} {text}" for name, text in shown.items())
                 print(f"{len(rows)} of {len(cases)}: {outcome.job.name}: {how}", file=sys.stderr, flush=True)
 
-        run_jobs([job for _, job in cases], workers=self.workers, ray=self.ray, progress=show)
+        with redirect_stdout(sys.stderr):  # Ray prints there what befalls its machines
+            run_jobs([job for _, job in cases], workers=self.workers, ray=self.ray, progress=show)
         ordered = [rows[id(job)] for _, job in cases]
         names = list(dict.fromkeys(name for row in ordered for name in row))
         if table is not None:

@@ -19,7 +19,7 @@ from heptarm.values.checks import integer
 from heptarm.values.files import unwritable
 
 #: Most episodes of a job: it starts a virtual cabinet, and is run again as a whole if its worker is lost.
-_BATCH = 10
+_BATCH = 5
 
 
 def record(
