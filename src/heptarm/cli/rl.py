@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -145,11 +144,10 @@ def train(
             raise CommandRejected(
                 "--resume is of one training", parameter="resume", hint="leave out --seeds, --sweep and --ray"
             )
-        made = partial(recipe_of, chosen, steps=steps, fitted=fitted, is_exact=exact)
-        cases = [
-            ({"seed": number, **settings}, with_settings(made(seed=number), settings))
-            for number, settings in cases_of(seeds, seed, sweep)
-        ]
+        cases: list[tuple[dict[str, object], Recipe]] = []
+        for number, settings in cases_of(seeds, seed, sweep):
+            made = recipe_of(chosen, seed=number, steps=steps, fitted=fitted, is_exact=exact)
+            cases.append(({"seed": number, **settings}, with_settings(made, settings)))
         return _train_jobs(
             cases, out, jobs, device=device, engine=engine, overwrite=overwrite, as_json=as_json
         )

@@ -60,7 +60,7 @@ def with_setting(owner: _Owner, name: str, text: str) -> _Owner:
 
 
 def with_settings(recipe: Recipe, chosen: Mapping[str, str]) -> Recipe:
-    """A recipe with other settings: `steps`, `taught`, a level of `randomisation`, or those of algorithm or task.
+    """A recipe with other settings: its own, a level of `randomisation`, or those of algorithm or task.
 
     Raises:
         CommandRejected: there is no such setting; or algorithm and task have both one of that name.
@@ -68,7 +68,7 @@ def with_settings(recipe: Recipe, chosen: Mapping[str, str]) -> Recipe:
     for name, text in chosen.items():
         if name == "randomisation":
             recipe = replace(recipe, randomisation=level(text))
-        elif name in ("steps", "taught"):
+        elif name in _of_recipe(recipe):
             recipe = with_setting(recipe, name, text)
         else:
             part, plain = _place(recipe, name)
@@ -84,7 +84,7 @@ def _place(recipe: Recipe, name: str) -> tuple[str, str]:
     known = {part: _settings(getattr(recipe, part)) for part in _PARTS}
     having = [part for part in _PARTS if name in known[part]]
     if not having:
-        raise _unknown(name, {"randomisation", "steps", "taught"}.union(*known.values()))
+        raise _unknown(name, {"randomisation", *_of_recipe(recipe)}.union(*known.values()))
     if len(having) > 1:
         raise CommandRejected(
             f"{name} is a setting of the algorithm and of the task",
@@ -93,6 +93,11 @@ def _place(recipe: Recipe, name: str) -> tuple[str, str]:
             hint=" or ".join(f"{part}.{name}" for part in having),
         )
     return having[0], name
+
+
+def _of_recipe(recipe: Recipe) -> set[str]:
+    """Settings that a recipe has itself; a seed is none."""
+    return set(_settings(recipe)) - {"seed"}
 
 
 def _settings(owner: object) -> dict[str, float | str]:
