@@ -1,4 +1,4 @@
-"""Jobs in other processes: what becomes of one whose worker is killed, of one that fails, and of all by Ctrl-C."""
+"""Jobs in other processes: one whose worker is killed, one that fails, and the end of all by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ class Square(Job[int]):
 def test_a_lost_job_is_run_again_and_one_that_fails_carries_its_error(tmp_path: Path) -> None:
     jobs = [Square(f"square {n}", n, tmp_path, kills=int(n == 2)) for n in range(2, 5)]
     seen = []
-    outcomes = run_jobs(jobs, workers=1, progress=lambda outcome: seen.append(outcome.job.name))
-    assert [outcome.value for outcome in outcomes] == [4, None, 16]
-    assert [outcome.attempts for outcome in outcomes] == [2, 1, 1]
-    assert [outcome.error for outcome in outcomes] == ["", "ValueError: three is not squared", ""]
-    assert "three is not squared" in outcomes[1].trace and [o.job for o in outcomes] == jobs
+    results = run_jobs(jobs, workers=1, progress=lambda result: seen.append(result.job.name))
+    assert [result.value for result in results] == [4, None, 16]
+    assert [result.attempts for result in results] == [2, 1, 1]
+    assert [result.error for result in results] == ["", "ValueError: three is not squared", ""]
+    assert "three is not squared" in results[1].trace and [o.job for o in results] == jobs
     assert sorted(seen) == ["square 2", "square 3", "square 4"]
 
 
@@ -133,10 +133,10 @@ def cluster() -> Iterator[Any]:
 @pytest.mark.filterwarnings("default")  # of Ray
 def test_jobs_on_a_ray_cluster(cluster: Any, tmp_path: Path) -> None:
     jobs = [Square(f"square {n}", n, tmp_path, kills=int(n == 2)) for n in range(2, 6)]
-    outcomes = run_jobs(jobs, ray=cluster.address)
-    assert [outcome.value for outcome in outcomes] == [4, None, 16, 25]
-    assert [outcome.attempts for outcome in outcomes] == [2, 1, 1, 1]
-    assert outcomes[1].error == "ValueError: three is not squared"
+    results = run_jobs(jobs, ray=cluster.address)
+    assert [result.value for result in results] == [4, None, 16, 25]
+    assert [result.attempts for result in results] == [2, 1, 1, 1]
+    assert results[1].error == "ValueError: three is not squared"
 
 
 @pytest.mark.long

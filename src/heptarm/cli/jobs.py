@@ -17,7 +17,7 @@ from rich.table import Table
 
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
-from heptarm.rl.pool import Job, Outcome, run_jobs
+from heptarm.rl.pool import Job, JobResult, run_jobs
 from heptarm.rl.sweep import sweep
 
 JOBS = Group("Many at once")
@@ -75,16 +75,16 @@ class JobOptions:
         rows: dict[int, dict[str, object]] = {}
         out = sys.stdout
 
-        def show(outcome: Outcome[Any]) -> None:
-            found = {} if outcome.error else figures(outcome.job, outcome.value)
-            about = {"seconds": outcome.seconds, "attempts": outcome.attempts, "worker": outcome.worker}
-            row = rows[id(outcome.job)] = {**facts[id(outcome.job)], **found, **about, "error": outcome.error}
+        def show(result: JobResult[Any]) -> None:
+            found = {} if result.error else figures(result.job, result.value)
+            about = {"seconds": result.seconds, "attempts": result.attempts, "worker": result.worker}
+            row = rows[id(result.job)] = {**facts[id(result.job)], **found, **about, "error": result.error}
             if as_json:
                 emit(row, file=out)
             else:
                 shown = {name: _text(name, value) for name, value in found.items()}
-                how = outcome.error or ", ".join(f"{name} {text}" for name, text in shown.items())
-                print(f"{len(rows)} of {len(cases)}: {outcome.job.name}: {how}", file=sys.stderr, flush=True)
+                how = result.error or ", ".join(f"{name} {text}" for name, text in shown.items())
+                print(f"{len(rows)} of {len(cases)}: {result.job.name}: {how}", file=sys.stderr, flush=True)
 
         with redirect_stdout(sys.stderr):  # Ray prints there what befalls its machines
             run_jobs([job for _, job in cases], workers=self.workers, ray=self.ray, progress=show)

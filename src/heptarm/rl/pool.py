@@ -72,7 +72,7 @@ class Job(ABC, Generic[Value]):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome(Generic[Value]):
+class JobResult(Generic[Value]):
     """How a job ended.
 
     Attributes:
@@ -99,21 +99,21 @@ def run_jobs(
     *,
     workers: int | None = None,
     ray: str = "",
-    progress: Callable[[Outcome[Value]], object] | None = None,
-) -> tuple[Outcome[Value], ...]:
+    progress: Callable[[JobResult[Value]], object] | None = None,
+) -> tuple[JobResult[Value], ...]:
     """Run jobs in other processes, many at once; when this ends, also by Ctrl-C, all have ended.
 
-    A job that raises is not run again: its outcome has the error, and the others go on. One whose worker is lost is run
+    A job that raises is not run again: its result has the error, and the others go on. One whose worker is lost is run
     again, `ATTEMPTS` times in all.
 
     Args:
         jobs: the jobs.
         workers: how many run at once on this machine; None: one for each processor.
         ray: address of a Ray cluster to run them on instead: "auto", "HOST:PORT" or "ray://HOST:PORT".
-        progress: called with each outcome as it comes.
+        progress: called with each result as it comes.
 
     Returns:
-        The outcomes in the order of the jobs.
+        The results in the order of the jobs.
 
     Raises:
         CommandRejected: a job that cannot be pickled; `workers` with `ray`; more graphics cards than Ray has.
@@ -126,15 +126,15 @@ def run_jobs(
         raise CommandRejected(
             "workers are of this machine, and ray has its own", parameter="workers", hint="leave one out"
         )
-    count = len(os.sched_getaffinity(0)) if workers is None else integer(workers, "workers", 1, _MOST)
+    count = _processors() if workers is None else integer(workers, "workers", 1, _MOST)
     sent = [_packed(job) for job in given]
-    outcomes: dict[int, Outcome[Value]] = {}
+    results: dict[int, JobResult[Value]] = {}
     attempts: Counter[int] = Counter()
     pool: _Pool = _Cluster(ray, max((job.gpus for job in given), default=0)) if ray else _Processes(count)
     try:
         for number, job in enumerate(given):
             pool.submit(number, sent[number], job.gpus)
-        while len(outcomes) < len(given):
+        while len(results) < len(given):
             number, ended = pool.next()
             job = given[number]
             attempts[number] += 1
@@ -143,14 +143,19 @@ def run_jobs(
                 pool.submit(number, sent[number], job.gpus)
                 continue
             error = f"its worker was lost {ATTEMPTS} times: {ended.error}" if ended.is_lost else ended.error
-            outcomes[number] = Outcome(
+            results[number] = JobResult(
                 job, ended.value, error, ended.trace, ended.seconds, attempts[number], ended.worker
             )
             if progress is not None:
-                progress(outcomes[number])
+                progress(results[number])
     finally:
         pool.close()
-    return tuple(outcomes[number] for number in range(len(given)))
+    return tuple(results[number] for number in range(len(given)))
+
+
+def _processors() -> int:
+    """Those that this program may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def _packed(job: Job[Any]) -> bytes:
@@ -202,7 +207,7 @@ def perform(sent: bytes) -> bytes:
 
 
 class _Ending(BaseException):
-    """The program that started this worker wants it to end, or has ended."""
+    """The program that started this worker ends it, or has ended."""
 
 
 def serve(descriptor: int) -> None:
