@@ -22,7 +22,7 @@ from heptarm.rl.sweep import sweep
 
 JOBS = Group("Many at once")
 #: Figures that are in files and JSON alone, since they would take the whole width of a table.
-_HIDDEN = ("policy",)
+_HIDDEN = ("file",)
 #: Width of a table that is not on a terminal [characters].
 _WIDE = 240
 #: How figures are shown to people, by their names; the others as they are.

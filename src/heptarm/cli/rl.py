@@ -220,7 +220,7 @@ def _train_jobs(
         (trained, report), file = value, files[job.name]
         trained.policy.save(file, overwrite=overwrite)
         trained.plot(file.with_suffix(".png"), overwrite=overwrite)
-        return {"policy": str(file), "steps": trained.steps, **_figures(report)}
+        return {"file": str(file), "steps": trained.steps, **_figures(report)}
 
     return jobs.run(made, figures, table=table, as_json=as_json)
 
