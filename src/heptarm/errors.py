@@ -363,6 +363,7 @@ EXTRAS = {
     "devices": ("evdev", "pyspacemouse"),
     "rerun": ("rerun",),
     "vision": ("cv2", "scipy"),
+    "ray": ("ray",),
 }
 
 

@@ -46,6 +46,7 @@ WITHOUT_A_CONNECTION = {
     "completion",
     "rl train",
     "rl eval",
+    "rl record",
     "twin",
     "export",
     "calibrate board",

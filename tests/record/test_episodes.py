@@ -242,7 +242,11 @@ def test_a_camera_that_stalls_and_an_error_make_a_failure_and_the_rest_stays(
                 episode.succeed()
             camera.is_stuck.clear()
             camera.ends.set()
-            with episodes.episode() as episode:
+            with pytest.raises(LimitError, match="number must be"):
+                episodes.episode(number=-1)
+            with pytest.raises(CommandRejected, match="exists"), episodes.episode(number=0):
+                raise AssertionError
+            with episodes.episode(number=7) as episode:
                 with pytest.raises(LocalProtocolError, match="no other episode"), episodes.episode():
                     raise AssertionError
                 seen = camera.shots
@@ -261,6 +265,7 @@ def test_a_camera_that_stalls_and_an_error_make_a_failure_and_the_rest_stays(
             raise AssertionError
     found = ha.load_episodes(tmp_path)
     assert [episode.label for episode in found] == ["failure", "failure", "success"]
+    assert [episode.number for episode in found] == [0, 1, 7]
     assert found[0].reason == "RuntimeError: the policy diverged"
     assert found[1].reason.startswith("camera gave nothing for")
 

@@ -61,7 +61,7 @@ CALIBRATIONS = {
     "board": "calibrate_eye:board",
 }
 BRIDGES = {"libiiwa": "bridge:libiiwa", "kst": "bridge:kst"}
-LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
+LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy", "record": "rl_record:record"}
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
 #: Groups that are commands themselves, and where they are.
 _APPS = {"sim": "sim:app"}
@@ -122,7 +122,7 @@ _targets = App(name="targets", help="List, save and remove robots that have a na
 _bridges = App(
     name="bridge", help="Let programs of other projects, unchanged, control an arm through heptarm's cabinet."
 )
-_learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
+_learn = App(name="rl", help="Train, evaluate and deploy policies; record demonstrations of a script.")
 app.command(_add(_move, MOVES, listed=_words == ["move"]))
 app.command(_add(_plans, PLANS, listed=_words == ["plan"]))
 app.command(_add(_calibrate, CALIBRATIONS, listed=_words == ["calibrate"]))

@@ -7,14 +7,14 @@ import math
 import os
 import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, TextIO
 
 from heptarm.values.state import State
 
 
-def emit(data: dict[str, Any]) -> None:
-    """Print one JSON object; NaN becomes null."""
-    print(json.dumps(_plain(data), ensure_ascii=False), flush=True)
+def emit(data: dict[str, Any], *, file: TextIO | None = None) -> None:
+    """Print one JSON object, None: to standard output; NaN becomes null."""
+    print(json.dumps(_plain(data), ensure_ascii=False), file=file, flush=True)
 
 
 def _plain(value: Any) -> Any:

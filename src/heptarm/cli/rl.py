@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
+from heptarm.cli.jobs import HERE, JOBS, JobOptions, cases_of, name_of
 from heptarm.cli.options import (
     NO_TARGET,
     CommandTarget,
@@ -30,8 +31,10 @@ from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.policy import Policy, shipped, shipped_peg
+from heptarm.rl.pool import Job
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
+from heptarm.rl.sweep import with_setting, with_settings
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import task_named
 from heptarm.values.files import refuse_existing
@@ -42,6 +45,7 @@ from heptarm.values.tool import Tool
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
+    from heptarm.rl.jobs import EvaluateJob
     from heptarm.rl.tasks import Task
     from heptarm.rl.train.recipe import Recipe
     from heptarm.rl.train.train import Row
@@ -57,9 +61,10 @@ Engine = Annotated[
         help="Simulation: MuJoCo on the CPU, MuJoCo Warp on a GPU, or the virtual cabinet's own plant."
     ),
 ]
-AnyPolicy = Annotated[
-    Path | None,
-    Parameter(help="File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."),
+_POLICY = "File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."
+AnyPolicy = Annotated[Path | None, Parameter(help=_POLICY)]
+Seeds = Annotated[
+    str, Parameter(group=JOBS, help="Several seeds, each a job of its own: 0..4 or 0,3,7. Default: --seed.")
 ]
 
 
@@ -91,10 +96,27 @@ def train(
     resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
     engine: Engine = "mujoco",
+    seeds: Seeds = "",
+    sweep: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=JOBS,
+            help="NAME=VALUE,VALUE: train with each value of a setting of algorithm or task, such as "
+            "learning_rate=3e-4,1e-3; may be repeated for all combinations.",
+        ),
+    ] = (),
+    jobs: JobOptions = HERE,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
-    """Train a policy; under torchrun, several workers train one."""
+    """Train a policy; under torchrun, several workers train one.
+
+    With several seeds or settings each is a job of its own, and evaluated on 200 targets that it has not seen:
+
+        heptarm rl train --seeds 0..4
+
+        heptarm rl train peg-in-hole --seeds 0..9 --sweep clearance=1e-3,5e-4 --ray auto
+    """
     require("torch", extra="rl")
     from heptarm.rl.train.train import train as work
 
@@ -117,6 +139,18 @@ def train(
             )
         chosen = replace(task_named(task), robot=robot)
     out = out or Path(f"{task}.npz")
+    if seeds or sweep or jobs != HERE:
+        if resume:
+            raise CommandRejected(
+                "--resume is of one training", parameter="resume", hint="leave out --seeds, --sweep and --ray"
+            )
+        cases: list[tuple[dict[str, object], Recipe]] = []
+        for number, settings in cases_of(seeds, seed, sweep):
+            made = recipe_of(chosen, seed=number, steps=steps, fitted=fitted, is_exact=exact)
+            cases.append(({"seed": number, **settings}, with_settings(made, settings)))
+        return _train_jobs(
+            cases, out, jobs, device=device, engine=engine, overwrite=overwrite, as_json=as_json
+        )
     recipe = recipe_of(chosen, seed=seed, steps=steps, fitted=fitted, is_exact=exact)
     budget, left = recipe.steps, "away" if task == ReachTask.name else "missing"
 
@@ -157,6 +191,49 @@ def train(
     return 0
 
 
+def _train_jobs(
+    cases: list[tuple[dict[str, object], Recipe]],
+    out: Path,
+    jobs: JobOptions,
+    *,
+    device: str,
+    engine: str,
+    overwrite: bool,
+    as_json: bool,
+) -> int:
+    """Train several policies; each gets a file of its own, and all of them one table."""
+    from heptarm.rl.jobs import TrainJob
+
+    made = [
+        (case, TrainJob(name_of(case), recipe, device=device, engine=_engine(engine)))
+        for case, recipe in cases
+    ]
+    files = {
+        job.name: out.with_name(f"{out.stem}-{job.name.replace('=', '').replace(' ', '-')}.npz")
+        for _, job in made
+    }
+    table = out.with_suffix(".csv")
+    for file in (table, *files.values(), *(path.with_suffix(".png") for path in files.values())):
+        refuse_existing(file, overwrite=overwrite, name="out")
+
+    def figures(job: Job[Any], value: Any) -> dict[str, object]:
+        (trained, report), file = value, files[job.name]
+        trained.policy.save(file, overwrite=overwrite)
+        trained.plot(file.with_suffix(".png"), overwrite=overwrite)
+        return {"file": str(file), "steps": trained.steps, **_figures(report)}
+
+    return jobs.run(made, figures, table=table, as_json=as_json)
+
+
+def _figures(report: EpisodeReport) -> dict[str, object]:
+    """What a row of a table has of a report."""
+    names = ["success_rate", "mean", "p95", "time_to_reach"]
+    if report.peak_force.any():
+        names.append("peak_force")
+    entries = report.as_dict()
+    return {name: entries[name] for name in names}
+
+
 def recipe_of(task: Task, *, seed: int, steps: int, fitted: Path | None, is_exact: bool = False) -> Recipe:
     """The recipe of a training; `fitted`: its arms vary about this one.
 
@@ -193,27 +270,85 @@ def _engine(name: str) -> Any:
 
 
 def evaluate(
-    policy: AnyPolicy = None,
-    /,
-    *,
+    *policies: Annotated[Path, Parameter(help=_POLICY + " Default: reach.")],
     episodes: Annotated[int, Parameter(help="Targets, none of them seen in training.")] = 1000,
     seed: Seed = 0,
     randomisation: Randomisation = "none",
     engine: Engine = "mujoco",
-    out: Annotated[Path | None, Parameter(help="Write report, recording and plot under this name.")] = None,
+    out: Annotated[
+        Path | None,
+        Parameter(
+            help="Write report, recording and plot under this name; of several evaluations their table."
+        ),
+    ] = None,
+    seeds: Seeds = "",
+    sweep: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=JOBS,
+            help="NAME=VALUE,VALUE: evaluate with each value of a setting of the task, or of randomisation, such as "
+            "clearance=1e-3,2e-4; may be repeated for all combinations.",
+        ),
+    ] = (),
+    jobs: JobOptions = HERE,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
-    """Evaluate a policy in simulation."""
+    """Evaluate a policy in simulation.
+
+    With several policies, seeds or settings each evaluation is a job of its own:
+
+        heptarm rl eval peg-in-hole mine.npz --seeds 0..9 --episodes 200 --sweep clearance=5e-4,2e-4
+    """
+    if len(policies) > 1 or seeds or sweep or jobs != HERE:
+        table = (
+            None if out is None else refuse_existing(out.with_suffix(".csv"), overwrite=overwrite, name="out")
+        )
+        cases = [
+            _evaluation(
+                str(policy), {"seed": number, "randomisation": randomisation, **settings}, episodes, engine
+            )
+            for policy in policies or (ReachTask.name,)
+            for number, settings in cases_of(seeds, seed, sweep)
+        ]
+        return jobs.run(cases, lambda _, report: _figures(report), table=table, as_json=as_json)
     from heptarm.rl.evaluate import evaluate as work
-    from heptarm.rl.sim.randomisation import level
 
     _refuse_reports(out, overwrite=overwrite, film=False)
-    network, known = _load(policy), level(randomisation)
-    if isinstance(network.task, ContactTask):
-        known = known.of_servo()
+    network = _load(policies[0] if policies else None)
+    known = _randomisation(network, randomisation)
     report = work(network, episodes, randomisation=known, seed=seed, engine=_engine(engine))
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
+
+
+def _evaluation(
+    policy: str, settings: dict[str, Any], episodes: int, engine: str
+) -> tuple[dict[str, object], EvaluateJob]:
+    """An evaluation as a job, and what distinguishes it."""
+    from heptarm.rl.jobs import EvaluateJob
+
+    network = _load(Path(policy))
+    task = network.task
+    for name, value in settings.items():
+        if name not in ("seed", "randomisation"):
+            task = with_setting(task, name, value)
+    case = {"policy": policy, **settings}
+    return case, EvaluateJob(
+        name_of(case),
+        network,
+        episodes,
+        task=task,
+        seed=settings["seed"],
+        randomisation=_randomisation(network, settings["randomisation"]),
+        engine=_engine(engine),
+    )
+
+
+def _randomisation(network: Policy[Any], name: str) -> Any:
+    """A level of randomisation as far as it concerns the task of a policy."""
+    from heptarm.rl.sim.randomisation import level
+
+    return level(name).of_servo() if isinstance(network.task, ContactTask) else level(name)
 
 
 def deploy(

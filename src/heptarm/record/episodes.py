@@ -26,7 +26,7 @@ from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, Sh
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.recorder import Recorder, RecordSource
 from heptarm.values.camera import Picture
-from heptarm.values.checks import finite_entries, instance, numbers, shown, within
+from heptarm.values.checks import finite_entries, instance, integer, numbers, shown, within
 from heptarm.values.files import unwritable
 from heptarm.values.frames import check_printable
 from heptarm.values.sealed import Sealed
@@ -46,6 +46,8 @@ TASK, RATE, NUMBER, LABEL, REASON = "episode_task", "episode_rate", "episode_num
 STALL = 2.0
 #: Fastest steps [Hz], quality of the pictures as JPEG files, most numbers of a stream, longest text.
 FASTEST, _QUALITY, _MOST, _LONGEST = 500.0, 92, 1000, 1000
+#: Highest number of an episode.
+_LAST = 10**9
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _FILE = re.compile(r"episode-(\d{5,})\.mcap")
 
@@ -66,6 +68,12 @@ def episode_files(folder: Path) -> list[tuple[int, Path]]:
     """Numbers and files of the episodes in a folder, in order."""
     found = [(match, path) for path in folder.glob("episode-*.mcap") if (match := _FILE.fullmatch(path.name))]
     return sorted((int(match.group(1)), path) for match, path in found)
+
+
+def next_number(folder: Path) -> int:
+    """Number of the next episode in a folder."""
+    files = episode_files(folder)
+    return files[-1][0] + 1 if files else 0
 
 
 class _Feed:
@@ -285,16 +293,19 @@ class EpisodeSet(Sealed):
         """Number of episodes in the folder."""
         return len(episode_files(self.folder))
 
-    def episode(self, task: str | None = None) -> Episode:
-        """The next episode, to be used in a `with` block.
+    def episode(self, task: str | None = None, *, number: int | None = None) -> Episode:
+        """An episode, to be used in a `with` block.
 
         Args:
             task: what is done, in words; None: that of the set.
+            number: of its file, as when several programs record parts of a set; None: the next one of the folder.
 
         Raises:
-            ShapeError: no text.
+            ShapeError: no text, or no integer.
+            LimitError: a number outside its range.
         """
-        return Episode(self, self._terms.task if task is None else _text(task, "task"))
+        chosen = None if number is None else integer(number, "number", 0, _LAST)
+        return Episode(self, self._terms.task if task is None else _text(task, "task"), chosen)
 
     def push(self, name: str, values: npt.ArrayLike) -> None:
         """Add numbers of a stream that the program pushes, such as a callback of ROS, at the time of the call.
@@ -376,8 +387,8 @@ class Episode(Sealed):
 
     task: Final[str]
 
-    def __init__(self, owner: EpisodeSet, task: str) -> None:
-        self._set, self.task = owner, task
+    def __init__(self, owner: EpisodeSet, task: str, number: int | None) -> None:
+        self._set, self.task, self._number = owner, task, number
         self._path = owner.folder
         self._label: Label = "unlabelled"
         self._reason = ""
@@ -399,8 +410,7 @@ class Episode(Sealed):
             )
         if terms.reset is not None:
             terms.reset()
-        files = episode_files(owner.folder)
-        number = files[-1][0] + 1 if files else 0
+        number = next_number(owner.folder) if self._number is None else self._number
         self._path = owner.folder / f"episode-{number:05d}.mcap"
         self._recorder = Recorder(
             {"": owner._source},

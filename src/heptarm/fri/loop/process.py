@@ -21,7 +21,6 @@ import sys
 import threading
 from collections import deque
 from dataclasses import dataclass, replace
-from importlib.machinery import PathFinder
 from typing import Any
 
 import cloudpickle
@@ -33,6 +32,7 @@ from heptarm.fri.loop.cycle import Cycle, describe
 from heptarm.fri.loop.law_limit import LawLimit
 from heptarm.fri.loop.native import CALL_LAW, ENDED, LAW_FAILED, SOCKET_ERROR
 from heptarm.fri.loop.settings import Law, LoopSettings
+from heptarm.io.new_process import by_value, is_importable, module_path
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import UdpSocket
 
@@ -94,9 +94,7 @@ def _reason(error: BaseException) -> str:
 def importable(law: Law | CompiledLaw | None) -> str | None:
     """Name "module:function" by which a new process can import a law; None if it cannot."""
     module, name = getattr(law, "__module__", None), getattr(law, "__qualname__", "<")
-    if module is None or module == "__main__" or "<" in name:
-        return None
-    if PathFinder.find_spec(module.partition(".")[0]) is None:  # only this process can find the module
+    if module is None or "<" in name or not is_importable(module):
         return None
     found: object = sys.modules.get(module)
     for part in name.split("."):
@@ -141,21 +139,10 @@ def packed(settings: LoopSettings, place: Place) -> bytes:
         CommandRejected: the law uses a value that belongs to this process, such as an arm, a lock or a file.
     """
     law = settings.law
-    module = sys.modules.get(getattr(law, "__module__", None) or "")
-    foreign = (
-        module is not None
-        and module.__name__ != "__main__"
-        and PathFinder.find_spec(module.__name__.partition(".")[0]) is None
-    )
     into = io.BytesIO()
     try:
-        if foreign:
-            cloudpickle.register_pickle_by_value(module)
-        try:
+        with by_value(law):
             _Pickler(into, law).dump((settings, place))
-        finally:
-            if foreign:
-                cloudpickle.unregister_pickle_by_value(module)
     except Exception as error:  # whatever the objects that it uses raise
         raise CommandRejected(
             f"the law {getattr(law, '__qualname__', law)!r} cannot be sent to the loop's process: {error}",
@@ -183,11 +170,10 @@ class Worker:
     """
 
     def __init__(self, path: str, sent: bytes) -> None:
-        folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         with system_errors("the loop's process cannot be started", kind=ConnectFailed):
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "heptarm.fri.loop.process", path],
-                env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
+                env={**os.environ, "PYTHONPATH": module_path(), "OPENBLAS_NUM_THREADS": "1"},
                 stdin=subprocess.PIPE,
                 stderr=subprocess.PIPE,
             )

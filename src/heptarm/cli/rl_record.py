@@ -1,0 +1,93 @@
+"""`heptarm rl record`: episodes of a scripted task, on many virtual arms at once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from heptarm.cli.jobs import HERE, JobOptions
+from heptarm.cli.options import Json
+from heptarm.record.episodes import next_number
+from heptarm.rl.jobs import RecordJob, Script
+from heptarm.rl.pool import Job
+from heptarm.values.camera import Camera
+from heptarm.values.checks import integer
+from heptarm.values.files import unwritable
+
+#: Most episodes of a job: it starts a virtual cabinet, and is run again as a whole if its worker is lost.
+_BATCH = 5
+
+
+def record(
+    script: Annotated[
+        Path,
+        Parameter(
+            help="Python file with a function demonstrate(arm, random), and perhaps reset(arm, random)."
+        ),
+    ],
+    folder: Annotated[
+        Path, Parameter(help="Folder of the episodes, see heptarm episodes; it may have some.")
+    ],
+    /,
+    *,
+    episodes: Annotated[int, Parameter(help="Episodes to record.")] = 20,
+    seed: Annotated[int, Parameter(help="Seed of all random numbers.")] = 0,
+    rate: Annotated[float, Parameter(help="Steps per second of an episode [Hz].")] = 20.0,
+    task: Annotated[str, Parameter(help="What is done, in words, for the episodes.")] = "",
+    camera: Annotated[
+        bool,
+        Parameter(negative="", help="Record pictures of a simulated camera, 96 x 96, with each episode."),
+    ] = False,
+    target: Annotated[
+        str,
+        Parameter(
+            help="Virtual arm that each worker starts: sim://iiwa14, or sim://iiwa14?scene=bins&speed=2."
+        ),
+    ] = "sim://iiwa14",
+    jobs: JobOptions = HERE,
+    as_json: Json = False,
+) -> int:
+    """Record episodes of a scripted task on virtual arms, many at once.
+
+    The function demonstrate does the task once, with random numbers of the episode, and returns whether it succeeded.
+    An episode is the same whichever worker records it. For example:
+
+        heptarm rl record examples/30_many_demonstrations.py push-aside --episodes 40 --workers 2
+    """
+    found, first = Script.load(script), next_number(folder)
+    last = first + integer(episodes, "episodes", 1, 100_000)
+    cameras = {"scene": Camera(size=(96, 96), rate=min(60.0, rate))} if camera else {}
+    numbers = [tuple(range(begin, min(begin + _BATCH, last))) for begin in range(first, last, _BATCH)]
+    cases: list[tuple[Mapping[str, object], Job[Any]]] = []
+    for part in numbers:
+        case = {"episodes": f"{part[0]}..{part[-1]}"}
+        job = RecordJob(
+            f"episodes {part[0]}..{part[-1]}",
+            found,
+            target,
+            part,
+            seed=seed,
+            rate=rate,
+            task=task,
+            cameras=cameras,
+        )
+        cases.append((case, job))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error, name="folder") from error
+
+    def figures(_: Job[Any], recorded: Any) -> dict[str, object]:
+        for episode in recorded:
+            file = folder / f"episode-{episode.number:05d}.mcap"
+            half = file.with_suffix(".part")
+            half.write_bytes(episode.content)
+            half.replace(file)
+        counts = Counter(episode.label for episode in recorded)
+        return {label: counts[label] for label in ("success", "failure", "unlabelled")}
+
+    return jobs.run(cases, figures, as_json=as_json)
