@@ -13,10 +13,12 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 import gymnasium
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.polish import Polish
 from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask, Moment
+from heptarm.rl.deploy_contact import ContactSettings, _check
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.contact_batch import BatchContact
 from heptarm.rl.sim.episodes import BatchSettings
@@ -129,6 +131,25 @@ def test_numbers_outside_their_range_are_refused(kind: type) -> None:
         if number.metadata.get("unit"):
             with pytest.raises(LimitError, match=rf"{number.name} must be .*{number.metadata['unit']}"):
                 kind(**{number.name: -1.0})
+
+
+def test_a_policy_may_choose_the_stiffness() -> None:
+    task = PegInHole(softest=0.25, tilt=1e-3, height=1e-6, steps=60)
+    assert task.action_size == 6 and task.observation_size == len(task.history) * 16
+    env = gymnasium.make("heptarm/PegInHole-v0", task=task)
+    assert env.action_space.shape == (6,) and env.reset(seed=1)[0] in env.observation_space
+    arms = BatchContact(task, TWO)
+    arms.reset(np.tile([2.5e-3, 0, 0, 0, 0, 0], (2, 1)))
+    down = np.array([[0.0, 0, 0.5, 0, 0, -1.0], [0.0, 0, 0.5, 0, 0, 1.0]])  # one compliant, one stiff
+    for _ in range(50):
+        step = arms.step(down)
+    full = task.leash * task.stiffness
+    assert step.force == pytest.approx([0.25 * full, full], rel=0.15)
+    assert arms.teach().shape == (2, 6)
+    with pytest.raises(LimitError, match="softest"):
+        PegInHole(softest=0.0)
+    with pytest.raises(CommandRejected, match='through must be "fri"'):
+        _check(task, ContactSettings(), None, None)
 
 
 def test_any_function_of_observations_is_evaluated() -> None:

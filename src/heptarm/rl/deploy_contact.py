@@ -200,6 +200,14 @@ def _check(
         raise CommandRejected(f"gripper must be given: the task {task.name} uses it", parameter="gripper")
     if task.look_size and bodies is None:
         raise CommandRejected(f"bodies must be given: the task {task.name} looks at them", parameter="bodies")
+    if task.has_stiffness and settings.through != "fri":
+        raise CommandRejected(
+            f'through must be "fri" for the task {task.name}, whose policy chooses the stiffness, got '
+            f"{settings.through!r}",
+            parameter="through",
+            value=settings.through,
+            hint="the stiffness of a servo motion does not change while it runs",
+        )
     fastest = task.step * task.rate * np.sqrt(3.0)
     if fastest > settings.speed:
         raise LimitError(
@@ -301,7 +309,8 @@ class _Run:
             speed=self._settings.speed,
         )
         with self._arm.fri("torque", period_ms=_PERIOD, law=law) as session:
-            return self._decide(_ByTorques(session, self._arm.state), tip, origin, target)
+            drive = _ByTorques(session, self._arm.state, self._stiffness)
+            return self._decide(drive, tip, origin, target)
 
     def _decide(self, drive: _Drive, tip: _Tip, origin: Pose, target: Array) -> _Episode:
         """Let the policy decide until the episode, or the stream of set-points, ends."""
@@ -322,7 +331,10 @@ class _Run:
             wrenches = []
             for part in range(1, _FINE + 1):
                 waiting.append(last + (command - last) * part / _FINE)
-                drive.set(origin @ Pose.from_rotvec(waiting[0][:3], waiting[0][3:6]))
+                due = waiting[0]
+                drive.set(origin @ Pose.from_rotvec(due[:3], due[3:6]))
+                if isinstance(drive, _ByTorques) and task.has_stiffness:
+                    drive.soften(float(task.fraction(due)))
                 time = (step * _FINE + part) / (task.rate * _FINE)
                 reached = tip.wait(drive, time, settings.stale)
                 if reached is None:
@@ -394,8 +406,8 @@ class _Drive(Protocol):
 class _ByTorques:
     """Set-points of the law of an FRI session."""
 
-    def __init__(self, session: Fri, start: State) -> None:
-        self._session, self.start = session, start
+    def __init__(self, session: Fri, start: State, stiffness: Array) -> None:
+        self._session, self.start, self._stiffness = session, start, stiffness
 
     @property
     def active(self) -> bool:
@@ -405,6 +417,10 @@ class _ByTorques:
     def set(self, pose: Pose) -> None:
         """Have the law follow a set-point."""
         self._session.params.goal = pose
+
+    def soften(self, fraction: float) -> None:
+        """Choose a fraction of the stiffness."""
+        self._session.params.stiffness = fraction * self._stiffness
 
 
 class _Tip:

@@ -125,6 +125,10 @@ class BatchContact(TaskBatch):
         self._length, self._contact = bind("actuator_length"), bind("qfrc_constraint")
         self._filter, self._friction = expand("actuator_dynprm"), expand("geom_friction")
         self._damping = expand("dof_damping")
+        self._springs = (
+            (expand("actuator_gainprm"), expand("actuator_biasprm")) if task.has_stiffness else None
+        )
+        self._stiff, self._damp = model.actuator_gainprm[-6:, 0].copy(), -model.actuator_biasprm[-6:, 2]
         self._steels = np.flatnonzero(model.geom_priority == 0)
         self._reach = float(model.site(PREFIX + task.site).pos[2])
         self._first = model.qpos0.copy()
@@ -219,6 +223,11 @@ class BatchContact(TaskBatch):
     def _control(self, which: Index | slice, command: Array | None = None) -> None:
         given = self.command[which] if command is None else command
         self._state["ctrl"][which, -6:] = given[:, :6]
+        if self._springs is not None:
+            (gain, bias), fraction = self._springs, self.task.fraction(given)[:, None]
+            gain[which, -6:, 0] = fraction * self._stiff
+            bias[which, -6:, 1] = -fraction * self._stiff
+            bias[which, -6:, 2] = -np.sqrt(fraction) * self._damp
         if self._gripper is not None:
             closes = given[:, 6] > 0.0 if self.task.has_gripper else np.zeros(len(given), dtype=bool)
             self._state["ctrl"][which, self._grip] = np.where(closes, self._gripper[1], self._gripper[0])
@@ -229,8 +238,10 @@ class BatchContact(TaskBatch):
         return np.concatenate([seen, self.task.hidden(self.moment(which))], axis=-1) if self._reveal else seen
 
     def teach(self) -> Array:
-        """What one who knows everything would do, shape (envs, actions)."""
-        return self.task.teach(self.moment())
+        """What one who knows everything would do, shape (envs, actions); as stiff as allowed."""
+        taught = self.task.teach(self.moment())
+        missing = self.task.action_size - taught.shape[1]
+        return np.concatenate([taught, np.ones((self.envs, missing))], axis=1) if missing else taught
 
     def _advance(self, action: Array) -> Array:
         return self.task.advance(self.command, self.pose, action)
