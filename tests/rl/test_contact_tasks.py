@@ -12,7 +12,7 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 
 import gymnasium
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.errors import CommandRejected, LimitError, ShapeError, Unreachable
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.polish import Polish
@@ -25,6 +25,7 @@ from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import TASKS, environment, task_named
+from heptarm.values.pose import Pose
 
 CONTACT = [name for name, kind in TASKS.items() if issubclass(kind, ContactTask)]
 TWO = BatchSettings(envs=2, starts="together", seed=3, threads=1)
@@ -117,6 +118,12 @@ def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
         def scene(self) -> str:
             return "<mujoco><worldbody/></mujoco>"
 
+    class Far(Push):
+        name = "far"
+        origin = Pose.of((1.4, 0.0, 0.2), (0.0, 1.0, 0.0, 0.0))
+
+    with pytest.raises(Unreachable, match="a start of the task far must be within reach"):
+        simulate(Far(), TWO)
     with pytest.raises(CommandRejected, match="the scene of broken cannot be read"):
         simulate(Broken(), TWO)
     with pytest.raises(CommandRejected, match="a body `tool` with a site `tip`"):

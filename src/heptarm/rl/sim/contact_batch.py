@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from mujoco import batch
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, Unreachable
 from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
 from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.sim.episodes import ALL, BatchSettings, Index, TaskBatch
@@ -78,12 +78,25 @@ def build(task: ContactTask) -> Any:
 
 
 def _joints(task: ContactTask, poses: Array, reach: float) -> Array:
-    """Joint positions for poses of a tip that is so far from the flange, shape (n, 6) to (n, 7)."""
+    """Joint positions for poses of a tip that is so far from the flange, shape (n, 6) to (n, 7).
+
+    Raises:
+        Unreachable: there are none for one of them.
+    """
     flanges = np.tile(np.eye(4), (len(poses), 1, 1))
     turned = _turned(_quaternions(poses[:, 3:]))
     flanges[:, :3, :3] = task.origin.rotation @ turned
     flanges[:, :3, 3] = task.origin.xyz + (poses[:, :3] - reach * turned[:, :, 2]) @ task.origin.rotation.T
-    return solve_batch(task.model, flanges)
+    found = solve_batch(task.model, flanges)
+    for index in np.flatnonzero(np.isnan(found).any(axis=1)).tolist():
+        raise Unreachable(
+            f"a start of the task {task.name} must be within reach of the {task.model.title}, got the flange at "
+            f"{np.round(flanges[index, :3, 3], 3).tolist()} m",
+            code=51,
+            parameter="starts",
+            hint="move the task's origin or its starts, or shorten its tool",
+        )
+    return found
 
 
 class BatchContact(TaskBatch):
