@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import warnings
 from dataclasses import fields
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -19,12 +23,14 @@ from heptarm.rl.contact.polish import Polish
 from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.deploy_contact import ContactSettings, _check
+from heptarm.rl.env import ContactEnv
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.contact_batch import BatchContact
 from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import TASKS, environment, task_named
+from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
 
 CONTACT = [name for name, kind in TASKS.items() if issubclass(kind, ContactTask)]
@@ -157,6 +163,61 @@ def test_a_policy_may_choose_the_stiffness() -> None:
         PegInHole(softest=0.0)
     with pytest.raises(CommandRejected, match='through must be "fri"'):
         _check(task, ContactSettings(), None, None)
+
+
+PICTURES = """
+import gymnasium, heptarm.rl, numpy as np, sys
+from gymnasium.utils.env_checker import check_env
+from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.values.camera import Camera
+
+cameras = {
+    "front": Camera(place=(1.2, -0.5, 0.7), target=(0.6, 0, 0.2), size=(64, 48), shadows=False),
+    "wrist": Camera(place=(0.1, 0, 0.02), target=(0, 0, 0.2), frame="flange", size=(48, 48), shadows=False),
+}
+env = gymnasium.make("heptarm/PickPlace-v0", task=PickPlace(steps=3), pictures=cameras).unwrapped
+first, _ = env.reset(seed=1)
+assert env.observation_space.contains(first) and first["front"].shape == (48, 64, 3)
+assert np.ptp(first["wrist"]) > 50
+for index in range(3):
+    seen, _, _, truncated, _ = env.step(np.array([0.0, 0.0, 1.0, -1.0]))
+    assert env.observation_space.contains(seen) and truncated == (index == 2)
+changed = np.abs(seen["wrist"].astype(int) - first["wrist"]).max()
+assert changed > 20, changed  # the last picture is of this episode, in which the gripper went down
+again, _ = env.reset(seed=1)
+assert (again["front"] == first["front"]).all()
+check_env(env)
+if "stable_baselines3" in sys.argv:
+    from stable_baselines3.common.env_checker import check_env
+
+    check_env(env)
+"""
+
+
+@pytest.mark.long
+@pytest.mark.slow
+def test_pictures_are_observations() -> None:
+    libraries = [name for name in ("stable_baselines3",) if find_spec(name)]
+    for driver in ("egl", "osmesa"):
+        environment = {**os.environ, "MUJOCO_GL": driver}
+        done = subprocess.run(
+            [sys.executable, "-c", PICTURES, *libraries],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+        if done.returncode == 0:
+            return
+    pytest.fail(done.stderr)
+
+
+def test_pictures_have_names_of_their_own() -> None:
+    with pytest.raises(CommandRejected, match='pictures must not be named "state"'):
+        ContactEnv("push", pictures={"state": Camera()})
+    with pytest.raises(ShapeError, match=r"pictures\['front'\] must be a Camera"):
+        ContactEnv("push", pictures={"front": 3})  # type: ignore[dict-item]
 
 
 def test_any_function_of_observations_is_evaluated() -> None:

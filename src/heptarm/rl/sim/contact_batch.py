@@ -17,10 +17,12 @@ from heptarm.errors import CommandRejected, Unreachable
 from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
 from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.sim.episodes import ALL, BatchSettings, Index, TaskBatch
+from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.gripper import driven_joints, has_gripper
 from heptarm.sim.plant.scene import GRIPPER, PREFIX, attach_text
 from heptarm.sim.plant.sensor_errors import FRICTION, GAIN, STICTION_SPEED, TORQUE_NOISE
-from heptarm.sim.plant.world import specification
+from heptarm.sim.plant.world import add_camera, specification
+from heptarm.values.camera import Camera
 from heptarm.values.checks import Array
 
 #: Readings of the torque sensors that a decision averages.
@@ -36,13 +38,19 @@ _DRIFT = 0.15
 _ORIGIN = "origin"
 
 
-def build(task: ContactTask) -> Any:
+def build(task: ContactTask, camera: Camera | None = None) -> Any:
     """The engine's model of a task, an `mujoco.MjModel`; its last six controls are the set-point [m, rad].
+
+    Args:
+        task: the task.
+        camera: that draws it, see `heptarm.sim.camera.ArmCamera`; None: nobody looks.
 
     Raises:
         CommandRejected: the scene is not in MuJoCo's format, or has no body `tool` with the site of its tip.
     """
-    spec = specification(task.robot)
+    spec = specification(task.robot, None if camera is None else ArmMeshes())
+    if camera is not None:
+        add_camera(spec, camera)
     for servo in list(spec.actuators):
         spec.delete(servo)
     for geom in spec.geoms:  # the arm itself touches nothing
@@ -177,6 +185,13 @@ class BatchContact(TaskBatch):
     def q(self) -> Array:
         """Measured positions, shape (envs, 7) [rad]."""
         return np.asarray(self._state["qpos"])[:, :7]
+
+    def placed(self, index: int) -> tuple[Array, tuple[Array, Array]]:
+        """Where everything of one arm is: MuJoCo's qpos, and what is moved by hand; see `ArmCamera.place_all`."""
+        positions, places, turns = (
+            np.asarray(self._state[name])[index] for name in ("qpos", "mocap_pos", "mocap_quat")
+        )
+        return positions, (places, turns)
 
     def bodies(self, which: Index | slice = ALL) -> dict[str, Array]:
         """Poses of the free bodies in the frame of the task, shape (n, 6) [m, rad] each."""

@@ -1,0 +1,55 @@
+"""Pictures of a simulated arm in a task with contacts, by the cameras that also look at virtual and real arms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected
+from heptarm.rl.contact.task import ContactTask
+from heptarm.rl.sim.contact_batch import BatchContact, build
+from heptarm.sim.camera import ArmCamera
+from heptarm.sim.lens import Lens
+from heptarm.values.camera import Camera
+from heptarm.values.checks import instance
+from heptarm.values.frames import check_name
+
+
+class TaskPictures:
+    """Draws one arm of a simulation.
+
+    Args:
+        task: of the simulation.
+        cameras: by the names of their pictures. Their scenes do not count: the task's own is drawn.
+
+    Raises:
+        CommandRejected: a name that is not allowed, or this machine cannot draw.
+        ShapeError: something else than cameras.
+    """
+
+    def __init__(self, task: ContactTask, cameras: Mapping[str, Camera]) -> None:
+        self.sizes: dict[str, tuple[int, int]] = {}
+        self._cameras: dict[str, ArmCamera] = {}
+        for name, camera in instance(cameras, Mapping, "pictures").items():
+            check_name(name, "pictures")
+            size = instance(camera, Camera, f"pictures[{name!r}]").size
+            model = build(task, Lens(camera).straight)
+            try:
+                self._cameras[name] = ArmCamera(model, camera)
+            except Exception as error:  # of any graphics driver
+                raise CommandRejected(
+                    f"this machine cannot draw: {type(error).__name__}: {error}",
+                    parameter="pictures",
+                    hint="set MUJOCO_GL to egl or osmesa before the program starts",
+                ) from error
+            self.sizes[name] = size
+
+    def draw(self, arms: BatchContact, index: int = 0) -> dict[str, npt.NDArray[np.uint8]]:
+        """The pictures of an arm: red, green, blue, shape (height, width, 3) each."""
+        found = {}
+        for name, camera in self._cameras.items():
+            camera.place_all(*arms.placed(index))
+            found[name] = camera.draw()
+        return found
