@@ -58,7 +58,7 @@ def test_gymnasium_and_stable_baselines_find_nothing_to_complain_of(kind: type) 
     from gymnasium.utils.env_checker import check_env
 
     env = gymnasium.make(environment(kind), task=kind(steps=8)).unwrapped
-    check_env(env)
+    check_env(env, skip_render_check=True)
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -175,7 +175,8 @@ cameras = {
     "front": Camera(place=(1.2, -0.5, 0.7), target=(0.6, 0, 0.2), size=(64, 48), shadows=False),
     "wrist": Camera(place=(0.1, 0, 0.02), target=(0, 0, 0.2), frame="flange", size=(48, 48), shadows=False),
 }
-env = gymnasium.make("heptarm/PickPlace-v0", task=PickPlace(steps=3), pictures=cameras).unwrapped
+words = {"pictures": cameras, "render_mode": "rgb_array"}
+env = gymnasium.make("heptarm/PickPlace-v0", task=PickPlace(steps=3), **words).unwrapped
 first, _ = env.reset(seed=1)
 assert env.observation_space.contains(first) and first["front"].shape == (48, 64, 3)
 assert np.ptp(first["wrist"]) > 50
@@ -184,6 +185,10 @@ for index in range(3):
     assert env.observation_space.contains(seen) and truncated == (index == 2)
 changed = np.abs(seen["wrist"].astype(int) - first["wrist"]).max()
 assert changed > 20, changed  # the last picture is of this episode, in which the gripper went down
+assert env.render().shape == (480, 640, 3) and np.ptp(env.render()) > 50
+reach = gymnasium.make("heptarm/Reach-v0", render_mode="rgb_array").unwrapped
+reach.reset(seed=1)
+check_env(reach)
 again, _ = env.reset(seed=1)
 assert (again["front"] == first["front"]).all()
 check_env(env)

@@ -34,6 +34,8 @@ Observation = npt.NDArray[np.float32]
 FARTHEST = 2.0
 #: Largest number of an observation of a task with contacts; what is above is clipped.
 LARGEST = 10.0
+#: What `render` shows.
+_VIEW = Camera(place=(1.5, -0.9, 0.9), target=(0.45, 0.0, 0.35))
 
 
 def observation_space(task: Task) -> spaces.Box:
@@ -73,22 +75,39 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
     Args:
         arms: the simulation, of one arm.
         steps: decisions of an episode.
-        render_mode: None; pictures are observations.
+        render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
-        CommandRejected: a render mode.
+        CommandRejected: another render mode.
     """
 
-    metadata = {"render_modes": [], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
 
     def __init__(self, arms: TaskBatch, *, steps: int, render_mode: str | None) -> None:
-        if render_mode is not None:
-            raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
-        self.render_mode = None
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise CommandRejected(
+                f'render_mode must be "rgb_array" or None, got {render_mode!r}', parameter="render_mode"
+            )
+        self.render_mode = render_mode
+        self._view: Any = None
         self.observation_space = self._space = observation_space(arms.task)
         self.action_space = action_space(arms.task)
         self._arms, self._steps = arms, steps
         self._open = False
+
+    def render(self) -> Any:
+        """A picture of the arm: red, green, blue, shape (height, width, 3); None without a render mode.
+
+        Raises:
+            CommandRejected: this machine cannot draw.
+        """
+        if self.render_mode is None:
+            return None
+        if self._view is None:
+            from heptarm.rl.sim.pictures import TaskPictures  # needs what draws
+
+            self._view = TaskPictures(self._arms.task, {"view": _VIEW})
+        return self._view.draw(self._arms)["view"]
 
     def _seen(self, observation: Observation) -> Any:
         """What is observed, for numbers of the task."""
@@ -163,7 +182,7 @@ class ReachEnv(TaskEnv):
         engine: "plant": the virtual cabinet's plant with its servo at 1 kHz; "training": what policies are
             trained on, some ten times as fast.
         randomisation: what differs from episode to episode.
-        render_mode: None; there are no pictures.
+        render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
         CommandRejected: unknown robot, or a render mode.
@@ -199,7 +218,7 @@ class ContactEnv(TaskEnv):
         randomisation: latency and bandwidth that differ from episode to episode.
         pictures: cameras by their names: an observation is a dictionary then, with the numbers as "state" and the
             pictures under these names. Set MUJOCO_GL to egl or osmesa where there is no display. None: numbers alone.
-        render_mode: None; pictures are observations.
+        render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
         CommandRejected: no such task, a render mode, a randomisation that the task has not, a picture that is named
