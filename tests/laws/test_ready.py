@@ -75,7 +75,7 @@ def test_cartesian_impedance_is_a_spring_of_its_stiffness() -> None:
     assert plant.place - begin == pytest.approx([0.0, 8.0 / 800.0, 0.0], abs=5e-4)
 
 
-def test_cartesian_impedance_holds_the_tip_of_a_tool_and_is_soft_about_it() -> None:
+def test_cartesian_impedance_holds_the_tip_of_a_tool_and_is_compliant_about_it() -> None:
     tip = Pose.from_rotvec((0.01, 0.02, 0.2), (0.1, -0.2, 0.3))
     plant = Plant(laws.cartesian_impedance(frame=tip, stiffness=(800.0,) * 3 + (50.0,) * 3))
     begin = Pose.from_matrix(model.forward(ARM, HOME)) @ tip
