@@ -308,9 +308,11 @@ class _Run:
                 q, dq = stream.at(t + period * self._speed)  # where it will be when the arm gets there
                 servo.set(q, self._speed * dq)
                 due = begun + round((t / self._speed + period) * 1e9)
-                state = arm.wait_until(
-                    lambda seen, due=due: seen.stamp >= due or not servo.active, timeout=_STREAM_WATCHDOG
-                )
+
+                def is_due(seen: State, due: int = due) -> bool:
+                    return seen.stamp >= due or not servo.active
+
+                state = arm.wait_until(is_due, timeout=_STREAM_WATCHDOG)
                 note(state)
                 t = (state.stamp - begun) * 1e-9 * self._speed
                 settled = t >= stream.duration and bool(
