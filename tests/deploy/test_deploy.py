@@ -209,8 +209,9 @@ def test_the_command_line_refuses_what_a_policy_with_contacts_has_not() -> None:
     ):
         done = refused("rl", "deploy", "peg-in-hole", *words)
         assert done.returncode != 0 and why in done.stderr, done.stderr
-    done = refused("rl", "deploy", "--tip", "0.2")
-    assert done.returncode != 0 and "of policies with contacts" in done.stderr
+    for words in (("--tip", "0.2"), ("--through", "fri")):
+        done = refused("rl", "deploy", *words)
+        assert done.returncode != 0 and "are of policies with contacts" in done.stderr
 
 
 @pytest.mark.slow
@@ -227,6 +228,8 @@ def test_the_command_line_inserts_a_peg_and_records_it(tmp_path: Path) -> None:
     assert report.facts["guard"] == {"force": 0} and report.facts["latency"] == 0.02
     recording = ha.load(out.with_suffix(".mcap"))
     assert recording.complete and len(recording) > 2000
+    assert report.facts["recording"] == str(out.with_suffix(".mcap"))
+    assert 0.0 < report.facts["twin"]["largest"]["q"] < 0.1 and "alike" in report.facts["twin"]
 
 
 @pytest.mark.slow

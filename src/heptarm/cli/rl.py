@@ -24,7 +24,7 @@ from heptarm.cli.options import (
     Yes,
 )
 from heptarm.cli.output import confirm, emit
-from heptarm.errors import CommandRejected, NotReady, require
+from heptarm.errors import CommandRejected, HeptarmError, NotReady, require
 from heptarm.rl import deploy as deployment
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.task import ContactTask
@@ -335,7 +335,14 @@ def _compared(
     given = target.text or target_from_env()
     is_like = given.startswith("sim://") and parse_target(given).is_private
     simulator = twin or (given if is_like else None)
-    found = replay_in_sim(recording, target=simulator)
+    facts: dict[str, Any]
+    try:
+        found = replay_in_sim(recording, target=simulator)
+    except HeptarmError as error:  # the deployment and its report count all the same
+        print(f"heptarm: no comparison with the simulator: {error}", file=sys.stderr)
+        return replace(
+            report, facts={**report.facts, "recording": str(recording), "twin": {"refusal": error.text}}
+        )
     if not as_json:
         print(found, file=sys.stderr)
     facts = {

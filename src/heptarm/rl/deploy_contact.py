@@ -363,9 +363,8 @@ class _Run:
             if settled >= _SETTLED * task.rate:
                 break
         left = task.steps - len(missing)
-        last_missing = float(task.left(now)) + (
-            task.radius if ended else 0.0
-        )  # one that ended early has failed
+        # one that ended early has failed
+        last_missing = float(task.left(now)) + (task.radius if ended else 0.0)
         return _Episode(
             np.array(poses + [poses[-1]] * left),
             np.array(joints + [joints[-1]] * left),
