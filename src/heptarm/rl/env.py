@@ -84,10 +84,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
 
     def __init__(self, arms: TaskBatch, *, steps: int, render_mode: str | None) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise CommandRejected(
-                f'render_mode must be "rgb_array" or None, got {render_mode!r}', parameter="render_mode"
-            )
+        if render_mode is not None:
+            word(render_mode, "render_mode", ("rgb_array",))
         self.render_mode = render_mode
         self._view: Any = None
         self.observation_space = self._space = observation_space(arms.task)
