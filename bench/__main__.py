@@ -25,7 +25,7 @@ from bench.measure.store import Store
 from bench.motion import endpoints, follow, inverse_kinematics, paths  # noqa: F401
 from bench.planning import rivals, search  # noqa: F401
 from bench.protocol import garbage, round_trip  # noqa: F401
-from bench.rl import deploy, training  # noqa: F401
+from bench.rl import contact, deploy, training  # noqa: F401
 from bench.ros import nodes  # noqa: F401
 from bench.safety import lost_client, stopping  # noqa: F401
 from bench.servo import stream  # noqa: F401

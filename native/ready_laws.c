@@ -38,7 +38,7 @@ static double sane(double goal, double otherwise) { return isfinite(goal) ? goal
 
 struct cartesian {
     struct robot robot;
-    double goal[7], stiffness[6], damping, force_max, moment_max, speed, turn_speed;
+    double frame[7], goal[7], stiffness[6], damping, force_max, moment_max, speed, turn_speed;
     double posture[N], posture_stiffness, tau_max[N], filter;
 };
 
@@ -72,12 +72,28 @@ static void follow_pose(const double *goal, double far, double angle_max, double
     for (int k = 0; k < 4; k++) pose[3 + k] = turned_goal[k] / size;
 }
 
-/* Impedance at the flange with a compliant posture in its null space (Khatib 1987; Ott, "Cartesian Impedance Control of
+/* From here on a frame that is fixed to the flange counts as it. */
+static void move_flange(struct posture *posture, const double *frame) {
+    double lever[3], own[9], turn[9];
+    rotate(posture->turn, frame, lever);
+    rotation(frame + 3, own);
+    for (int i = 0; i < 3; i++) {
+        posture->place[i] += lever[i];
+        for (int j = 0; j < 3; j++) {
+            turn[3 * i + j] = 0.0;
+            for (int k = 0; k < 3; k++) turn[3 * i + j] += posture->turn[3 * i + k] * own[3 * k + j];
+        }
+    }
+    memcpy(posture->turn, turn, sizeof turn);
+}
+
+/* Impedance at a frame of the flange with a compliant posture in its null space (Khatib 1987; Ott, "Cartesian Impedance Control of
    Redundant and Flexible-Joint Robots", 2008). The cabinet compensates gravity and Coriolis torques. */
 static int cartesian(const struct heptarm_state *s, struct heptarm_command *out, const struct cartesian *p, struct cartesian_memory *m) {
     struct posture posture;
     double j[6][N], mass[N][N], factor[N * N], inverse[6][N], lambda[36], inertia[6], tau0[N], tau[N], velocity[6];
     find_posture(&p->robot, s->q, &posture);
+    move_flange(&posture, p->frame);
     int fresh = m->started == 0.0;
     smooth(s, p->filter, m->dq, fresh);
     if (fresh) {

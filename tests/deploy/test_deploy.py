@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,7 +15,7 @@ import heptarm as ha
 from heptarm.rl.deploy import DeploySettings, circle, deploy
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.film import film
-from heptarm.rl.pilot import PolicyGuard, Watch
+from heptarm.rl.pilot import Pilot, PolicyGuard, Watch
 from heptarm.rl.policy import shipped, shipped_peg
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
@@ -95,6 +96,10 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
             deploy_contact(arm, shipped_peg(), arm.pose())
         with pytest.raises(ha.LimitError, match="speed must be at least"):
             deploy_contact(arm, shipped_peg(), arm.pose(), settings=ContactSettings(speed=0.01))
+        places = [arm.pose(), ha.Pose.at(1.5, 0.0, 0.3)]
+        flange = ContactSettings(frame="flange")
+        with pytest.raises(ha.Unreachable, match=r"origins\[1\]"):
+            deploy_contact(arm, shipped_peg(), places, np.zeros((2, 6)), settings=flange)
         assert np.abs(arm.state.q - before).max() < 1e-4
     with pytest.raises(ha.LimitError, match="latency"):
         DeploySettings(latency=3.0)
@@ -124,6 +129,40 @@ def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
     assert (report.paths > np.array(guard.low) - 0.03).all()
     assert (report.paths < np.array(guard.high) + 0.03).all()
     assert report.facts["guard"]["box"] > 0
+
+
+class Diverged:
+    """Returns one action for ever."""
+
+    def __init__(self, action: float) -> None:
+        self.task = ReachTask()
+        self._action = np.full(7, action)
+
+    def __call__(self, observation: np.ndarray, /) -> np.ndarray:
+        return self._action
+
+
+def test_a_policy_that_diverges_ends_at_rest_and_its_episode_is_marked(tmp_path: Path) -> None:
+    with ha.connect(FAST, watchdog=5.0) as arm, arm.record(tmp_path / "run.mcap"):
+        with pytest.raises(
+            ha.CommandRejected, match=r"episodes\[0\]: an action of the policy must be finite"
+        ):
+            tried(arm, Diverged(np.nan), [POINT])
+        assert np.abs(arm.wait_for_rest().q - ReachTask().home).max() < 1e-2
+    notes = [note.text for note in ha.load(tmp_path / "run.mcap").notes]
+    assert any(text.startswith("failed: episodes[0]: an action of the policy") for text in notes)
+
+
+def test_a_policy_that_saturates_without_effect_diverges() -> None:
+    pilot = Pilot(Diverged(1.0))
+    q = np.array(pilot.task.home)
+    pilot.begin(q)
+    with pytest.raises(ha.CommandRejected, match="at its bounds in every direction for 2 s"):
+        for _ in range(100):  # pushed against what holds the arm: the leash ends the command
+            pilot.decide(q, np.zeros(7), np.array(POINT))
+    pilot.begin(q)
+    for _ in range(60):  # it moves
+        q = pilot.decide(q, np.zeros(7), np.array(POINT)) - 0.01
 
 
 def test_the_guard_brings_commands_back() -> None:
@@ -170,8 +209,9 @@ def test_the_command_line_refuses_what_a_policy_with_contacts_has_not() -> None:
     ):
         done = refused("rl", "deploy", "peg-in-hole", *words)
         assert done.returncode != 0 and why in done.stderr, done.stderr
-    done = refused("rl", "deploy", "--tip", "0.2")
-    assert done.returncode != 0 and "of policies with contacts" in done.stderr
+    for words in (("--tip", "0.2"), ("--through", "fri")):
+        done = refused("rl", "deploy", *words)
+        assert done.returncode != 0 and "are of policies with contacts" in done.stderr
 
 
 @pytest.mark.slow
@@ -188,6 +228,24 @@ def test_the_command_line_inserts_a_peg_and_records_it(tmp_path: Path) -> None:
     assert report.facts["guard"] == {"force": 0} and report.facts["latency"] == 0.02
     recording = ha.load(out.with_suffix(".mcap"))
     assert recording.complete and len(recording) > 2000
+    assert report.facts["recording"] == str(out.with_suffix(".mcap"))
+    assert 0.0 < report.facts["twin"]["largest"]["q"] < 0.1 and "alike" in report.facts["twin"]
+
+
+@pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_the_law_of_torques_inserts_a_peg_and_is_guarded() -> None:
+    policy, target = shipped_peg(), "sim://iiwa14?scene=peg-in-hole&sensors=noisy:1&speed=0.5"
+    error = np.array([0.002, -0.001, 0.0005, 0.01, 0.02, 0.0])
+    with ha.connect(target, watchdog=5.0) as arm, held_peg(arm) as hole:
+        origin = policy.task.presumed(hole, error)
+        settings = ContactSettings(through="fri", latency=0.02, stale=2.0)
+        report = deploy_contact(arm, policy, origin, [error], settings=settings)
+        assert report.success.all() and report.facts["through"] == "fri" and report.peak_force.max() < 30.0
+        report = deploy_contact(arm, policy, origin, [error], settings=replace(settings, peak=2.0))
+        assert report.facts["ended"] == ["force"] and not report.success.any()
+        assert report.peak_force.max() > 2.0
 
 
 @pytest.mark.slow

@@ -75,6 +75,27 @@ def test_cartesian_impedance_is_a_spring_of_its_stiffness() -> None:
     assert plant.place - begin == pytest.approx([0.0, 8.0 / 800.0, 0.0], abs=5e-4)
 
 
+def test_cartesian_impedance_holds_the_tip_of_a_tool_and_is_compliant_about_it() -> None:
+    tip = Pose.from_rotvec((0.01, 0.02, 0.2), (0.1, -0.2, 0.3))
+    plant = Plant(laws.cartesian_impedance(frame=tip, stiffness=(800.0,) * 3 + (50.0,) * 3))
+    begin = Pose.from_matrix(model.forward(ARM, HOME)) @ tip
+    goal = begin.shifted(y=0.02) @ Pose.from_rotvec((0.0, 0.0, 0.0), (0.0, 0.05, 0.0))
+    plant.run(0.02)
+    plant.trial.params.goal = goal
+    plant.run(1.2)
+    held = Pose.from_matrix(model.forward(ARM, plant.q)) @ tip
+    assert np.abs(held.xyz - goal.xyz).max() < 1e-3
+    assert np.abs((held.inverse() @ goal).rotvec).max() < 2e-3
+    flange = plant.place
+    plant.push = lambda t: np.array([0.0, 8.0 * min(1.0, t / 0.2), 0.0])  # on the flange
+    plant.run(1.2)
+    moved = Pose.from_matrix(model.forward(ARM, plant.q)) @ tip
+    assert moved.xyz - held.xyz == pytest.approx([0.0, 8.0 / 800.0, 0.0], abs=1e-3)
+    assert plant.place[1] - flange[1] > 0.015, "it turns about the tip, too"
+    with pytest.raises(CommandRejected, match="frame must be"):
+        laws.cartesian_impedance(frame=(0.0, 0.0, 0.2))  # type: ignore[arg-type]
+
+
 def test_the_null_space_moves_the_elbow_and_not_the_flange() -> None:
     away = HOME + [0.25, 0.0, -0.3, 0.0, 0.3, 0.0, -0.2]
     plant = Plant(laws.cartesian_impedance(posture=away, posture_stiffness=30.0))

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import warnings
 from dataclasses import fields
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -12,17 +16,22 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 
 import gymnasium
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.errors import CommandRejected, LimitError, ShapeError, Unreachable
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.polish import Polish
 from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask, Moment
+from heptarm.rl.deploy_contact import ContactSettings, _check
+from heptarm.rl.env import ContactEnv
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.contact_batch import BatchContact
 from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import TASKS, environment, task_named
+from heptarm.values.camera import Camera
+from heptarm.values.pose import Pose
 
 CONTACT = [name for name, kind in TASKS.items() if issubclass(kind, ContactTask)]
 TWO = BatchSettings(envs=2, starts="together", seed=3, threads=1)
@@ -49,7 +58,7 @@ def test_gymnasium_and_stable_baselines_find_nothing_to_complain_of(kind: type) 
     from gymnasium.utils.env_checker import check_env
 
     env = gymnasium.make(environment(kind), task=kind(steps=8)).unwrapped
-    check_env(env)
+    check_env(env, skip_render_check=True)
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -115,6 +124,12 @@ def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
         def scene(self) -> str:
             return "<mujoco><worldbody/></mujoco>"
 
+    class Far(Push):
+        name = "far"
+        origin = Pose.of((1.4, 0.0, 0.2), (0.0, 1.0, 0.0, 0.0))
+
+    with pytest.raises(Unreachable, match="a start of the task far must be within reach"):
+        simulate(Far(), TWO)
     with pytest.raises(CommandRejected, match="the scene of broken cannot be read"):
         simulate(Broken(), TWO)
     with pytest.raises(CommandRejected, match="a body `tool` with a site `tip`"):
@@ -129,6 +144,85 @@ def test_numbers_outside_their_range_are_refused(kind: type) -> None:
         if number.metadata.get("unit"):
             with pytest.raises(LimitError, match=rf"{number.name} must be .*{number.metadata['unit']}"):
                 kind(**{number.name: -1.0})
+
+
+def test_a_policy_may_choose_the_stiffness() -> None:
+    task = PegInHole(softest=0.25, tilt=1e-3, height=1e-6, steps=60)
+    assert task.action_size == 6 and task.observation_size == len(task.history) * 16
+    env = gymnasium.make("heptarm/PegInHole-v0", task=task)
+    assert env.action_space.shape == (6,) and env.reset(seed=1)[0] in env.observation_space
+    arms = BatchContact(task, TWO)
+    arms.reset(np.tile([2.5e-3, 0, 0, 0, 0, 0], (2, 1)))
+    down = np.array([[0.0, 0, 0.5, 0, 0, -1.0], [0.0, 0, 0.5, 0, 0, 1.0]])  # one compliant, one stiff
+    for _ in range(50):
+        step = arms.step(down)
+    full = task.leash * task.stiffness
+    assert step.force == pytest.approx([0.25 * full, full], rel=0.15)
+    assert arms.teach().shape == (2, 6)
+    with pytest.raises(LimitError, match="softest"):
+        PegInHole(softest=0.0)
+    with pytest.raises(CommandRejected, match='through must be "fri"'):
+        _check(task, ContactSettings(), None, None)
+
+
+PICTURES = """
+import gymnasium, heptarm.rl, numpy as np, sys
+from gymnasium.utils.env_checker import check_env
+from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.values.camera import Camera
+
+cameras = {
+    "front": Camera(place=(1.2, -0.5, 0.7), target=(0.6, 0, 0.2), size=(64, 48), shadows=False),
+    "wrist": Camera(place=(0.1, 0, 0.02), target=(0, 0, 0.2), frame="flange", size=(48, 48), shadows=False),
+}
+words = {"pictures": cameras, "render_mode": "rgb_array"}
+env = gymnasium.make("heptarm/PickPlace-v0", task=PickPlace(steps=3), **words).unwrapped
+first, _ = env.reset(seed=1)
+assert env.observation_space.contains(first) and first["front"].shape == (48, 64, 3)
+assert np.ptp(first["wrist"]) > 50
+for index in range(3):
+    seen, _, _, truncated, _ = env.step(np.array([0.0, 0.0, 1.0, -1.0]))
+    assert env.observation_space.contains(seen) and truncated == (index == 2)
+changed = np.abs(seen["wrist"].astype(int) - first["wrist"]).max()
+assert changed > 20, changed  # the last picture is of this episode, in which the gripper went down
+assert env.render().shape == (480, 640, 3) and np.ptp(env.render()) > 50
+reach = gymnasium.make("heptarm/Reach-v0", render_mode="rgb_array").unwrapped
+reach.reset(seed=1)
+check_env(reach)
+again, _ = env.reset(seed=1)
+assert (again["front"] == first["front"]).all()
+check_env(env)
+if "stable_baselines3" in sys.argv:
+    from stable_baselines3.common.env_checker import check_env
+
+    check_env(env)
+"""
+
+
+@pytest.mark.long
+@pytest.mark.slow
+def test_pictures_are_observations() -> None:
+    libraries = [name for name in ("stable_baselines3",) if find_spec(name)]
+    for driver in ("egl", "osmesa"):
+        environment = {**os.environ, "MUJOCO_GL": driver}
+        done = subprocess.run(
+            [sys.executable, "-c", PICTURES, *libraries],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+        if done.returncode == 0:
+            return
+    pytest.fail(done.stderr)
+
+
+def test_pictures_have_names_of_their_own() -> None:
+    with pytest.raises(CommandRejected, match='pictures must not be named "state"'):
+        ContactEnv("push", pictures={"state": Camera()})
+    with pytest.raises(ShapeError, match=r"pictures\['front'\] must be a Camera"):
+        ContactEnv("push", pictures={"front": 3})  # type: ignore[dict-item]
 
 
 def test_any_function_of_observations_is_evaluated() -> None:

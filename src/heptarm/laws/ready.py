@@ -23,6 +23,7 @@ from heptarm.model.dynamics import ROTOR, rigid_bodies
 from heptarm.values.checks import Array, array, flag, frozen, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
+from heptarm.values.shape import ORIGIN
 
 #: Kind of a session.
 Kind: TypeAlias = Literal["torque", "position", "wrench"]
@@ -87,6 +88,7 @@ class ReadyLaw(LibraryLaw):
 def cartesian_impedance(
     goal: Pose | None = None,
     *,
+    frame: Pose | None = None,
     stiffness: npt.ArrayLike = (1000.0, 1000.0, 1000.0, 60.0, 60.0, 60.0),
     damping: float = 0.7,
     force_max: float = 60.0,
@@ -98,15 +100,17 @@ def cartesian_impedance(
     tau_max: npt.ArrayLike | None = None,
     load: Body | None = None,
 ) -> ReadyLaw:
-    """Impedance of the flange in base axes with a compliant posture in the null space, by torques.
+    """Impedance of the flange or a frame on it, in base axes, with a compliant posture in the null space; by torques.
 
     `rt.memory` has `goal` (the goal that it follows), `error` [m, rad], `force` [N, Nm] and `saturated`, the number of
     cycles in which force, moment or a torque was limited.
 
     Args:
-        goal: of the flange in the base; None: where it is. Live: `rt.params.goal`, x y z [m] and quaternion x y z w.
+        goal: of the flange, or of `frame`, in the base; None: where it is. Live: `rt.params.goal`, x y z [m] and
+            quaternion x y z w.
+        frame: what is held, in the flange, such as the tip of a tool; None: the flange. It is the centre of stiffness.
         stiffness: along and about the axes of the base, shape (6,) [N/m, Nm/rad].
-        damping: ratio; the damping follows from the stiffness and the mass that the flange shows.
+        damping: ratio; the damping follows from the stiffness and the mass that the held frame shows.
         force_max: largest force of the spring [N].
         moment_max: largest moment of the spring [Nm].
         speed: largest speed of the followed goal [m/s].
@@ -117,10 +121,12 @@ def cartesian_impedance(
         load: on the flange, beside the load data of the cabinet.
     """
     _check_body(load, "load")
+    held = ORIGIN if frame is None else instance(frame, Pose, "frame")
     return ReadyLaw(
         "cartesian_impedance",
         {
             "robot": lambda arm: Param(rigid_bodies(arm, load, rotor=ROTOR), live=False),
+            "frame": Param(held.array, live=False),
             "goal": _pose(goal),
             "stiffness": _vector(
                 stiffness, "stiffness", high=STIFFNESS, unit="N/m or Nm/rad", rate=2.0 * STIFFNESS

@@ -6,7 +6,8 @@ The loop runs at the task's rate over a servo motion. Nothing here needs torch o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass
 from math import ceil
 from typing import TYPE_CHECKING
@@ -14,10 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError, StaleState, StreamError
+from heptarm.errors import HeptarmError, StaleState, StreamError, inside
+from heptarm.record.journal import NOTE
 from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
+from heptarm.rl.tasks import deployed_task
 from heptarm.values.checks import Array, array, instance, within
 from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.ptp import ptp
@@ -94,26 +97,13 @@ def deploy(
         The report; its facts contain the interventions of the guard and the statistics of the streams.
 
     Raises:
-        CommandRejected: a policy of another task.
+        CommandRejected: a policy of another task, or one that diverges: the arm stops.
         LimitError: a target outside the guard's box, or a robot that is not the task's.
         StaleState: no more states arrived; the arm was stopped.
         StreamError: the servo stream ended early.
     """
-    task, settings = policy.task, settings or DeploySettings()
-    if not isinstance(task, ReachTask):
-        raise CommandRejected(
-            f"the policy must be of the task {ReachTask.name}, got one of {task.name}",
-            parameter="policy",
-            value=task.name,
-            hint="heptarm.rl.deploy_contact deploys it",
-        )
-    if arm.robot.name != task.model.name:
-        raise LimitError(
-            f"the policy was trained for the {task.model.title}; this is a {arm.robot.title}",
-            parameter="policy",
-            value=task.robot,
-            hint=f"train one with --robot {arm.robot.name}",
-        )
+    settings = settings or DeploySettings()
+    task = deployed_task(policy.task, ReachTask, arm.robot)
     goals = [_target(target, settings.guard) for target in _listed(targets)]
     begins = (
         [np.asarray(task.home)] * len(goals) if starts is None else list(np.atleast_2d(np.asarray(starts)))
@@ -123,8 +113,9 @@ def deploy(
     late = 0
     arm.subscribe(rate=min(_STATES * task.rate, 500.0), groups=("joints", "motion", "safety"))
     for number, (goal, begin) in enumerate(zip(goals, begins, strict=True)):
-        arm.move(ptp(begin), speed=settings.homing)
-        episode, ticks = _run(arm, pilot, goal, settings)
+        with marked(arm, number):
+            arm.move(ptp(begin), speed=settings.homing)
+            episode, ticks = _run(arm, pilot, goal, settings)
         episodes.append(episode)
         late += ticks
         if progress is not None:
@@ -189,6 +180,22 @@ def _send(sv: JointServo, waiting: deque[tuple[int, Array]], tick: int) -> None:
     while len(waiting) > 1 and waiting[1][0] <= tick:
         waiting.popleft()
     sv.set(waiting[0][1] if waiting[0][0] <= tick else sv.start.q)
+
+
+@contextmanager
+def marked(arm: ArmVerbs, number: int) -> Iterator[None]:
+    """Name an episode in the errors that end it, and mark it in a recording.
+
+    Args:
+        arm: that is recorded.
+        number: of the episode, from 0 on.
+    """
+    try:
+        with inside(f"episodes[{number}]"):
+            yield
+    except HeptarmError as error:
+        arm.connection.journal.add(NOTE, f"failed: {error.text}")
+        raise
 
 
 def fresh(arm: ArmVerbs, limit: float) -> State:

@@ -1,9 +1,9 @@
 """Deployment of a policy of a task with contacts on an arm, with the observations and set-points of training.
 
 The policy decides at the task's rate; between two decisions the set-point of the Cartesian impedance moves in small
-steps over a servo motion. All times are of the robot's clock, so that a simulator may run at any speed. The task's
-leash and box bound the forces, and the largest force of the impedance, which the cabinet keeps. Nothing here needs
-torch or MuJoCo.
+steps. The impedance is the cabinet's, with set-points over a servo motion, or a law of torques over FRI. All times are
+of the robot's clock, so that a simulator may run at any speed. The task's leash and box bound the forces, and the
+largest force of the impedance. Nothing here needs torch or MuJoCo.
 """
 
 from __future__ import annotations
@@ -11,16 +11,21 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError, StaleState, StreamError, Timeout
+from heptarm.errors import CommandRejected, LimitError, ShapeError, StaleState, StreamError, Timeout, inside
+from heptarm.laws.ready import cartesian_impedance
+from heptarm.model.inverse_kinematics import solve
 from heptarm.rl.contact.task import ContactTask, Moment
+from heptarm.rl.deploy import marked
+from heptarm.rl.pilot import Decisions
 from heptarm.rl.policy import Policy
 from heptarm.rl.report import EpisodeReport
-from heptarm.values.checks import Array, instance, within
+from heptarm.rl.tasks import deployed_task
+from heptarm.values.checks import Array, instance, within, word
 from heptarm.values.condition.force import ForceAbove
 from heptarm.values.frames import check_name
 from heptarm.values.mode.impedance import CartesianImpedance
@@ -29,13 +34,15 @@ from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Cause
 
 if TYPE_CHECKING:
-    from heptarm.arm.motion.servo import PoseServo
+    from heptarm.arm.fri.session import Fri
     from heptarm.arm.verbs import ArmVerbs
     from heptarm.skills.gripper import Gripper
     from heptarm.values.state import State
 
 #: Ticks of the servo motion a decision: 100 a second at 20 decisions.
 _FINE = 5
+#: What the arm is driven through, and the period of FRI [ms].
+THROUGH, _PERIOD = ("servo", "fri"), 2
 #: Damping ratio of the impedance, as in training.
 _RATIO = 0.7
 #: The tip is brought so far above where an episode begins, and at the end [m].
@@ -44,6 +51,8 @@ _CLEAR = 0.02
 _APPROACH, _RETREAT = 0.1, 0.05
 #: The zero of the wrench is the mean of so many seconds at rest: a single reading is as uncertain as what it measures.
 _ZEROING = 0.5
+#: An episode is over when nothing has been missing for so long [s].
+_SETTLED = 0.5
 #: Longest wait for these [s].
 _PATIENCE = 30.0
 #: A tick that is so late on the robot's clock is counted [ns].
@@ -56,8 +65,11 @@ class ContactSettings:
 
     Attributes:
         frame: of the tool or workpiece, where the site `tip` of the task's scene is.
+        through: "servo": a servo motion in the cabinet's Cartesian impedance, 100 set-points a second; "fri": the law
+            `laws.cartesian_impedance` at that frame, torques 500 times a second.
         force: largest that the control exerts in each direction [N]; the arm is held compliant at it.
-        peak: a larger force on the tip ends the deployment: the arm stops [N].
+        peak: a larger force on the tip ends the episode: the arm stops [N]. Over a servo motion the cabinet watches it
+            as well.
         speed: largest of the set-point [m/s].
         latency: added between seeing and commanding [s].
         stale: without a newer state for so long the deployment ends, and without a target the arm stops [s].
@@ -65,6 +77,7 @@ class ContactSettings:
 
     _: KW_ONLY
     frame: str = "tip"
+    through: str = "servo"
     force: float = 25.0
     peak: float = 60.0
     speed: float = 0.25
@@ -73,6 +86,7 @@ class ContactSettings:
 
     def __post_init__(self) -> None:
         check_name(self.frame, "frame")
+        word(self.through, "through", THROUGH)
         within(self.force, "force", 1.0, 100.0, unit="N")
         within(self.peak, "peak", 1.0, 1000.0, unit="N")
         within(self.speed, "speed", 0.0, 1.0, above=True, unit="m/s")
@@ -107,8 +121,9 @@ def deploy_contact(
 ) -> EpisodeReport:
     """Run a policy of a task with contacts on an arm, one episode for each target.
 
-    An episode begins with the tip above the middle of the task's starts, and ends with it back there. One that meets a
-    force above `ContactSettings.peak` ends there, with the arm at rest, and counts as failed.
+    An episode begins with the tip above the middle of the task's starts, and ends with it back there. It is over when
+    nothing has been missing for half a second. One that meets a force above `ContactSettings.peak` ends there, with
+    the arm at rest, and counts as failed.
 
     Args:
         arm: in control, with what the task needs in its gripper; the start can be reached in a line.
@@ -121,18 +136,21 @@ def deploy_contact(
         progress: called after each episode with its number and what is missing [m].
 
     Returns:
-        The report; forces are those of the arm's own estimate. Its facts have the interventions of the guard.
+        The report; forces are those of the arm's own estimate. Its facts have the interventions of the guard, and how
+        each episode ended: "", or "force".
 
     Raises:
         CommandRejected: a policy of another task, no such frame, or bodies or a gripper that the task needs and lacks;
-            an action that is not finite, upon which the arm stops.
+            one that diverges, upon which the arm stops and the episode is marked in a recording.
         LimitError: a robot that is not the task's, or a set-point that could be faster than the guard allows.
+        Unreachable: a start that no joint positions reach; nothing has moved.
         ShapeError: targets of another shape, or not finite.
         StaleState: no more states arrived; the arm was stopped.
         StreamError: the servo stream ended early.
     """
-    task, chosen = instance(policy, Policy, "policy").task, settings or ContactSettings()
-    _check(arm, task, chosen, bodies, gripper)
+    chosen = settings or ContactSettings()
+    task = deployed_task(instance(policy, Policy, "policy").task, ContactTask, arm.robot)  # type: ignore[type-abstract]
+    _check(task, chosen, bodies, gripper)
     goals = _goals(task, targets)
     frames = [origins] * len(goals) if isinstance(origins, Pose) else list(origins)
     for frame in frames:
@@ -143,20 +161,25 @@ def deploy_contact(
             parameter="origins",
         )
     arm.subscribe(rate=2.0 * _FINE * task.rate)
-    arm.pose(chosen.frame)  # refuses a frame that is not there before anything moves
     run = _Run(arm, policy, chosen, bodies, gripper)
+    for number, origin in enumerate(frames):
+        with inside(f"origins[{number}]"):
+            run.check_start(origin)
     episodes = []
     for number, (origin, goal) in enumerate(zip(frames, goals, strict=True)):
-        episodes.append(run.episode(origin, goal))
+        with marked(arm, number):
+            episodes.append(run.episode(origin, goal))
         if progress is not None:
             progress(number, float(episodes[-1].missing[-1]))
     facts = {
         "engine": "arm",
         "robot": arm.robot.title,
         "virtual": arm.is_virtual,
+        "through": chosen.through,
         "latency": chosen.latency,
         "late_ticks": sum(episode.late for episode in episodes),
         "guard": {"force": sum(episode.ended == "force" for episode in episodes)},
+        "ended": [episode.ended for episode in episodes],
     }
     return EpisodeReport(
         task,
@@ -170,27 +193,21 @@ def deploy_contact(
 
 
 def _check(
-    arm: ArmVerbs, task: Any, settings: ContactSettings, bodies: Bodies | None, gripper: Gripper | None
+    task: ContactTask, settings: ContactSettings, bodies: Bodies | None, gripper: Gripper | None
 ) -> None:
     """Refuse, before anything moves, what cannot be deployed."""
-    if not isinstance(task, ContactTask):
-        raise CommandRejected(
-            f"the policy must be of a task with contacts, got one of {task.name}",
-            parameter="policy",
-            value=task.name,
-            hint="heptarm.rl.deploy deploys it",
-        )
-    if arm.robot.name != task.model.name:
-        raise LimitError(
-            f"the policy was trained for the {task.model.title}; this is a {arm.robot.title}",
-            parameter="policy",
-            value=task.robot,
-            hint=f"train one with --robot {arm.robot.name}",
-        )
     if task.has_gripper and gripper is None:
         raise CommandRejected(f"gripper must be given: the task {task.name} uses it", parameter="gripper")
     if task.look_size and bodies is None:
         raise CommandRejected(f"bodies must be given: the task {task.name} looks at them", parameter="bodies")
+    if task.has_stiffness and settings.through != "fri":
+        raise CommandRejected(
+            f'through must be "fri" for the task {task.name}, whose policy chooses the stiffness, got '
+            f"{settings.through!r}",
+            parameter="through",
+            value=settings.through,
+            hint="the stiffness of a servo motion does not change while it runs",
+        )
     fastest = task.step * task.rate * np.sqrt(3.0)
     if fastest > settings.speed:
         raise LimitError(
@@ -222,68 +239,115 @@ class _Run:
         bodies: Bodies | None,
         gripper: Gripper | None,
     ) -> None:
-        self._arm, self._policy, self._settings = arm, policy, settings
+        self._arm, self._settings = arm, settings
         self._bodies, self._gripper = bodies, gripper
         self._task: ContactTask = policy.task
-        stiffness = np.repeat([self._task.stiffness, self._task.turn_stiffness], 3)
-        self._spring = CartesianImpedance(stiffness, damping=_RATIO, max_force={"xyz": settings.force})
+        self._decisions = Decisions(policy, rate=self._task.rate)
+        self._stiffness = np.repeat([self._task.stiffness, self._task.turn_stiffness], 3)
+        self._spring = CartesianImpedance(self._stiffness, damping=_RATIO, max_force={"xyz": settings.force})
+        begins = self._task.starts(np.random.default_rng(0), 100)
+        #: The middle of the starts, in the frame of the task.
+        self._start = Pose.from_rotvec(begins[:, :3].mean(axis=0), begins[:, 3:].mean(axis=0))
+        #: Of the tip in the flange; a frame that is not there is refused here.
+        self._tip = arm.pose(settings.frame, reference="flange")
+
+    def check_start(self, origin: Pose) -> None:
+        """Refuse an origin whose start cannot be reached.
+
+        Raises:
+            Unreachable: no joint positions reach it.
+        """
+        for height in (0.0, -_CLEAR):
+            place = (origin @ self._start).shifted(z=height, frame="tool") @ self._tip.inverse()
+            solve(self._arm.robot, place, near=self._arm.state.q)
 
     def episode(self, origin: Pose, target: Array) -> _Episode:
         """One episode: to its start, the policy, and back."""
-        arm, task, frame = self._arm, self._task, self._settings.frame
-        begins = task.starts(np.random.default_rng(0), 100)
-        start = origin @ Pose.from_rotvec(begins[:, :3].mean(axis=0), begins[:, 3:].mean(axis=0))
+        arm, frame = self._arm, self._settings.frame
+        start = origin @ self._start
         above = start.shifted(z=-_CLEAR, frame="tool")
         arm.move([lin(place, moving=frame, speed_mps=_APPROACH) for place in (above, start)])
         arm.wait_for_rest()
         tip = _Tip(arm, origin, frame)
         tip.zero(_ZEROING)
-        with arm.servo(
-            "lin",
-            rate=task.rate * _FINE * arm.real_time_factor,
-            watchdog=self._settings.stale,
-            mode=self._spring,
-            moving=frame,
-            until=ForceAbove(self._settings.peak, frame=frame),
-        ) as servo:
-            found = self._decide(servo, tip, origin, target)
-        height = float(found.poses[-1][2]) - float(begins[:, 2].mean())
+        self._decisions.begin()
+        through = self._by_torques if self._settings.through == "fri" else self._by_servo
+        found = through(tip, origin, target)
+        height = float(found.poses[-1][2]) - float(self._start.xyz[2])
         arm.move(
             lin_rel(z=-max(height, 0.0) - _CLEAR, frame=origin, moving=frame, speed_mps=_RETREAT),
             mode=self._spring,
         )
-        if servo.result is not None and servo.result.cause is Cause.CONDITION:
-            return replace(found, ended="force")
-        if found.ended:
+        if found.ended == "early":
             raise StreamError(
-                "the servo stream ended before the episode did", hint="look at the cabinet's log"
+                "the stream of set-points ended before the episode did", hint="look at the cabinet's log"
             )
         return found
 
-    def _decide(self, servo: PoseServo, tip: _Tip, origin: Pose, target: Array) -> _Episode:
-        """Let the policy decide until the episode, or the servo motion, ends."""
-        task = self._task
-        state = servo.start
+    def _by_servo(self, tip: _Tip, origin: Pose, target: Array) -> _Episode:
+        """Set-points of the cabinet's impedance over a servo motion."""
+        arm, settings = self._arm, self._settings
+        with arm.servo(
+            "lin",
+            rate=self._task.rate * _FINE * arm.real_time_factor,
+            watchdog=settings.stale,
+            mode=self._spring,
+            moving=settings.frame,
+            until=ForceAbove(settings.peak, frame=settings.frame),
+        ) as servo:
+            found = self._decide(servo, tip, origin, target)
+        has_met = servo.result is not None and servo.result.cause is Cause.CONDITION
+        return replace(found, ended="force") if has_met else found
+
+    def _by_torques(self, tip: _Tip, origin: Pose, target: Array) -> _Episode:
+        """Set-points of an impedance of torques over FRI."""
+        law = cartesian_impedance(
+            frame=self._tip,
+            stiffness=self._stiffness,
+            damping=_RATIO,
+            force_max=self._settings.force,
+            speed=self._settings.speed,
+        )
+        with self._arm.fri("torque", period_ms=_PERIOD, law=law) as session:
+            drive = _ByTorques(session, self._arm.state, self._stiffness)
+            return self._decide(drive, tip, origin, target)
+
+    def _decide(self, drive: _Drive, tip: _Tip, origin: Pose, target: Array) -> _Episode:
+        """Let the policy decide until the episode, or the stream of set-points, ends."""
+        task, settings = self._task, self._settings
+        state = drive.start
         pose = tip.pose(state)
         now = self._moment(origin, pose, task.begin(pose), np.zeros(6), target)
-        delay = round(self._settings.latency * task.rate * _FINE)
+        delay = round(settings.latency * task.rate * _FINE)
         waiting = deque([now.command] * (delay + 1), maxlen=delay + 1)
         frames = deque([task.frame(now)] * (max(task.history) + 1))
         poses, joints, forces, missing, late = [pose], [state.q], [], [], 0
+        settled, ended, abrupt = 0, "", 0.0
         for step in range(task.steps):
             last = now.command
-            command = task.advance(last, pose, self._action(np.array(frames)))
+            action = self._decisions.action(task.observe(np.array(frames)))
+            command = task.advance(last, pose, action)
+            self._decisions.check(action, last, command)
             wrenches = []
             for part in range(1, _FINE + 1):
                 waiting.append(last + (command - last) * part / _FINE)
-                servo.set(origin @ Pose.from_rotvec(waiting[0][:3], waiting[0][3:6]))
-                reached = tip.wait(servo, (step * _FINE + part) / (task.rate * _FINE))
+                due = waiting[0]
+                drive.set(origin @ Pose.from_rotvec(due[:3], due[3:6]))
+                if isinstance(drive, _ByTorques) and task.has_stiffness:
+                    drive.soften(float(task.fraction(due)))
+                time = (step * _FINE + part) / (task.rate * _FINE)
+                reached = tip.wait(drive, time, settings.stale)
                 if reached is None:
+                    ended = "early"
                     break
                 state, is_late = reached
                 late += is_late
                 wrenches.append(tip.wrench(state))
-            if len(wrenches) < _FINE:
+                force = float(np.linalg.norm(wrenches[-1][:3]))
+                if force > settings.peak:
+                    ended, abrupt = "force", force
+                    break
+            if ended:
                 break
             self._grip(last, command)
             pose, wrench = tip.pose(state), np.mean(wrenches, axis=0)
@@ -295,31 +359,20 @@ class _Run:
             joints.append(state.q)
             forces.append(float(np.linalg.norm(wrench[:3])))
             missing.append(float(task.left(now)))
+            settled = settled + 1 if missing[-1] <= task.radius else 0
+            if settled >= _SETTLED * task.rate:
+                break
         left = task.steps - len(missing)
-        never = [float(task.left(now)) + task.radius] * left  # one that ended early has failed
+        # one that ended early has failed
+        last_missing = float(task.left(now)) + (task.radius if ended else 0.0)
         return _Episode(
             np.array(poses + [poses[-1]] * left),
             np.array(joints + [joints[-1]] * left),
-            np.array(forces + [0.0] * left),
-            np.array(missing + never),
+            np.array([*forces, abrupt, *[0.0] * left][: task.steps]),
+            np.array(missing + [last_missing] * left),
             late,
-            ended="early" if left else "",
+            ended,
         )
-
-    def _action(self, frames: Array) -> Array:
-        """What the policy decides.
-
-        Raises:
-            CommandRejected: that is not finite; the arm stops.
-        """
-        action = np.asarray(self._policy(self._task.observe(frames)), dtype=np.float64)
-        if not np.isfinite(action).all():
-            raise CommandRejected(
-                f"an action of the policy must be finite, got {action.tolist()}",
-                parameter="policy",
-                hint="train it again, or evaluate it with `heptarm rl eval`",
-            )
-        return action
 
     def _moment(self, origin: Pose, pose: Array, command: Array, wrench: Array, target: Array) -> Moment:
         seen = {} if self._bodies is None else self._bodies()
@@ -332,6 +385,41 @@ class _Run:
         """Close or open the gripper where the policy has changed its mind."""
         if self._gripper is not None and self._task.has_gripper and last[6] != command[6]:
             self._gripper.close() if command[6] > 0.0 else self._gripper.open()
+
+
+class _Drive(Protocol):
+    """What takes set-points of the tip in the base."""
+
+    @property
+    def start(self) -> State:
+        """The robot's state when it began."""
+
+    @property
+    def active(self) -> bool:
+        """Whether the arm follows set-points."""
+
+    def set(self, pose: Pose, /) -> object:
+        """The next one."""
+
+
+class _ByTorques:
+    """Set-points of the law of an FRI session."""
+
+    def __init__(self, session: Fri, start: State, stiffness: Array) -> None:
+        self._session, self.start, self._stiffness = session, start, stiffness
+
+    @property
+    def active(self) -> bool:
+        """Whether the law runs."""
+        return self._session.active
+
+    def set(self, pose: Pose) -> None:
+        """Have the law follow a set-point."""
+        self._session.params.goal = pose
+
+    def soften(self, fraction: float) -> None:
+        """Choose a fraction of the stiffness."""
+        self._session.params.stiffness = fraction * self._stiffness
 
 
 class _Tip:
@@ -353,24 +441,27 @@ class _Tip:
         self._arm.wait_until(is_enough, timeout=_PATIENCE)
         self._zero = np.mean(list(seen.values()), axis=0)
 
-    def wait(self, servo: PoseServo, time: float) -> tuple[State, bool] | None:
+    def wait(self, drive: _Drive, time: float, limit: float) -> tuple[State, bool] | None:
         """The first state from a time since the start on [s], and whether it is late; None: the motion has ended.
+
+        Args:
+            drive: what the arm follows.
+            time: since its start [s].
+            limit: without a newer state for so long none is waited for [s].
 
         Raises:
             StaleState: no states arrive.
         """
-        due = servo.start.stamp + round(time * 1e9)
+        due = drive.start.stamp + round(time * 1e9)
         try:
-            state = self._arm.wait_until(
-                lambda seen: seen.stamp >= due or not servo.active, timeout=servo.watchdog
-            )
+            state = self._arm.wait_until(lambda seen: seen.stamp >= due or not drive.active, timeout=limit)
         except Timeout:
             raise StaleState(
-                f"no newer state within {servo.watchdog:.2f} s",
-                allowed=f"[0, {servo.watchdog:g}] s",
+                f"no newer state within {limit:.2f} s",
+                allowed=f"[0, {limit:g}] s",
                 hint="check the connection and the load of this machine",
             ) from None
-        return (state, state.stamp - due > _LATE) if servo.active else None
+        return (state, state.stamp - due > _LATE) if drive.active else None
 
     def pose(self, state: State) -> Array:
         """Shape (6,) [m, rad]."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import COARSE, ReachTask
 from heptarm.rl.tasks import Task, task_named
+from heptarm.values.camera import Camera
 from heptarm.values.checks import array, instance, word
 
 require("gymnasium", extra="rl")
@@ -31,6 +34,8 @@ Observation = npt.NDArray[np.float32]
 FARTHEST = 2.0
 #: Largest number of an observation of a task with contacts; what is above is clipped.
 LARGEST = 10.0
+#: What `render` shows.
+_VIEW = Camera(place=(1.5, -0.9, 0.9), target=(0.45, 0.0, 0.35))
 
 
 def observation_space(task: Task) -> spaces.Box:
@@ -69,26 +74,46 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
 
     Args:
         arms: the simulation, of one arm.
-        render_mode: None; there are no pictures.
+        steps: decisions of an episode.
+        render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
-        CommandRejected: a render mode.
+        CommandRejected: another render mode.
     """
 
-    metadata = {"render_modes": [], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012  Gymnasium's own name
 
-    def __init__(self, arms: TaskBatch, *, render_mode: str | None) -> None:
+    def __init__(self, arms: TaskBatch, *, steps: int, render_mode: str | None) -> None:
         if render_mode is not None:
-            raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
-        self.render_mode = None
+            word(render_mode, "render_mode", ("rgb_array",))
+        self.render_mode = render_mode
+        self._view: Any = None
         self.observation_space = self._space = observation_space(arms.task)
         self.action_space = action_space(arms.task)
-        self._arms = arms
+        self._arms, self._steps = arms, steps
         self._open = False
+
+    def render(self) -> Any:
+        """A picture of the arm: red, green, blue, shape (height, width, 3); None without a render mode.
+
+        Raises:
+            CommandRejected: this machine cannot draw.
+        """
+        if self.render_mode is None:
+            return None
+        if self._view is None:
+            from heptarm.rl.sim.pictures import TaskPictures  # needs what draws
+
+            self._view = TaskPictures(self._arms.task, {"view": _VIEW})
+        return self._view.draw(self._arms)["view"]
+
+    def _seen(self, observation: Observation) -> Any:
+        """What is observed, for numbers of the task."""
+        return observation
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """Start an episode.
 
         Args:
@@ -110,11 +135,10 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
         seen = self._arms.reset(goals, seed=own)
         self._open = True
         tip, left = self._arms.outcome()
-        return _seen(seen[0], self._space), self._info(
-            tip[0], float(left[0]), self._arms.target[0].copy(), 0.0
-        )
+        info = self._info(tip[0], float(left[0]), self._arms.target[0].copy(), 0.0)
+        return self._seen(_seen(seen[0], self._space)), info
 
-    def step(self, action: npt.NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: npt.NDArray[np.float32]) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """One decision.
 
         Args:
@@ -128,11 +152,12 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
             raise NotReady("no episode is running", hint="call reset()")
         target = self._arms.target[0].copy()
         step = self._arms.step(np.asarray(action)[None])
-        ended = bool(step.done[0])
+        is_begun = bool(step.done[0])
+        ended = is_begun or int(self._arms.age[0]) >= self._steps
         self._open = not ended
-        seen = step.final if ended else step.observation
+        seen = step.final if is_begun else step.observation
         info = self._info(step.tip[0], float(step.distance[0]), target, float(step.force[0]))
-        return _seen(seen[0], self._space), float(step.reward[0]), False, ended, info
+        return self._seen(_seen(seen[0], self._space)), float(step.reward[0]), False, ended, info
 
     def _info(self, tip: Any, distance: float, target: Any, force: float) -> dict[str, Any]:
         return {
@@ -155,7 +180,7 @@ class ReachEnv(TaskEnv):
         engine: "plant": the virtual cabinet's plant with its servo at 1 kHz; "training": what policies are
             trained on, some ten times as fast.
         randomisation: what differs from episode to episode.
-        render_mode: None; there are no pictures.
+        render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
         CommandRejected: unknown robot, or a render mode.
@@ -180,7 +205,7 @@ class ReachEnv(TaskEnv):
             instance(task, ReachTask, "task")
         self.task = task or ReachTask(robot, action=action, feature=feature)
         arms = _arms(self.task, randomisation, engine=engine)
-        super().__init__(arms, render_mode=render_mode)
+        super().__init__(arms, steps=self.task.steps, render_mode=render_mode)
 
 
 class ContactEnv(TaskEnv):
@@ -189,10 +214,13 @@ class ContactEnv(TaskEnv):
     Args:
         task: the task, or the name of one with its defaults.
         randomisation: latency and bandwidth that differ from episode to episode.
-        render_mode: None; there are no pictures.
+        pictures: cameras by their names: an observation is a dictionary then, with the numbers as "state" and the
+            pictures under these names. Set MUJOCO_GL to egl or osmesa where there is no display. None: numbers alone.
+        render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
-        CommandRejected: no such task, a render mode, or a randomisation that the task has not.
+        CommandRejected: no such task, a render mode, a randomisation that the task has not, a picture that is named
+            "state", or a machine that cannot draw.
         MissingExtra: Gymnasium is not installed.
     """
 
@@ -201,12 +229,34 @@ class ContactEnv(TaskEnv):
         task: ContactTask | str = "peg-in-hole",
         *,
         randomisation: Randomisation = NONE,
+        pictures: Mapping[str, Camera] | None = None,
         render_mode: str | None = None,
     ) -> None:
         self.task = _task(task)
         instance(self.task, ContactTask, "task")
         instance(randomisation, Randomisation, "randomisation")
-        super().__init__(_arms(self.task, randomisation), render_mode=render_mode)
+        # one decision more than an episode, so that its last picture is not of the next one
+        arms = _arms(replace(self.task, steps=self.task.steps + 1), randomisation)
+        super().__init__(arms, steps=self.task.steps, render_mode=render_mode)
+        self._pictures: Any = None
+        if pictures is not None:
+            from heptarm.rl.sim.pictures import TaskPictures  # needs what draws
+
+            if "state" in instance(pictures, Mapping, "pictures"):
+                raise CommandRejected(
+                    'pictures must not be named "state", which the numbers are', parameter="pictures"
+                )
+            self._pictures = TaskPictures(self.task, pictures)
+            views = {
+                name: spaces.Box(0, 255, (height, width, 3), dtype=np.uint8)
+                for name, (width, height) in self._pictures.sizes.items()
+            }
+            self.observation_space = spaces.Dict({"state": self._space, **views})
+
+    def _seen(self, observation: Observation) -> Any:
+        if self._pictures is None:
+            return observation
+        return {"state": observation, **self._pictures.draw(self._arms)}
 
 
 class TaskVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked into

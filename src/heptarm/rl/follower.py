@@ -84,6 +84,9 @@ class Follower:
         """The next commanded joint positions, shape (7,) [rad]; call it `task.rate` times per second.
 
         None: no target, or no fresh joint state; then send nothing.
+
+        Raises:
+            CommandRejected: the policy diverges; then send nothing either.
         """
         if self._target is None or not now - self._seen <= self.guard.stale:
             self._under_way = False

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
+from math import ceil
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError
+from heptarm.errors import CommandRejected, LimitError
 from heptarm.model.kinematics import forward
 from heptarm.rl.task import ReachTask
 from heptarm.values.checks import Array, array, within
 from heptarm.values.robot import RobotModel
+
+#: A policy that decides the same for so long, without effect, diverges [s]; a command that is still [m, rad].
+_STUCK, _STILL = 2.0, 1e-6
+_DIVERGES = "the policy diverges: train it again, or evaluate it with `heptarm rl eval`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +123,60 @@ class Decides(Protocol):
         """The action, shape (actions,), within +-1."""
 
 
+class Decisions:
+    """Asks a policy for its actions, and refuses those of one that diverges.
+
+    Args:
+        policy: what decides.
+        rate: decisions a second [Hz].
+    """
+
+    def __init__(self, policy: Callable[[Array], npt.NDArray[np.floating[Any]]], *, rate: float) -> None:
+        self._policy, self._most = policy, ceil(_STUCK * rate)
+        self._last, self._count = np.empty(0), 0
+
+    def begin(self) -> None:
+        """Start an episode."""
+        self._last, self._count = np.empty(0), 0
+
+    def action(self, observation: Array) -> Array:
+        """The action for an observation.
+
+        Raises:
+            CommandRejected: it is not finite.
+        """
+        action = np.asarray(self._policy(observation), dtype=np.float64)
+        if not np.isfinite(action).all():
+            raise CommandRejected(
+                f"an action of the policy must be finite, got {action.tolist()}",
+                parameter="policy",
+                hint=_DIVERGES,
+            )
+        return action
+
+    def check(self, action: Array, before: Array, command: Array) -> None:
+        """Refuse a policy that saturates: for seconds the same action, all of it at its bounds, and no more effect.
+
+        Args:
+            action: of this decision.
+            before: the last command.
+            command: what the action made of it.
+
+        Raises:
+            CommandRejected: it does.
+        """
+        is_same = bool((np.abs(action) >= 1.0).all()) and np.array_equal(np.sign(action), self._last)
+        self._count = self._count + 1 if is_same and np.abs(command - before).max() <= _STILL else 0
+        self._last = np.sign(action)
+        if self._count >= self._most:
+            raise CommandRejected(
+                f"an action of the policy must not be at its bounds in every direction for {_STUCK:g} s while the "
+                f"command is at its limits, got {action.tolist()}",
+                parameter="policy",
+                hint=_DIVERGES,
+            )
+
+
 class Pilot:
     """Turns measured joints and a target into the next commanded joints, decision by decision.
 
@@ -132,12 +192,13 @@ class Pilot:
     def __init__(self, policy: Decides, guard: PolicyGuard | None = None) -> None:
         self.task = policy.task
         self.watch = Watch(guard or PolicyGuard(), self.task.model, period=1.0 / self.task.rate)
-        self._policy = policy
+        self._decisions = Decisions(policy, rate=self.task.rate)
         self._command = self._held = np.empty(0)
 
     def begin(self, q: Array) -> None:
         """Start an episode at joint positions, shape (7,) [rad]."""
         self._command, self._held = q, self.task.hold(q)
+        self._decisions.begin()
 
     def decide(self, q: Array, dq: Array, target: Array) -> Array:
         """The next command.
@@ -149,8 +210,12 @@ class Pilot:
 
         Returns:
             Commanded joint positions for the next 1 / `task.rate` seconds, shape (7,) [rad].
+
+        Raises:
+            CommandRejected: the policy diverges.
         """
-        action = self._policy(self.task.observe(q, dq, target)).astype(np.float64)
+        action = self._decisions.action(self.task.observe(q, dq, target))
         wanted = self.task.advance(self._command, q, action, self._held)
-        self._command = self.watch.allow(self._command, wanted)
+        before, self._command = self._command, self.watch.allow(self._command, wanted)
+        self._decisions.check(action, before, self._command)
         return self._command

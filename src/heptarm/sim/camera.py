@@ -85,6 +85,20 @@ class ArmCamera:
         if everything is not None:
             self._data.qpos[:] = everything
         self._data.qpos[:7] = q
+        self._show()
+
+    def place_all(self, positions: Array, mocap: tuple[Array, Array]) -> None:
+        """Put everything where a simulation of the same model has it.
+
+        Args:
+            positions: MuJoCo's qpos, shape (nq,).
+            mocap: places and quaternions w x y z of the bodies that are moved by hand, shapes (n, 3) and (n, 4).
+        """
+        self._data.qpos[:] = positions
+        self._data.mocap_pos[:], self._data.mocap_quat[:] = mocap
+        self._show()
+
+    def _show(self) -> None:
         mujoco.mj_forward(self._model, self._data)
         self._renderer.update_scene(self._data, CAMERA, self._option)
         if not self._has_tool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from math import isnan
@@ -34,7 +34,9 @@ from heptarm.values.checks import instance, within
 from heptarm.values.frames import FLANGE
 from heptarm.values.mode.mode import HandGuiding, Mode, check_mode
 from heptarm.values.motion.ptp import ptp
+from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.robot import RobotModel, known_robot
+from heptarm.values.state import State
 from heptarm.values.tool import Tool
 from heptarm.wire import messages as wire
 
@@ -45,6 +47,8 @@ _FASTER, _SLOWER = 5.0, 0.5
 _RATE = 500.0
 #: Targets per second of a stream [Hz], and its watchdog [s].
 _STREAM_RATE, _STREAM_WATCHDOG = 100.0, 2.0
+#: At the end of a stream the arm has settled when no joint deviates more [rad] or is faster [rad/s].
+_SETTLED, _STILL = 5e-3, 0.02
 #: The arm is where a motion began if no joint is farther away [rad].
 _THERE = 1e-6
 #: A motion may take this many times as long as it was recorded, and so much longer, before the twin goes on [s].
@@ -271,9 +275,9 @@ class _Run:
         )
         number = 0
 
-        def note(_: float) -> None:
+        def note(state: State) -> None:
             nonlocal number
-            motion = None if number else self._arm.state.motion
+            motion = None if number else state.motion
             if motion is not None and motion.active:
                 number = motion.id
 
@@ -282,14 +286,7 @@ class _Run:
         for step in self._stops_within(section):
             self._schedule(step.word, stamp + (step.t - section.motion.begin))
         try:
-            self._arm.replay(
-                section.stream,
-                speed_scaling=self._speed,
-                rate=_STREAM_RATE,
-                watchdog=_STREAM_WATCHDOG,
-                mode=mode,
-                on_progress=note,
-            )
+            self._follow(section.stream, mode, note)
         except MotionError:
             pass  # the twin's recording has its cause
         except HeptarmError as error:
@@ -331,6 +328,40 @@ class _Run:
             refusal = str(error)
         self._numbers[section.motion.id] = number
         self.repetitions.append(Repetition(section, number, refusal))
+
+    def _follow(self, stream: Trajectory, mode: Mode | None, note: Callable[[State], None]) -> None:
+        """Follow set-points by the simulator's clock, which a busy machine holds up, until the arm has settled.
+
+        Args:
+            stream: the set-points.
+            mode: control mode.
+            note: gets each state.
+        """
+        arm, period = self._arm, 1.0 / _STREAM_RATE
+        with arm.servo(
+            "joint",
+            rate=_STREAM_RATE,
+            watchdog=_STREAM_WATCHDOG,
+            speed=1.0,
+            acceleration=1.0,
+            mode=mode,
+            min_trajectory_time=period,
+        ) as servo:
+            begun, t, settled = arm.state.stamp, 0.0, False
+            while servo.active and not settled and t < stream.duration + SETTLE * self._speed:
+                q, dq = stream.at(t + period * self._speed)  # where it will be when the arm gets there
+                servo.set(q, self._speed * dq)
+                due = begun + round((t / self._speed + period) * 1e9)
+
+                def is_due(seen: State, due: int = due) -> bool:
+                    return seen.stamp >= due or not servo.active
+
+                state = arm.wait_until(is_due, timeout=_STREAM_WATCHDOG)
+                note(state)
+                t = (state.stamp - begun) * 1e-9 * self._speed
+                settled = t >= stream.duration and bool(
+                    np.abs(state.q - stream.q[-1]).max() < _SETTLED and np.abs(state.dq).max() < _STILL
+                )
 
     def _stops_within(self, section: Section) -> list[RepeatedStep]:
         return [

@@ -45,7 +45,8 @@ class Moment:
 
     Attributes:
         pose: of the tip, shape (n, 6) [m, rad].
-        command: set-point of the impedance, shape (n, 6); of a task with a gripper (n, 7): -1 opens it, 1 closes it.
+        command: set-point of the impedance, shape (n, 6), and as far as the task has them: the gripper, -1 opens it and
+            1 closes it; the fraction of the stiffness.
         wrench: on the tip, zeroed when the episode began, shape (n, 6) [N, Nm]. In rewards it is the true one.
         target: what the episode is about, shape (n, k), as the task draws it.
         bodies: poses of the free bodies of the scene by their names, shape (n, 6) each.
@@ -82,6 +83,7 @@ class ContactTask(ABC):
         turn_leash: likewise [rad].
         stiffness: of the impedance [N/m].
         turn_stiffness: likewise [Nm/rad].
+        softest: lowest fraction of both that a policy may choose, by one more number of its actions; 1: they are fixed.
 
     Raises:
         CommandRejected: unknown robot.
@@ -124,6 +126,7 @@ class ContactTask(ABC):
     turn_leash: float = quantity(0.04, "rad")
     stiffness: float = quantity(1500.0, "N/m")
     turn_stiffness: float = quantity(60.0, "Nm/rad")
+    softest: float = 1.0
 
     def __post_init__(self) -> None:
         self.model  # noqa: B018  raises for an unknown robot
@@ -131,6 +134,7 @@ class ContactTask(ABC):
             if unit := number.metadata.get("unit"):
                 value = within(getattr(self, number.name), number.name, 0.0, _LARGE, above=True, unit=unit)
                 object.__setattr__(self, number.name, value)
+        object.__setattr__(self, "softest", within(self.softest, "softest", 0.0, 1.0, above=True))
         integer(self.steps, "steps", 1, _MANY)
         ages = numbers(self.history, "history", "ages in decisions").tolist()
         if not isinstance(ages, list) or not ages:
@@ -217,9 +221,14 @@ class ContactTask(ABC):
         return robot(self.robot)
 
     @property
+    def has_stiffness(self) -> bool:
+        """Whether a policy chooses the stiffness."""
+        return self.softest < 1.0
+
+    @property
     def frame_size(self) -> int:
         """Size of what a decision shows."""
-        return 3 * len(self.axes) + self.has_gripper + self.look_size
+        return 3 * len(self.axes) + self.has_gripper + self.has_stiffness + self.look_size
 
     @property
     def observation_size(self) -> int:
@@ -229,17 +238,21 @@ class ContactTask(ABC):
     @property
     def action_size(self) -> int:
         """Size of an action."""
-        return len(self.axes) + self.has_gripper
+        return len(self.axes) + self.has_gripper + self.has_stiffness
 
     @property
     def command_size(self) -> int:
         """Size of a command."""
-        return _NUMBERS + self.has_gripper
+        return _NUMBERS + self.has_gripper + self.has_stiffness
 
     def begin(self, pose: Array) -> Array:
         """The command of an arm at rest, its gripper open; shape (..., 6) to (..., command_size)."""
-        is_open = -np.ones((*pose.shape[:-1], self.command_size - _NUMBERS))
-        return np.concatenate([pose, is_open], axis=-1)
+        more = [-1.0] * self.has_gripper + [1.0] * self.has_stiffness
+        return np.concatenate([pose, np.broadcast_to(more, (*pose.shape[:-1], len(more)))], axis=-1)
+
+    def fraction(self, command: Array) -> Array:
+        """Of the stiffness, in a command, shape (..., command_size) to (...)."""
+        return command[..., -1] if self.has_stiffness else np.ones(command.shape[:-1])
 
     def frame(self, now: Moment) -> Array:
         """What a decision shows, one frame of an observation, shape (n, frame_size)."""
@@ -285,7 +298,9 @@ class ContactTask(ABC):
         low, high = self.box
         wanted[..., :_NUMBERS] = np.minimum(np.maximum(near, low), high)
         if self.has_gripper:
-            wanted[..., _NUMBERS] = np.where(action[..., -1] > 0.0, 1.0, -1.0)
+            wanted[..., _NUMBERS] = np.where(action[..., len(axes)] > 0.0, 1.0, -1.0)
+        if self.has_stiffness:  # evenly on a logarithmic scale
+            wanted[..., -1] = self.softest ** (0.5 - 0.5 * np.clip(action[..., -1], -1.0, 1.0))
         return wanted
 
     def steer(self, now: Moment, goal: Array, *, ahead: float = 1.5) -> Array:

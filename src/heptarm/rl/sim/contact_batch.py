@@ -13,14 +13,16 @@ import mujoco
 import numpy as np
 from mujoco import batch
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, Unreachable
 from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
 from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.sim.episodes import ALL, BatchSettings, Index, TaskBatch
+from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.gripper import driven_joints, has_gripper
 from heptarm.sim.plant.scene import GRIPPER, PREFIX, attach_text
 from heptarm.sim.plant.sensor_errors import FRICTION, GAIN, STICTION_SPEED, TORQUE_NOISE
-from heptarm.sim.plant.world import specification
+from heptarm.sim.plant.world import add_camera, specification
+from heptarm.values.camera import Camera
 from heptarm.values.checks import Array
 
 #: Readings of the torque sensors that a decision averages.
@@ -36,13 +38,19 @@ _DRIFT = 0.15
 _ORIGIN = "origin"
 
 
-def build(task: ContactTask) -> Any:
+def build(task: ContactTask, camera: Camera | None = None) -> Any:
     """The engine's model of a task, an `mujoco.MjModel`; its last six controls are the set-point [m, rad].
+
+    Args:
+        task: the task.
+        camera: that draws it, see `heptarm.sim.camera.ArmCamera`; None: nobody looks.
 
     Raises:
         CommandRejected: the scene is not in MuJoCo's format, or has no body `tool` with the site of its tip.
     """
-    spec = specification(task.robot)
+    spec = specification(task.robot, None if camera is None else ArmMeshes())
+    if camera is not None:
+        add_camera(spec, camera)
     for servo in list(spec.actuators):
         spec.delete(servo)
     for geom in spec.geoms:  # the arm itself touches nothing
@@ -78,12 +86,25 @@ def build(task: ContactTask) -> Any:
 
 
 def _joints(task: ContactTask, poses: Array, reach: float) -> Array:
-    """Joint positions for poses of a tip that is so far from the flange, shape (n, 6) to (n, 7)."""
+    """Joint positions for poses of a tip that is so far from the flange, shape (n, 6) to (n, 7).
+
+    Raises:
+        Unreachable: there are none for one of them.
+    """
     flanges = np.tile(np.eye(4), (len(poses), 1, 1))
     turned = _turned(_quaternions(poses[:, 3:]))
     flanges[:, :3, :3] = task.origin.rotation @ turned
     flanges[:, :3, 3] = task.origin.xyz + (poses[:, :3] - reach * turned[:, :, 2]) @ task.origin.rotation.T
-    return solve_batch(task.model, flanges)
+    found = solve_batch(task.model, flanges)
+    for index in np.flatnonzero(np.isnan(found).any(axis=1)).tolist():
+        raise Unreachable(
+            f"a start of the task {task.name} must be within reach of the {task.model.title}, got the flange at "
+            f"{np.round(flanges[index, :3, 3], 3).tolist()} m",
+            code=51,
+            parameter="starts",
+            hint="move the task's origin or its starts, or shorten its tool",
+        )
+    return found
 
 
 class BatchContact(TaskBatch):
@@ -125,6 +146,10 @@ class BatchContact(TaskBatch):
         self._length, self._contact = bind("actuator_length"), bind("qfrc_constraint")
         self._filter, self._friction = expand("actuator_dynprm"), expand("geom_friction")
         self._damping = expand("dof_damping")
+        self._springs = (
+            (expand("actuator_gainprm"), expand("actuator_biasprm")) if task.has_stiffness else None
+        )
+        self._stiff, self._damp = model.actuator_gainprm[-6:, 0].copy(), -model.actuator_biasprm[-6:, 2]
         self._steels = np.flatnonzero(model.geom_priority == 0)
         self._reach = float(model.site(PREFIX + task.site).pos[2])
         self._first = model.qpos0.copy()
@@ -160,6 +185,13 @@ class BatchContact(TaskBatch):
     def q(self) -> Array:
         """Measured positions, shape (envs, 7) [rad]."""
         return np.asarray(self._state["qpos"])[:, :7]
+
+    def placed(self, index: int) -> tuple[Array, tuple[Array, Array]]:
+        """Where everything of one arm is: MuJoCo's qpos, and what is moved by hand; see `ArmCamera.place_all`."""
+        positions, places, turns = (
+            np.asarray(self._state[name])[index] for name in ("qpos", "mocap_pos", "mocap_quat")
+        )
+        return positions, (places, turns)
 
     def bodies(self, which: Index | slice = ALL) -> dict[str, Array]:
         """Poses of the free bodies in the frame of the task, shape (n, 6) [m, rad] each."""
@@ -219,6 +251,11 @@ class BatchContact(TaskBatch):
     def _control(self, which: Index | slice, command: Array | None = None) -> None:
         given = self.command[which] if command is None else command
         self._state["ctrl"][which, -6:] = given[:, :6]
+        if self._springs is not None:
+            (gain, bias), fraction = self._springs, self.task.fraction(given)[:, None]
+            gain[which, -6:, 0] = fraction * self._stiff
+            bias[which, -6:, 1] = -fraction * self._stiff
+            bias[which, -6:, 2] = -np.sqrt(fraction) * self._damp
         if self._gripper is not None:
             closes = given[:, 6] > 0.0 if self.task.has_gripper else np.zeros(len(given), dtype=bool)
             self._state["ctrl"][which, self._grip] = np.where(closes, self._gripper[1], self._gripper[0])
@@ -229,8 +266,10 @@ class BatchContact(TaskBatch):
         return np.concatenate([seen, self.task.hidden(self.moment(which))], axis=-1) if self._reveal else seen
 
     def teach(self) -> Array:
-        """What one who knows everything would do, shape (envs, actions)."""
-        return self.task.teach(self.moment())
+        """What one who knows everything would do, shape (envs, actions); as stiff as allowed."""
+        taught = self.task.teach(self.moment())
+        missing = self.task.action_size - taught.shape[1]
+        return np.concatenate([taught, np.ones((self.envs, missing))], axis=1) if missing else taught
 
     def _advance(self, action: Array) -> Array:
         return self.task.advance(self.command, self.pose, action)

@@ -182,7 +182,7 @@ def compiled(
         # each link has two shapes: a search by trees takes longer than none
         spec.option.disableflags |= NO_TREES
     if camera is not None:
-        _add_camera(spec, camera)
+        add_camera(spec, camera)
     _soften(spec)
     return spec.compile() if scene is None else scene.compile(spec)
 
@@ -195,7 +195,8 @@ def _soften(spec: mujoco.MjSpec) -> None:
             geom.solimp = ONSET
 
 
-def _add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
+def add_camera(spec: mujoco.MjSpec, camera: Camera) -> None:
+    """Add a camera to the description of an arm, as `CAMERA`."""
     body, pose = spec.worldbody, camera.pose @ _UPSIDE_DOWN
     if camera.frame == "flange":
         flange = spec.site("flange")
