@@ -84,6 +84,7 @@ def test_what_cannot_be_written_is_refused(arm: ha.Arm) -> None:
     ):
         with pytest.raises(kind, match=words):
             arm.io.set({"OutputX3Pin11": True, name: value})  # type: ignore[dict-item]
+    assert "Cell.Level" in arm.io and "lamp" not in arm.io
     with pytest.raises(ha.ShapeError):
         arm.io.set({})
     with pytest.raises(ha.CommandRejected, match="led must be one of .*got 'green'"):
@@ -124,7 +125,9 @@ def test_keys_of_the_smartpad(arm: ha.Arm) -> None:
     end()
     end_later = arm.pad.on_key(lambda slot, down: later.append((slot, down)))
     arm.operator.press_key(2)
-    arm.wait_until(lambda state: len(later) == 2, timeout=20.0)  # the key comes on another way than the answer
+    arm.wait_until(
+        lambda state: len(later) == 2, timeout=20.0
+    )  # the key comes on another way than the answer
     end_later()
     arm.pad.set_key(2, "", enabled=False)
     with pytest.raises(ha.Timeout):
