@@ -119,7 +119,10 @@ def test_the_arm_follows_single_points_on_a_busy_machine(rate: int, declared: fl
     The speed over 0.05 s deviates by 15 % of its peak at most.
     """
     rng, seconds, amplitude = np.random.default_rng(8), 3.0, 0.3
-    swing = lambda time: amplitude * (0.5 - 0.5 * np.cos(np.pi * np.clip(time / seconds, 0.0, 1.0)))  # noqa: E731
+
+    def swing(time: np.ndarray) -> np.ndarray:
+        return np.asarray(amplitude * (0.5 - 0.5 * np.cos(np.pi * np.clip(time / seconds, 0.0, 1.0))))
+
     came = np.maximum.accumulate(arrivals(rng, 1.0 / rate, round(seconds * rate)))
     for begin in rng.uniform(10.0, 13.0, 12):
         held = (came > begin) & (came < begin + 0.03)
@@ -142,7 +145,7 @@ def test_the_arm_follows_single_points_on_a_busy_machine(rate: int, declared: fl
             command = runner.advance(when, state).command
             cabinet.aim(command.q + options.horizon * command.dq)
         else:
-            point = TrajectoryPoint(declared, (0.0,) * 6 + (float(swing((k + 1) / rate)),))
+            point = TrajectoryPoint(declared, (0.0,) * 6 + (float(swing(np.array((k + 1) / rate))),))
             goal = TrajectoryGoal(configuration.joints, (point,), from_topic=True, sent=PublishInfo(number=k))
             runner.accept(goal, now=when, state=state)
     moved = np.array(path[50:]) - np.array(path[:-50])
