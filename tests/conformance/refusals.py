@@ -65,6 +65,9 @@ REFUSALS: dict[str, Refusal] = {
     "times_that_fall": Refusal(lambda c, g: _earlier(g, g.points[0].time + 0.5), _G),
     "a_negative_time": Refusal(lambda c, g: _earlier(g, -0.5), _G),
     "an_end_in_the_past": Refusal(lambda c, g: replace(g, start=c.now() - 5.0), _G),
+    "an_end_elsewhere_that_is_due_now": Refusal(
+        lambda c, g: replace(_points(g, time=0.39), start=c.now() - 0.39), _G
+    ),
     "an_end_that_moves": Refusal(lambda c, g: _points(g, dq=_with(g, REST, 2, 0.1)), _G),
     "nan_among_positions": Refusal(lambda c, g: _points(g, q=_with(g, g.points[0].q, 3, np.nan)), _G),
     "infinity_among_velocities": Refusal(

@@ -165,6 +165,7 @@ SERVING = (
     "behind a limit",
     "stopMotion",
     "after its end it takes no destinations",
+    "DirectServo reports its joints",
     "DirectServo arrives",
     "limits that are none are refused",
     "SmartServoLIN arrives",

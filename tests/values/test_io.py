@@ -22,6 +22,7 @@ def test_by_full_name_by_part_and_as_attribute() -> None:
     with pytest.raises(CommandRejected, match="no signal 'lamp'") as error:
         _ = SEEN.lamp
     assert "Cell.Level" in error.value.hint
+    assert "user_button" in SEEN and "lamp" not in SEEN and 3 not in SEEN
 
 
 def test_a_value_of_a_state() -> None:

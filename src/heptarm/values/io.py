@@ -69,6 +69,14 @@ def find_name(name: str, names: Sequence[str]) -> int:
     )
 
 
+def is_name(name: object, names: Sequence[str]) -> bool:
+    """Whether `find_name` finds a name."""
+    try:
+        return isinstance(name, str) and find_name(name, names) >= 0
+    except CommandRejected:
+        return False
+
+
 def find_signal(name: str, signals: Sequence[Signal]) -> Signal:
     """A signal by its name, as `find_name` finds it.
 
@@ -100,6 +108,10 @@ class SignalValues(Mapping[str, SignalValue]):
         """Value of a signal. Raises CommandRejected as `find_name` does."""
         names = tuple(self._values)
         return self._values[names[find_name(name, names)]]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether one signal has that name."""
+        return is_name(name, tuple(self._values))
 
     def __getattr__(self, name: str) -> SignalValue:
         """Value of a signal."""

@@ -50,6 +50,10 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 import com.kuka.roboticsAPI.persistenceModel.IPersistenceEngine;
 import com.kuka.roboticsAPI.persistenceModel.XmlApplicationDataSource;
 import com.kuka.roboticsAPI.sensorModel.CartesianPositionInformation;
+import com.kuka.roboticsAPI.sensorModel.SensorForExternalForce;
+import com.kuka.roboticsAPI.sensorModel.SensorForExternalTorque;
+import com.kuka.roboticsAPI.sensorModel.SensorForMeasuredTorque;
+import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 import com.kuka.flexfellow.AbstractFlexFellow;
 import com.kuka.med.deviceModel.LBRMed;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationData;
@@ -114,6 +118,21 @@ public class Members extends RoboticsAPIApplication {
         out.flush();
     }
 
+    /** The sensors of the arm report what the arm does. */
+    private void sensors() {
+        SensorForMeasuredTorque measured = lbr.getSensorForMeasuredTorque();
+        SensorForExternalTorque external = lbr.getSensorForExternalTorque();
+        SensorForExternalForce force = lbr.getSensorForExternalForce();
+        say("a sensor of measured torques", isNear(measured.getSensorData(), lbr.getMeasuredTorque()));
+        say("a sensor of external torques", isNear(external.getSensorData(), lbr.getExternalTorque()));
+        double z = lbr.getExternalForceTorque(lbr.getFlange()).getForce().getZ();
+        say("a sensor of the external force", Math.abs(force.getSensorData().getForce().getZ() - z) < 1.0);
+    }
+
+    private static boolean isNear(TorqueSensorData one, TorqueSensorData other) {
+        return Math.abs(one.getSingleTorqueValue(JointEnum.J2) - other.getSingleTorqueValue(JointEnum.J2)) < 1.0;
+    }
+
     @Override
     public void run() throws Exception {
         String file = getApplicationData().getProcessData("sample.file").getValue();
@@ -125,6 +144,8 @@ public class Members extends RoboticsAPIApplication {
         modes();
         motions();
         conditions();
+        sensors();
+        getContext().dumpDevices();
         PositionMastering mastering = new PositionMastering(lbr);
         MasteringInfo info = mastering.getMasteringInfo("gripper");
         say("mastering of a tool", info.getMasteringState(0));

@@ -138,6 +138,9 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
             ThreadUtil.milliSleep(5);
         }
         ThreadUtil.milliSleep(300);
+        say("DirectServo reports its joints", runtime.getAxisQMsrOnController().isNearlyEqual(beside(here, 0.2), 1e-3));
+        runtime.setDestination(lbr.getCurrentCartesianPosition(lbr.getFlange()), lbr.getRootFrame());
+        ThreadUtil.milliSleep(50);
         say("DirectServo arrives", isAt(beside(here, 0.2)));
         runtime.stopMotion();
         ThreadUtil.milliSleep(300);

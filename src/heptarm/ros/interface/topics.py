@@ -183,9 +183,9 @@ def servo_jog(context: NodeContext, message: Any) -> None:
 # --------------------------------------------------------------------- controllers of ros2_control
 
 
-def forward_position(context: NodeContext, message: Any) -> None:
+def forward_position(context: NodeContext, message: Any, sent: PublishInfo) -> None:
     """Follow seven positions [rad], a std_msgs/Float64MultiArray as for position_controllers."""
-    context.driver.follow_stream(_seven(message, "rad"))
+    context.driver.follow_stream(_seven(message, "rad"), sent)
 
 
 def forward_velocity(context: NodeContext, message: Any) -> None:
@@ -200,13 +200,13 @@ def _seven(message: Any, unit: str) -> Array:
 # ------------------------------------------------------------------------------------- FRI
 
 
-def lbr_position(context: NodeContext, message: Any) -> None:
+def lbr_position(context: NodeContext, message: Any, sent: PublishInfo) -> None:
     """Follow the positions of a lbr_fri_idl/LBRJointPositionCommand: by the open FRI session, if there is one."""
     q = array(list(message.joint_position), 7, "joint_position [rad]")
     if context.driver.fri.active:
         context.driver.fri.command(q=q)
     else:
-        context.driver.follow_stream(q)
+        context.driver.follow_stream(q, sent)
 
 
 def lbr_torque(context: NodeContext, message: Any) -> None:
@@ -273,7 +273,7 @@ TOPICS = (
     Topic("~/servo/twist", "geometry_msgs/TwistStamped", servo_twist),
     Topic("~/servo/twist_unstamped", "geometry_msgs/Twist", servo_twist_unstamped),
     Topic("~/servo/jog", "control_msgs/JointJog", servo_jog),
-    Topic(_FORWARD_POSITION, "std_msgs/Float64MultiArray", forward_position),
+    Topic(_FORWARD_POSITION, "std_msgs/Float64MultiArray", forward_position, counted=True),
     Topic(_FORWARD_VELOCITY, "std_msgs/Float64MultiArray", forward_velocity),
     Topic("~/fri/joint", _JOINTS, fri_joint),
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
@@ -302,6 +302,9 @@ _PRESET_HANDLERS: Mapping[NameRole, Handler] = MappingProxyType(
     }
 )
 
+#: Those whose handlers count the messages of their publisher.
+_COUNTED = (NameRole.TRAJECTORY, NameRole.FORWARD, NameRole.LBR_POSITION)
+
 
 def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
     """List the topics that a node subscribes to.
@@ -321,7 +324,7 @@ def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
             entry.type,
             _PRESET_HANDLERS[entry.role],
             at_once=entry.role is NameRole.STOP,
-            counted=entry.role is NameRole.TRAJECTORY,
+            counted=entry.role in _COUNTED,
         )
         for entry in PRESETS[values["names"]].entries
         if entry.role in _PRESET_HANDLERS and entry.is_available

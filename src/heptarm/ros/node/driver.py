@@ -34,6 +34,7 @@ from heptarm.ros.trajectory.execution import Execution, GoalListener
 from heptarm.ros.trajectory.fri_execution import FriExecution
 from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.ros.trajectory.servo_execution import ServoExecution
 from heptarm.ros.trajectory.spline_execution import SplineExecution
 from heptarm.ros.trajectory.trajectory import TrajectorySample
@@ -487,11 +488,12 @@ class Driver:
         self._prepare_stream()
         self._stream.twist(np.asarray(twist, dtype=np.float64), frame)
 
-    def follow_stream(self, q: Array) -> None:
+    def follow_stream(self, q: Array, sent: PublishInfo | None = None) -> None:
         """Follow a stream of joint positions as the trajectory topic does, or as a servo topic where it cannot.
 
         Args:
             q: shape (7,) [rad].
+            sent: when or as which its message was published; None: unknown.
 
         Raises:
             HeptarmError: refused; the text gives the reason.
@@ -500,7 +502,7 @@ class Driver:
             self.follow(q)
             return
         point = TrajectoryPoint(_STREAM_AHEAD, tuple(q.tolist()))
-        self.accept(TrajectoryGoal(self.configuration.joints, (point,), from_topic=True))
+        self.accept(TrajectoryGoal(self.configuration.joints, (point,), from_topic=True, sent=sent))
 
     def _prepare_stream(self) -> None:
         self._check_active()

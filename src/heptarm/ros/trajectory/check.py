@@ -274,16 +274,17 @@ def _from_here(
 ) -> tuple[Array, Array, Array, Array]:
     """Put the state of the arm before the points, and drop the points of the past."""
     first = int(np.searchsorted(times, 0.0, side="right"))
-    if first > 0 and not late:  # the first point is now, so the arm has to be there
+    # the arm has to be at a first point that is now, and at a last one whose time is over
+    if first > 0 and (not late or first == len(times)):
         away = np.abs(q[first - 1] - here.q)
         worst = int(np.argmax(away))
         if away[worst] > rules.jump:
             raise GoalRefused(
-                f"the first point must be within {rules.jump:g} rad of the arm, "
-                f"got {away[worst]:.4f} rad for {names[worst]}",
-                hint="plan from the current state, or give the first point a later time",
+                f"the {'last' if late else 'first'} point is due now, so it must be within {rules.jump:g} rad "
+                f"of the arm, got {away[worst]:.4f} rad for {names[worst]}",
+                hint="plan from the current state, or give the point a later time",
             )
-    if first == len(times):  # one point, now
+    if first == len(times):  # the last point is now
         begin, end = here, slice(first - 1, None)
         gap = np.abs(q[-1] - begin.q).max()
         return (

@@ -75,6 +75,9 @@ class SendTimes:
         period = _measured(counts, times, period)
         expected = self._newest + step * period
         if abs(now - expected) > _LOST:
+            if len(times) < _ENOUGH and now - times[-2] < step * period + _LOST:
+                self._newest = now  # no pause: the declared period is wrong, and the true one not known yet
+                return now, 0.0
             return self._begin(now), now - expected
         # when the newest point would have arrived had it been delayed as little as another one
         arrivals = (times + (self._count - counts) * period)[times > now - _MEMORY]

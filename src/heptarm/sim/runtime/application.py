@@ -593,8 +593,12 @@ def _errors(text: str) -> list[tuple[str, str, str]]:
 
 
 def _places(text: str) -> list[tuple[str, str]]:
-    """File and message of each error."""
-    return [(match[1], match[3]) for line in text.splitlines() if (match := _ERROR.match(line))]
+    """File and message of each error; a symbol that is not found is named, with where it was looked for."""
+    files = [match[1] for line in text.splitlines() if (match := _ERROR.match(line))]
+    return [
+        (file, ": ".join(filter(None, (message, " in ".join(filter(None, (symbol, location)))))))
+        for file, (message, symbol, location) in zip(files, _errors(text), strict=True)
+    ]
 
 
 def _sunrise(location: str, own: frozenset[str]) -> str:

@@ -28,6 +28,11 @@ public class RoboticsAPIContext {
         return station.controller;
     }
 
+    /** Prints the cabinet and the robot. */
+    public void dumpDevices() {
+        System.out.println(station.controller.getName() + ": " + station.robot.getName());
+    }
+
     /** The persistence engine; there is no other. */
     public <T> T getEngine(Class<T> type) {
         if (type != IPersistenceEngine.class) {

@@ -1,11 +1,7 @@
 package com.kuka.roboticsAPI.applicationModel;
 
 import com.kuka.roboticsAPI.applicationModel.tasks.RoboticsAPITask;
-import com.kuka.roboticsAPI.controllerModel.Controller;
-import com.kuka.roboticsAPI.deviceModel.Robot;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-
-import heptarm.doubles.runtime.Station;
 
 /** Base of applications. */
 public abstract class RoboticsAPIApplication extends RoboticsAPITask {
@@ -16,11 +12,6 @@ public abstract class RoboticsAPIApplication extends RoboticsAPITask {
     public void runApplication() {
         throw new IllegalStateException("the cabinet runs applications: heptarm sim app FOLDER --app-class "
                 + getClass().getSimpleName());
-    }
-
-    /** The robot; there is only one, so the name has no effect. */
-    public Robot getRobot(Controller controller, String name) {
-        return Station.current().robot;
     }
 
     /** A new tool or workpiece from the project's template of that name. */

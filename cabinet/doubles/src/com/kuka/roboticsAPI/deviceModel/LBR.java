@@ -29,6 +29,9 @@ import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
+import com.kuka.roboticsAPI.sensorModel.SensorForExternalForce;
+import com.kuka.roboticsAPI.sensorModel.SensorForExternalTorque;
+import com.kuka.roboticsAPI.sensorModel.SensorForMeasuredTorque;
 import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 
 import heptarm.doubles.motion.AppendedMotion;
@@ -229,6 +232,18 @@ public abstract class LBR extends Robot {
 
     public JointPosition getCommandedJointPosition() {
         return new JointPosition(numbers(StateWords.Q_CMD, AXES));
+    }
+
+    public SensorForMeasuredTorque getSensorForMeasuredTorque() {
+        return this::getMeasuredTorque;
+    }
+
+    public SensorForExternalTorque getSensorForExternalTorque() {
+        return this::getExternalTorque;
+    }
+
+    public SensorForExternalForce getSensorForExternalForce() {
+        return () -> getExternalForceTorque(flange);
     }
 
     public TorqueSensorData getMeasuredTorque() {

@@ -23,4 +23,6 @@ public interface IServoRuntime {
     JointPosition getCurrentJointDestination();
 
     Frame getCurrentCartesianDestination(ObjectFrame frame);
+
+    JointPosition getAxisQMsrOnController();
 }

@@ -23,8 +23,6 @@ public interface ISmartServoRuntime extends IServoRuntime {
 
     Frame getCurrentCartesianPosition(ObjectFrame frame);
 
-    JointPosition getAxisQMsrOnController();
-
     double[] getAxisTauExtMsr();
 
     String getFineIpoState();

@@ -7,6 +7,7 @@ import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.recovery.IRecovery;
 import com.kuka.roboticsAPI.deviceModel.Device;
+import com.kuka.roboticsAPI.deviceModel.Robot;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
 import com.kuka.task.ITaskManager;
@@ -61,6 +62,11 @@ public abstract class RoboticsAPITask {
     }
 
     /** The robot; there is only one, so the name has no effect. */
+    public Robot getRobot(Controller controller, String name) {
+        return Station.current().robot;
+    }
+
+    /** Likewise. */
     public Device getDevice(Controller controller, String name) {
         return Station.current().robot;
     }

@@ -1,0 +1,6 @@
+package com.kuka.roboticsAPI.sensorModel;
+
+/** The joint torques that contacts cause. */
+public interface SensorForExternalTorque {
+    TorqueSensorData getSensorData();
+}
