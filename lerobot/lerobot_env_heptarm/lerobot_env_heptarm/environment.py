@@ -1,7 +1,7 @@
 """A task on a virtual arm as an environment of LeRobot: the whole cabinet, in real time, as a policy meets it.
 
 Observations and actions are those of the robot heptarm, so that a policy that was trained on its recordings is judged
-as it is.
+as it is. Without pictures all numbers are the state of the environment, as ACT needs them then.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import gymnasium as gym
 import numpy as np
 from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
-from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
+from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from lerobot_camera_heptarm import HeptarmCameraConfig
 from lerobot_robot_heptarm import HeptarmRobot, HeptarmRobotConfig
 from lerobot_robot_heptarm.scenes import HOME, TASKS
@@ -34,7 +34,8 @@ class HeptarmEnvConfig(EnvConfig):
     Attributes:
         task: "pick-place" or "peg".
         fps: steps per second, as in the recordings.
-        size: width and height of the pictures [pixels]; 0: observations have no pictures.
+        size: width and height of the pictures [pixels]; 0: observations have no pictures, and their numbers are
+            `observation.environment_state` instead of `observation.state`.
         speed: as of the robot.
         options: more for the virtual arm, such as "sensors=noisy".
     """
@@ -52,13 +53,20 @@ class HeptarmEnvConfig(EnvConfig):
         numbers = [kind for kind in robot.observation_features.values() if kind is float]
         self.features = {
             ACTION: PolicyFeature(type=FeatureType.ACTION, shape=(len(robot.action_features),)),
-            "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(len(numbers),)),
+            self.numbers: PolicyFeature(
+                type=FeatureType.STATE if self.size else FeatureType.ENV, shape=(len(numbers),)
+            ),
         }
-        self.features_map = {ACTION: ACTION, "agent_pos": OBS_STATE}
+        self.features_map = {ACTION: ACTION, self.numbers: OBS_STATE if self.size else OBS_ENV_STATE}
         if self.size:
             name = f"pixels/{CAMERA}"
             self.features[name] = PolicyFeature(type=FeatureType.VISUAL, shape=(self.size, self.size, 3))
             self.features_map[name] = f"{OBS_IMAGES}.{CAMERA}"
+
+    @property
+    def numbers(self) -> str:
+        """Key of the numbers in an observation, as LeRobot's other environments name them."""
+        return "agent_pos" if self.size else "environment_state"
 
     @property
     def robot(self) -> HeptarmRobotConfig:
@@ -106,7 +114,7 @@ class HeptarmEnv(gym.Env):
         self._names = [name for name, kind in self._robot.observation_features.items() if kind is float]
         self.action_space = gym.spaces.Box(-np.pi, np.pi, (count,), np.float32)
         spaces: dict[str, gym.Space] = {
-            "agent_pos": gym.spaces.Box(-np.inf, np.inf, (len(self._names),), np.float64)
+            config.numbers: gym.spaces.Box(-np.inf, np.inf, (len(self._names),), np.float64)
         }
         if config.size:
             picture = gym.spaces.Box(0, 255, (config.size, config.size, 3), np.uint8)
@@ -156,7 +164,7 @@ class HeptarmEnv(gym.Env):
 
     def _observation(self) -> dict[str, Any]:
         seen = self._robot.get_observation()
-        observation: dict[str, Any] = {"agent_pos": np.array([seen[name] for name in self._names])}
+        observation: dict[str, Any] = {self.config.numbers: np.array([seen[name] for name in self._names])}
         if self.config.size:
             self._picture = seen[CAMERA]
             observation["pixels"] = {CAMERA: self._picture}

@@ -21,7 +21,7 @@ from lerobot.robots import Robot, RobotConfig
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
 import heptarm as ha
-from heptarm.sim.plant.scene import Wiring
+from heptarm.values.io import GripperWiring
 
 #: Names of the joints, as in data sets.
 JOINTS = tuple(f"joint_{axis}" for axis in range(1, 8))
@@ -116,7 +116,7 @@ class HeptarmRobot(Robot):
         self.config = config
         self.cameras = make_cameras_from_configs(config.cameras)
         self._arm: ha.Arm | None = None
-        self._wiring = Wiring()
+        self._wiring = GripperWiring()
         self._opens: bool | None = None
         self._block = ExitStack()
         self._stream: Any = None
@@ -176,7 +176,7 @@ class HeptarmRobot(Robot):
             if self.config.tool:
                 block.enter_context(arm.tool(self.config.tool))
             if self._has_gripper:
-                self._wiring = Wiring() if self.config.gripper == "scene" else Wiring.of(self.config.gripper)
+                self._wiring = GripperWiring.of(self.config.gripper)
                 _ = arm.io[self._wiring.is_open]  # a name that the cabinet lacks is refused here
             self._arm, self._block = arm, block.pop_all()
             _robots.append(self)
