@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -14,8 +15,9 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop.client import Client
 from heptarm.record.convert import convert as convert_recording
-from heptarm.record.demonstration import load_episodes
+from heptarm.record.demonstration import Demonstrations, SignalStatistics, load_episodes
 from heptarm.record.fri_client import record_client
+from heptarm.record.hdf5 import save_hdf5
 from heptarm.record.lerobot import save_lerobot
 from heptarm.record.recorder import Recorder
 from heptarm.record.recording import load
@@ -207,8 +209,11 @@ def convert(
     /,
     *,
     to: Annotated[
-        Literal["lerobot"] | None,
-        Parameter(help="Make a data set for LeRobot (version 3.0) of a folder of episodes."),
+        Literal["lerobot", "hdf5"] | None,
+        Parameter(
+            help="Make a data set of a folder of episodes: a folder for LeRobot (version 3.0), or an HDF5 file in the "
+            "layout of robomimic."
+        ),
     ] = None,
     label: Annotated[
         tuple[str, ...],
@@ -233,12 +238,14 @@ def convert(
         heptarm convert insert/ data/insert --to lerobot
     """
     if to is not None:
-        return _to_lerobot(file, out, label or ("success",), rate, overwrite=overwrite, as_json=as_json)
+        found = load_episodes(file, labels=label or ("success",), rate=rate)
+        save = save_lerobot if to == "lerobot" else save_hdf5
+        return _made(found, save(found, out, overwrite=overwrite), as_json=as_json)
     if label or rate is not None:
         raise CommandRejected(
             "label and rate are of data sets",
             parameter="label" if label else "rate",
-            hint="give --to lerobot, or leave them out",
+            hint="give --to lerobot or --to hdf5, or leave them out",
         )
     run = load(file, arm=arm)
     files = convert_recording(run, out, overwrite=overwrite)
@@ -257,15 +264,11 @@ def convert(
     return 0
 
 
-def _to_lerobot(
-    folder: Path, out: Path, labels: tuple[str, ...], rate: float | None, *, overwrite: bool, as_json: bool
-) -> int:
-    """Make a data set of a folder of episodes."""
-    found = load_episodes(folder, labels=labels, rate=rate)
-    where = save_lerobot(found, out, overwrite=overwrite)
+def _made(found: Demonstrations, where: Path, *, as_json: bool) -> int:
+    """Report the data set that was made of episodes."""
     steps = sum(map(len, found))
     if as_json:
-        emit({"folder": str(where), "episodes": len(found), "steps": steps})
+        emit({"out": str(where), "episodes": len(found), "steps": steps})
     else:
         print(f"{len(found)} episodes, {steps} steps in {where}")
     return 0
@@ -277,6 +280,12 @@ def episodes(
     ],
     /,
     *,
+    statistics: Annotated[
+        bool,
+        Parameter(
+            negative="", help="Also how each number is spread: least, largest, mean, standard deviation."
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> int:
     """List the episodes of a folder: label, duration, steps, what was dropped or corrected.
@@ -300,4 +309,23 @@ def episodes(
             print(episode)
     if not as_json:
         print(found)
+    if statistics:
+        _show(found.statistics(), as_json=as_json)
     return 0
+
+
+def _show(statistics: Mapping[str, SignalStatistics], *, as_json: bool) -> None:
+    """Show how the numbers of a set are spread."""
+    columns = ("min", "max", "mean", "std")
+    if as_json:
+        rows = {
+            name: {column: getattr(spread, column).tolist() for column in columns}
+            for name, spread in statistics.items()
+        }
+        emit({"statistics": rows})
+        return
+    print("".join([f"{'':14}", *(f"{column:>11}" for column in columns)]))
+    for name, spread in statistics.items():
+        for number in range(len(spread.min)):
+            label = name if len(spread.min) == 1 else f"{name}[{number}]"
+            print(f"{label:14}" + "".join(f"{getattr(spread, column)[number]:11.4g}" for column in columns))
