@@ -124,6 +124,37 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         "four steps teach nothing"
     )
 
+    # without pictures: all numbers are the state of the environment
+    assert run(home, "python", "-m", "lerobot_env_heptarm.state_set", "me/pick", "me/pick-state").count(
+        "2 episodes"
+    )
+    blind = tmp_path / "blind"
+    run(
+        home,
+        "lerobot-train",
+        *("--dataset.repo_id=me/pick-state", "--policy.type=act", "--policy.device=cpu"),
+        *("--policy.push_to_hub=false", "--policy.chunk_size=30", "--policy.n_action_steps=15"),
+        *("--policy.dim_model=128", "--policy.pretrained_backbone_weights=null", "--batch_size=4"),
+        *("--steps=4", "--save_freq=4", "--num_workers=0", "--wandb.enable=false", f"--output_dir={blind}"),
+    )
+    policy = f"--policy.path={blind / 'checkpoints' / 'last' / 'pretrained_model'}"
+    said = run(
+        home,
+        "lerobot-rollout",
+        *(part for part in ROBOT if "cameras" not in part),
+        *(policy, "--policy.device=cpu", f"--fps={FPS}", "--duration=3", "--task=put it"),
+        '--rename_map={"observation.state": "observation.environment_state"}',
+    )
+    assert "Duration limit reached" in said
+    judged = tmp_path / "judged-blind"
+    run(
+        home,
+        "lerobot-eval",
+        *(policy, "--policy.device=cpu", "--env.type=heptarm", "--env.task=pick-place", "--env.size=0"),
+        *("--eval.n_episodes=1", "--eval.batch_size=1", f"--output_dir={judged}"),
+    )
+    assert json.loads((judged / "eval_info.json").read_text())["overall"]["n_episodes"] == 1
+
 
 def test_bad_settings_are_refused_before_anything_moves(home: Path) -> None:
     program = """

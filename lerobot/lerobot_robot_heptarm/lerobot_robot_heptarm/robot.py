@@ -22,6 +22,7 @@ from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnected
 
 import heptarm as ha
 from heptarm.values.io import GripperWiring
+from lerobot_robot_heptarm.scenes import GRIPPER
 
 #: Names of the joints, as in data sets.
 JOINTS = tuple(f"joint_{axis}" for axis in range(1, 8))
@@ -60,7 +61,7 @@ class HeptarmRobotConfig(RobotConfig):
         watchdog: longest gap between two actions; a longer one ends the stream, and the arm rests [s], up to 2.
         tool: a tool that the cabinet knows, attached while connected; "": none.
         gripper: signals of a gripper, as `heptarm panel --gripper` takes them: "open=NAME close=NAME is_open=NAME
-            is_closed=NAME"; "scene": that of a virtual arm's scene; "": there is none.
+            is_closed=NAME"; "scene": that of a virtual arm's scene, and the tool unless there is another; "": none.
         state: what observations have beside the joints and the gripper: any of "velocities" [rad/s], "torques", the
             external ones of the joints [Nm], "pose" of the tool frame in the base [m, rad, KUKA's angles] and "wrench",
             the external one there [N, Nm].
@@ -173,8 +174,8 @@ class HeptarmRobot(Robot):
         block = ExitStack()
         with block:
             arm = block.enter_context(ha.connect(self.config.target, watchdog=5.0))
-            if self.config.tool:
-                block.enter_context(arm.tool(self.config.tool))
+            if self.config.tool or self.config.gripper == "scene":
+                block.enter_context(arm.tool(self.config.tool or GRIPPER))
             if self._has_gripper:
                 self._wiring = GripperWiring.of(self.config.gripper)
                 _ = arm.io[self._wiring.is_open]  # a name that the cabinet lacks is refused here

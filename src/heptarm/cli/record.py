@@ -238,9 +238,9 @@ def convert(
         heptarm convert insert/ data/insert --to lerobot
     """
     if to is not None:
-        found = load_episodes(file, labels=label or ("success",), rate=rate)
+        chosen = load_episodes(file, labels=label or ("success",), rate=rate)
         save = save_lerobot if to == "lerobot" else save_hdf5
-        return _made(found, save(found, out, overwrite=overwrite), as_json=as_json)
+        return _made(chosen, save(chosen, out, overwrite=overwrite), as_json=as_json)
     if label or rate is not None:
         raise CommandRejected(
             "label and rate are of data sets",
