@@ -20,12 +20,13 @@ from heptarm.record.fri_client import record_client
 from heptarm.record.hdf5 import save_hdf5
 from heptarm.record.lerobot import save_lerobot
 from heptarm.record.recorder import Recorder
-from heptarm.record.recording import load
+from heptarm.record.recording import Recording, load
 from heptarm.values.camera import Camera
 from heptarm.values.checks import within
 from heptarm.values.files import refuse_existing
 from heptarm.values.state import GROUP_NAMES
 from heptarm.viewers.live import LiveView
+from heptarm.viewers.recorded import save_rerun
 
 _Number = TypeVar("_Number", int, float)
 CameraAsked = Annotated[
@@ -204,7 +205,9 @@ def convert(
     file: Annotated[Path, Parameter(help="Recording, MCAP; or a folder of episodes.")],
     out: Annotated[
         Path,
-        Parameter(help="File to write: .parquet, .csv or .npz; or a folder for pictures, or for a data set."),
+        Parameter(
+            help="File to write: .parquet, .csv, .npz, or .rrd for rerun; or a folder for pictures, or a data set."
+        ),
     ],
     /,
     *,
@@ -229,7 +232,7 @@ def convert(
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
-    """Convert a recording to Parquet, CSV or NumPy, its pictures to JPEG files, or episodes to a data set.
+    """Convert a recording to Parquet, CSV, NumPy or rerun, its pictures to JPEG files, or episodes to a data set.
 
     For example:
 
@@ -248,6 +251,8 @@ def convert(
             hint="give --to lerobot or --to hdf5, or leave them out",
         )
     run = load(file, arm=arm)
+    if out.suffix == ".rrd":
+        return _for_rerun(run, out, overwrite=overwrite, as_json=as_json)
     files = convert_recording(run, out, overwrite=overwrite)
     count = len(run.pictures)
     if as_json:
@@ -261,6 +266,16 @@ def convert(
             print(f"{count} pictures were left out; a path without a suffix is a folder for them")
     if not as_json and not run.complete:
         print(f"{file} was cut off at its end; everything before was converted")
+    return 0
+
+
+def _for_rerun(run: Recording, out: Path, *, overwrite: bool, as_json: bool) -> int:
+    """Write a recording for the rerun viewer."""
+    save_rerun(run, out, overwrite=overwrite)
+    if as_json:
+        emit({"files": [str(out)], "states": len(run), "complete": run.complete})
+    else:
+        print(f"{len(run)} states in {out}; `rerun {out}` shows them")
     return 0
 
 
