@@ -7,7 +7,7 @@ as it is. Without pictures all numbers are the state of the environment, as ACT 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,8 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 from lerobot_camera_heptarm import HeptarmCameraConfig
 from lerobot_robot_heptarm import HeptarmRobot, HeptarmRobotConfig
-from lerobot_robot_heptarm.scenes import HOME, TASKS
+from lerobot_robot_heptarm.scenes import HOME, TASKS, Leg, way
+from lerobot_robot_heptarm.stepped import SteppedArm
 
 import heptarm as ha
 
@@ -36,6 +37,8 @@ class HeptarmEnvConfig(EnvConfig):
         fps: steps per second, as in the recordings.
         size: width and height of the pictures [pixels]; 0: observations have no pictures, and their numbers are
             `observation.environment_state` instead of `observation.state`.
+        engine: "cabinet": a whole virtual arm, in real time; "stepped": its simulated robot alone, as fast as the
+            processor allows, without pictures.
         speed: as of the robot.
         options: more for the virtual arm, such as "sensors=noisy".
     """
@@ -43,12 +46,17 @@ class HeptarmEnvConfig(EnvConfig):
     task: str | None = "pick-place"
     fps: int = 15
     size: int = 96
+    engine: str = "cabinet"
     speed: float = 0.5
     options: str = ""
 
     def __post_init__(self) -> None:
         if self.task not in TASKS:
             raise ValueError(f"task must be one of {', '.join(TASKS)}, got {self.task}")
+        if self.engine not in ("cabinet", "stepped"):
+            raise ValueError(f"engine must be cabinet or stepped, got {self.engine}")
+        if self.engine == "stepped" and (self.size or self.options):
+            raise ValueError("the engine stepped has neither pictures nor options: use --env.size=0")
         robot = HeptarmRobot(self.robot)
         numbers = [kind for kind in robot.observation_features.values() if kind is float]
         self.features = {
@@ -121,6 +129,7 @@ class HeptarmEnv(gym.Env):
             spaces["pixels"] = gym.spaces.Dict({CAMERA: picture})
         self.observation_space = gym.spaces.Dict(spaces)
         self._steps, self._due = 0, 0.0
+        self.legs: list[Leg] = []
         self._picture = np.zeros((max(config.size, 16), max(config.size, 16), 3), np.uint8)
 
     def reset(
@@ -128,13 +137,15 @@ class HeptarmEnv(gym.Env):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Bring the arm home, and the bodies to new places."""
         super().reset(seed=seed)
-        if not self._robot.is_connected:
-            self._robot.connect()
-        self._robot.rest()
-        arm = self._robot.arm
-        arm.move(ha.ptp(HOME), speed=0.5)
-        arm.operator.reset()
-        self._task.prepare(arm, self.np_random)
+        if self.config.engine == "stepped":
+            self._robot.attach(SteppedArm(self._task.scene))
+        else:
+            if not self._robot.is_connected:
+                self._robot.connect()
+            self._robot.rest()
+            self._robot.arm.move(ha.ptp(HOME), speed=0.5)
+            self._robot.arm.operator.reset()
+        self.legs = self._task.prepare(self._robot.arm, self.np_random)
         self._steps, self._due = 0, time.monotonic()
         return self._observation(), {"is_success": False}
 
@@ -149,12 +160,23 @@ class HeptarmEnv(gym.Env):
             self._robot.rest()
         else:
             self._robot.send_action(dict(zip(self._robot.action_features, map(float, action), strict=True)))
-            self._due = max(self._due + 1.0 / self.config.fps, time.monotonic() - 1.0 / self.config.fps)
-            time.sleep(max(self._due - time.monotonic(), 0.0))
+            self._pass(1.0 / self.config.fps)
         is_last = self._steps >= self._max_episode_steps
         done = (is_last or self._home) and self._task.is_done(self._robot.arm)
         info = {"is_success": done}
         return self._observation(), float(done), done or failed, is_last, info
+
+    def _pass(self, period: float) -> None:
+        """Wait until the time of a step is over [s]."""
+        if self.config.engine == "stepped":
+            self._robot.arm.step(period)
+            return
+        self._due = max(self._due + period, time.monotonic() - period)
+        time.sleep(max(self._due - time.monotonic(), 0.0))
+
+    def way(self) -> Iterator[tuple[np.ndarray, bool]]:
+        """How to do the task from here: joint positions and the gripper, `FINE` in a second."""
+        return way(self._robot.arm, self.legs)
 
     @property
     def _home(self) -> bool:

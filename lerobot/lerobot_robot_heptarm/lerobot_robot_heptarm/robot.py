@@ -23,6 +23,7 @@ from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnected
 import heptarm as ha
 from heptarm.values.io import GripperWiring
 from lerobot_robot_heptarm.scenes import GRIPPER
+from lerobot_robot_heptarm.stepped import SteppedArm
 
 #: Names of the joints, as in data sets.
 JOINTS = tuple(f"joint_{axis}" for axis in range(1, 8))
@@ -116,13 +117,13 @@ class HeptarmRobot(Robot):
         super().__init__(config)
         self.config = config
         self.cameras = make_cameras_from_configs(config.cameras)
-        self._arm: ha.Arm | None = None
+        self._arm: Any = None
         self._wiring = GripperWiring()
         self._opens: bool | None = None
         self._block = ExitStack()
         self._stream: Any = None
         self._stream_block = ExitStack()
-        self._last = 0.0
+        self._last, self._is_stepped = 0.0, False
         self._observed = -np.inf
 
     # --------------------------------------------------------------------------------- what it has
@@ -185,6 +186,12 @@ class HeptarmRobot(Robot):
             camera.connect()
         self.configure()
 
+    def attach(self, arm: SteppedArm) -> None:
+        """Use a simulated robot that is moved on step by step, in place of one that is connected."""
+        self._end_stream()
+        self._arm, self._is_stepped, self._opens = arm, True, None
+        self._wiring = GripperWiring.of(self.config.gripper)
+
     @property
     def is_calibrated(self) -> bool:
         """Whether it knows its joint angles: an iiwa always does."""
@@ -206,7 +213,8 @@ class HeptarmRobot(Robot):
             self._end_stream()
         finally:
             self._arm = self._opens = None
-            _robots.remove(self)
+            if self in _robots:
+                _robots.remove(self)
             self._block.close()
 
     # --------------------------------------------------------------------------------- at work
@@ -243,7 +251,8 @@ class HeptarmRobot(Robot):
         q = np.array([float(action[f"{joint}.pos"]) for joint in JOINTS])
         sent = q if not np.isfinite(q).all() else q.clip(arm.robot.q_min, arm.robot.q_max)
         now = time.monotonic()
-        if self._stream is not None and now - self._last > 0.8 * self.config.watchdog:
+        silence = 0.0 if self._is_stepped else now - self._last
+        if self._stream is not None and silence > 0.8 * self.config.watchdog:
             self._end_stream()
         if self._stream is None:
             self._begin_stream()
