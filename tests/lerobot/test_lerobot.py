@@ -151,9 +151,23 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         home,
         "lerobot-eval",
         *(policy, "--policy.device=cpu", "--env.type=heptarm", "--env.task=pick-place", "--env.size=0"),
-        *("--eval.n_episodes=1", "--eval.batch_size=1", f"--output_dir={judged}"),
+        *("--env.engine=stepped", "--eval.n_episodes=1", "--eval.batch_size=1", f"--output_dir={judged}"),
     )
     assert json.loads((judged / "eval_info.json").read_text())["overall"]["n_episodes"] == 1
+
+
+def test_a_script_demonstrates_faster_than_time_and_the_same_for_a_seed(home: Path) -> None:
+    module = ("-m", "lerobot_env_heptarm.demonstrate")
+    for name in ("me/one", "me/two"):
+        assert "of 1 tries were successes" in run(home, "python", *module, name, "--episodes=1", "--jobs=1")
+    look = """
+import numpy as np
+from lerobot.datasets import LeRobotDataset
+one, two = (np.array(LeRobotDataset(name).hf_dataset["observation.environment_state"]) for name in ("me/one", "me/two"))
+assert one.shape == two.shape and one.shape[1] == 11 and (one == two).all()
+assert abs(one[-1, 9] + 0.2) < 0.1, "the cube is in the other bin"
+"""
+    run(home, "python", "-c", look)
 
 
 def test_bad_settings_are_refused_before_anything_moves(home: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import logging
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from functools import partial
 from multiprocessing import get_context
 from typing import NamedTuple
@@ -83,7 +84,8 @@ def record(
         repo_id=name, fps=config.fps, features=features, robot_type=robot.name, use_videos=False
     )
     words, tries = TASKS[str(config.task)].words, 0
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+    with ExitStack() as end, ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        end.callback(data.finalize)  # what is complete stays
         while data.num_episodes < episodes:
             seeds = range(seed + tries, seed + tries + episodes - data.num_episodes)
             tries += len(seeds)
@@ -92,7 +94,6 @@ def record(
                     for seen, done in zip(trial.seen, trial.done, strict=True):
                         data.add_frame({OBS_ENV_STATE: seen, ACTION: done, "task": words})
                     data.save_episode()
-    data.finalize()
     logging.info("%d of %d tries were successes; %s", data.num_episodes, tries, data.root)
     return data
 
