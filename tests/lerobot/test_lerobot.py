@@ -124,7 +124,7 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         "four steps teach nothing"
     )
 
-    # without pictures: all numbers are the state of the environment
+    # without pictures: the place of the body is the state of the environment
     assert run(home, "python", "-m", "lerobot_env_heptarm.state_set", "me/pick", "me/pick-state").count(
         "2 episodes"
     )
@@ -134,18 +134,11 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         "lerobot-train",
         *("--dataset.repo_id=me/pick-state", "--policy.type=act", "--policy.device=cpu"),
         *("--policy.push_to_hub=false", "--policy.chunk_size=30", "--policy.n_action_steps=15"),
-        *("--policy.dim_model=128", "--policy.pretrained_backbone_weights=null", "--batch_size=4"),
+        *("--policy.dim_model=128", "--policy.use_vae=false", "--policy.pretrained_backbone_weights=null"),
+        "--batch_size=4",
         *("--steps=4", "--save_freq=4", "--num_workers=0", "--wandb.enable=false", f"--output_dir={blind}"),
     )
     policy = f"--policy.path={blind / 'checkpoints' / 'last' / 'pretrained_model'}"
-    said = run(
-        home,
-        "lerobot-rollout",
-        *(part for part in ROBOT if "cameras" not in part),
-        *(policy, "--policy.device=cpu", f"--fps={FPS}", "--duration=3", "--task=put it"),
-        '--rename_map={"observation.state": "observation.environment_state"}',
-    )
-    assert "Duration limit reached" in said
     judged = tmp_path / "judged-blind"
     run(
         home,
@@ -163,7 +156,7 @@ def test_a_script_demonstrates_faster_than_time_and_the_same_for_a_seed(home: Pa
     look = """
 import numpy as np
 from lerobot.datasets import LeRobotDataset
-one, two = (np.array(LeRobotDataset(name).hf_dataset["observation.environment_state"]) for name in ("me/one", "me/two"))
+one, two = (np.array(LeRobotDataset(name).hf_dataset["observation.state"]) for name in ("me/one", "me/two"))
 assert one.shape == two.shape and one.shape[1] == 11 and (one == two).all()
 assert abs(one[-1, 9] + 0.2) < 0.1, "the cube is in the other bin"
 """

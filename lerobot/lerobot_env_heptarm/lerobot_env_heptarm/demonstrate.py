@@ -1,7 +1,8 @@
 """Demonstrations of a task for policies without pictures, recorded as fast as the processor allows.
 
 `python -m lerobot_env_heptarm.demonstrate me/pick --episodes 40` makes a LeRobot data set: a script does the task on
-the engine `stepped` of the environment. Its numbers are `observation.environment_state`. Only successes are kept.
+the engine `stepped` of the environment. The place of the body is also `observation.environment_state`. Only successes
+are kept.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 from lerobot.datasets import LeRobotDataset
-from lerobot.utils.constants import ACTION, OBS_ENV_STATE
+from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_STATE
 from lerobot_robot_heptarm import HeptarmRobot
 from lerobot_robot_heptarm.scenes import FINE, TASKS
 
-from lerobot_env_heptarm.environment import HeptarmEnv, HeptarmEnvConfig
+from lerobot_env_heptarm.environment import PLACE, HeptarmEnv, HeptarmEnvConfig
 
 
 class Trial(NamedTuple):
@@ -52,7 +53,7 @@ def demonstrate(seed: int, *, config: HeptarmEnvConfig, noise: float) -> Trial:
     while not ends:
         q, opens = way[min(round(len(seen) * FINE / config.fps), len(way) - 1)]
         action = np.append(q + noise * random.standard_normal(7), float(opens)).astype(np.float32)
-        seen.append(observation[config.numbers].astype(np.float32))
+        seen.append(observation["agent_pos"].astype(np.float32))
         done.append(action)
         observation, _, terminated, truncated, info = env.step(action)
         success, ends = info["is_success"], terminated or truncated
@@ -78,7 +79,7 @@ def record(
     actions = list(robot.action_features)
     features = {
         key: {"dtype": "float32", "shape": (len(parts),), "names": parts}
-        for key, parts in ((OBS_ENV_STATE, names), (ACTION, actions))
+        for key, parts in ((OBS_STATE, names), (OBS_ENV_STATE, names[-PLACE:]), (ACTION, actions))
     }
     data = LeRobotDataset.create(
         repo_id=name, fps=config.fps, features=features, robot_type=robot.name, use_videos=False
@@ -92,7 +93,8 @@ def record(
             for trial in pool.map(partial(demonstrate, config=config, noise=noise), seeds):
                 if trial.success:
                     for seen, done in zip(trial.seen, trial.done, strict=True):
-                        data.add_frame({OBS_ENV_STATE: seen, ACTION: done, "task": words})
+                        state = {OBS_STATE: seen, OBS_ENV_STATE: seen[-PLACE:]}
+                        data.add_frame({**state, ACTION: done, "task": words})
                     data.save_episode()
     logging.info("%d of %d tries were successes; %s", data.num_episodes, tries, data.root)
     return data

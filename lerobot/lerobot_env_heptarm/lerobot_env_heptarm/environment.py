@@ -1,7 +1,7 @@
 """A task on a virtual arm as an environment of LeRobot: the whole cabinet, in real time, as a policy meets it.
 
 Observations and actions are those of the robot heptarm, so that a policy that was trained on its recordings is judged
-as it is. Without pictures all numbers are the state of the environment, as ACT needs them then.
+as it is. Without pictures the place of the body is there once more, as the state of the environment, which ACT needs.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ import heptarm as ha
 
 #: The camera of an environment.
 CAMERA = "front"
+#: Numbers at the end of a state that are the place of the task's body, x y z [m].
+PLACE = 3
 
 
 @EnvConfig.register_subclass("heptarm")
@@ -35,8 +37,8 @@ class HeptarmEnvConfig(EnvConfig):
     Attributes:
         task: "pick-place" or "peg".
         fps: steps per second, as in the recordings.
-        size: width and height of the pictures [pixels]; 0: observations have no pictures, and their numbers are
-            `observation.environment_state` instead of `observation.state`.
+        size: width and height of the pictures [pixels]; 0: observations have no pictures, and the place of the
+            body is also `observation.environment_state`.
         engine: "cabinet": a whole virtual arm, in real time; "stepped": its simulated robot alone, as fast as the
             processor allows, without pictures.
         speed: as of the robot.
@@ -61,20 +63,16 @@ class HeptarmEnvConfig(EnvConfig):
         numbers = [kind for kind in robot.observation_features.values() if kind is float]
         self.features = {
             ACTION: PolicyFeature(type=FeatureType.ACTION, shape=(len(robot.action_features),)),
-            self.numbers: PolicyFeature(
-                type=FeatureType.STATE if self.size else FeatureType.ENV, shape=(len(numbers),)
-            ),
+            "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(len(numbers),)),
         }
-        self.features_map = {ACTION: ACTION, self.numbers: OBS_STATE if self.size else OBS_ENV_STATE}
+        self.features_map = {ACTION: ACTION, "agent_pos": OBS_STATE}
+        if not self.size:
+            self.features["environment_state"] = PolicyFeature(type=FeatureType.ENV, shape=(PLACE,))
+            self.features_map["environment_state"] = OBS_ENV_STATE
         if self.size:
             name = f"pixels/{CAMERA}"
             self.features[name] = PolicyFeature(type=FeatureType.VISUAL, shape=(self.size, self.size, 3))
             self.features_map[name] = f"{OBS_IMAGES}.{CAMERA}"
-
-    @property
-    def numbers(self) -> str:
-        """Key of the numbers in an observation, as LeRobot's other environments name them."""
-        return "agent_pos" if self.size else "environment_state"
 
     @property
     def robot(self) -> HeptarmRobotConfig:
@@ -122,8 +120,10 @@ class HeptarmEnv(gym.Env):
         self._names = [name for name, kind in self._robot.observation_features.items() if kind is float]
         self.action_space = gym.spaces.Box(-np.pi, np.pi, (count,), np.float32)
         spaces: dict[str, gym.Space] = {
-            config.numbers: gym.spaces.Box(-np.inf, np.inf, (len(self._names),), np.float64)
+            "agent_pos": gym.spaces.Box(-np.inf, np.inf, (len(self._names),), np.float64)
         }
+        if not config.size:
+            spaces["environment_state"] = gym.spaces.Box(-np.inf, np.inf, (PLACE,), np.float64)
         if config.size:
             picture = gym.spaces.Box(0, 255, (config.size, config.size, 3), np.uint8)
             spaces["pixels"] = gym.spaces.Dict({CAMERA: picture})
@@ -186,7 +186,10 @@ class HeptarmEnv(gym.Env):
 
     def _observation(self) -> dict[str, Any]:
         seen = self._robot.get_observation()
-        observation: dict[str, Any] = {self.config.numbers: np.array([seen[name] for name in self._names])}
+        numbers = np.array([seen[name] for name in self._names])
+        observation: dict[str, Any] = {"agent_pos": numbers}
+        if not self.config.size:
+            observation["environment_state"] = numbers[-PLACE:]
         if self.config.size:
             self._picture = seen[CAMERA]
             observation["pixels"] = {CAMERA: self._picture}

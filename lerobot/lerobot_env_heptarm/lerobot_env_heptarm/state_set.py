@@ -1,7 +1,7 @@
-"""A data set whose numbers are the state of the environment, for policies without pictures.
+"""A data set with the place of the body as the state of the environment, for policies without pictures.
 
-`lerobot-record` writes all numbers of a robot to `observation.state`. ACT without pictures asks for
-`observation.environment_state`. This copies a data set with the one in the place of the other:
+`lerobot-record` writes all numbers of a robot to `observation.state`. ACT without pictures also asks for
+`observation.environment_state`. This copies a data set and adds it, from the end of the state:
 `python -m lerobot_env_heptarm.state_set me/pick me/pick-state`.
 """
 
@@ -15,9 +15,11 @@ from lerobot.datasets import LeRobotDataset
 from lerobot.datasets.dataset_tools import modify_features, recompute_stats
 from lerobot.utils.constants import OBS_ENV_STATE, OBS_STATE
 
+from lerobot_env_heptarm.environment import PLACE
+
 
 def state_set(source: str, copy: str) -> LeRobotDataset:
-    """Copy a data set; `observation.state` becomes `observation.environment_state`, and pictures are left out.
+    """Copy a data set with `observation.environment_state`; pictures are left out.
 
     Args:
         source: name of the data set, "me/pick".
@@ -30,13 +32,14 @@ def state_set(source: str, copy: str) -> LeRobotDataset:
     data = LeRobotDataset(source)
     if OBS_STATE not in data.features:
         raise ValueError(f"{source} must have {OBS_STATE}, it has {', '.join(data.features)}")
-    numbers = np.array(data.hf_dataset[OBS_STATE], np.float32)
-    about = {key: data.features[OBS_STATE][key] for key in ("dtype", "shape", "names")}
+    places = np.array(data.hf_dataset[OBS_STATE], np.float32)[:, -PLACE:]
+    names = list(data.features[OBS_STATE]["names"])[-PLACE:]
+    about = {"dtype": "float32", "shape": (PLACE,), "names": names}
     return recompute_stats(
         modify_features(
             data,
-            add_features={OBS_ENV_STATE: (numbers, about)},
-            remove_features=[OBS_STATE, *data.meta.camera_keys],
+            add_features={OBS_ENV_STATE: (places, about)},
+            remove_features=list(data.meta.camera_keys),
             repo_id=copy,
         )
     )
