@@ -102,7 +102,7 @@ def record(
 
 def main() -> None:
     """Record what the command line asks for."""
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("name", help="of the data set, such as me/pick")
     parser.add_argument("--task", default="pick-place", choices=list(TASKS))

@@ -47,7 +47,7 @@ def state_set(source: str, copy: str) -> LeRobotDataset:
 
 def main() -> None:
     """Copy the data set of the command line."""
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.basicConfig(level=logging.INFO, format="%(message)s", force=True)
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("source", help="name of a data set, such as me/pick")
     parser.add_argument("copy", help="name of the new one, such as me/pick-state")
