@@ -240,6 +240,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "live": (WORDS + "rviz shows the arm; `heptarm live` runs beside the node",),
         "load": (WORDS + "it reads a file",),
         "load_episodes": (WORDS + "it reads files",),
+        "save_hdf5": (WORDS + "it writes a data set of recorded episodes",),
         "save_lerobot": (WORDS + "it writes a data set of recorded episodes",),
         "param": (WORDS + "a law is Python code",),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),

@@ -107,6 +107,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "load": {"path": "no such file"},
     "replay_in_sim": {"recording": "no such file"},
     "load_episodes": {"folder": "no such folder", "labels": ("success",)},
+    "save_hdf5": {"episodes": Demonstrations(Path("no such folder"), ()), "file": "no such folder/x.hdf5"},
     "save_lerobot": {"episodes": Demonstrations(Path("no such folder"), ()), "folder": "no such folder"},
     "Arm.episodes": {"folder": "no such folder", "cameras": (), "streams": None, "reset": None},
     "export_model": {"path": "no such format"},

@@ -203,6 +203,9 @@ from .record.episodes import (
 from .record.fri_client import (
     record_client as record_client,
 )
+from .record.hdf5 import (
+    save_hdf5 as save_hdf5,
+)
 from .record.lerobot import (
     save_lerobot as save_lerobot,
 )

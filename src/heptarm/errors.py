@@ -362,6 +362,7 @@ EXTRAS = {
     "record": ("mcap", "pandas", "pyarrow", "plotly"),
     "devices": ("evdev", "pyspacemouse"),
     "rerun": ("rerun",),
+    "hdf5": ("h5py",),
     "vision": ("cv2", "scipy"),
     "ray": ("ray",),
 }

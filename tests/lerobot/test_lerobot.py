@@ -124,6 +124,44 @@ print(json.dumps([data.features["observation.state"]["names"], list(data[0]["obs
         "four steps teach nothing"
     )
 
+    # without pictures: the place of the body is the state of the environment
+    assert run(home, "python", "-m", "lerobot_env_heptarm.state_set", "me/pick", "me/pick-state").count(
+        "2 episodes"
+    )
+    blind = tmp_path / "blind"
+    run(
+        home,
+        "lerobot-train",
+        *("--dataset.repo_id=me/pick-state", "--policy.type=act", "--policy.device=cpu"),
+        *("--policy.push_to_hub=false", "--policy.chunk_size=30", "--policy.n_action_steps=15"),
+        *("--policy.dim_model=128", "--policy.use_vae=false", "--policy.pretrained_backbone_weights=null"),
+        "--batch_size=4",
+        *("--steps=4", "--save_freq=4", "--num_workers=0", "--wandb.enable=false", f"--output_dir={blind}"),
+    )
+    policy = f"--policy.path={blind / 'checkpoints' / 'last' / 'pretrained_model'}"
+    judged = tmp_path / "judged-blind"
+    run(
+        home,
+        "lerobot-eval",
+        *(policy, "--policy.device=cpu", "--env.type=heptarm", "--env.task=pick-place", "--env.size=0"),
+        *("--env.engine=stepped", "--eval.n_episodes=1", "--eval.batch_size=1", f"--output_dir={judged}"),
+    )
+    assert json.loads((judged / "eval_info.json").read_text())["overall"]["n_episodes"] == 1
+
+
+def test_a_script_demonstrates_faster_than_time_and_the_same_for_a_seed(home: Path) -> None:
+    module = ("-m", "lerobot_env_heptarm.demonstrate")
+    for name in ("me/one", "me/two"):
+        assert "of 1 tries were successes" in run(home, "python", *module, name, "--episodes=1", "--jobs=1")
+    look = """
+import numpy as np
+from lerobot.datasets import LeRobotDataset
+one, two = (np.array(LeRobotDataset(name).hf_dataset["observation.state"]) for name in ("me/one", "me/two"))
+assert one.shape == two.shape and one.shape[1] == 11 and (one == two).all()
+assert abs(one[-1, 9] + 0.2) < 0.1, "the cube is in the other bin"
+"""
+    run(home, "python", "-c", look)
+
 
 def test_bad_settings_are_refused_before_anything_moves(home: Path) -> None:
     program = """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from heptarm.record.pictures import Pictures
 from heptarm.record.recorded import RecordedEvent
 from heptarm.record.recording import Recording
 from heptarm.values.robot import robot
+from tests.arm.peer import Peer
 
 pytest.importorskip("viser")
 
@@ -79,6 +81,29 @@ def test_an_episode_shows_what_its_cameras_saw() -> None:
             assert player.pictures["wrist"].image.mean() == pytest.approx(level, abs=2)
     finally:
         player.close()
+
+
+def test_the_episodes_of_a_folder_are_chosen_on_the_page(tmp_path: Path) -> None:
+    peer, deadline = Peer(), time.monotonic() + 30.0
+    with peer.arm() as arm, arm.episodes(tmp_path, task="Look", streams={"force": None}) as episodes:
+        for number in range(2):
+            with episodes.episode() as episode:
+                begin = arm.state.stamp
+                while arm.state.stamp - begin < 100_000_000 and time.monotonic() < deadline:
+                    episodes.push("force", 4.5 + number)
+                    time.sleep(0.01)
+                episode.fail("it jammed") if number else episode.succeed()
+    peer.close()
+    with played(tmp_path) as player:
+        assert player.episode is not None and player.episode.options == ("episode-00000", "episode-00001")
+        player.step(0.05)
+        assert player.about.content == "**success** Look\n\nforce: 4.5"
+        player.episode.value = "episode-00001"
+        player.step(0.05)
+        assert player.about.content == "**failure** (it jammed) Look\n\nforce: 5.5"
+    with pytest.raises(ha.CommandRejected, match="has no episodes"):
+        (tmp_path / "empty").mkdir()
+        open_player(tmp_path / "empty", PanelOptions(port=0))
 
 
 def test_what_cannot_be_played(tmp_path: Path) -> None:

@@ -172,6 +172,11 @@ def test_the_commands_list_episodes_and_make_a_data_set(
     first, second, *rest = capsys.readouterr().out.splitlines()
     assert first.startswith("episode-00000.mcap  success  0.") and first.endswith("  Look")
     assert "failure (too slow)" in second and "1 success, 1 failure" in " ".join(rest)
+    assert command.episodes(folder, statistics=True) == 0
+    assert any(line.startswith("action[6] ") for line in capsys.readouterr().out.splitlines())
+    assert command.episodes(folder, statistics=True, as_json=True) == 0
+    spread = json.loads(capsys.readouterr().out.splitlines()[-1])["statistics"]
+    assert len(spread["q"]["mean"]) == 7 and set(spread["q"]) == {"min", "max", "mean", "std"}
     assert command.episodes(folder, as_json=True) == 0
     assert [json.loads(line)["label"] for line in capsys.readouterr().out.splitlines()] == [
         "success",

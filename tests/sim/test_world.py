@@ -10,11 +10,12 @@ import pytest
 
 from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.scene import Scene, Wiring, is_mounted, names
+from heptarm.sim.plant.scene import Scene, is_mounted, names
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.values.checks import Array
+from heptarm.values.io import GripperWiring
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import Body
 from tests.sim import motions
@@ -217,7 +218,7 @@ def test_a_file_that_is_no_scene_is_refused(content: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("text", ["open", "open=", "opens=Cell.Open", "open=Cell.Open wide"])
 def test_a_wiring_that_names_something_else_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="NAME=Group.Signal"):
-        Wiring.of(text)
+        GripperWiring.of(text)
 
 
 def test_the_operator_sees_where_a_body_is() -> None:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, STDOUT
 
 import numpy as np
 import pytest
 
 import heptarm as ha
 from heptarm import devices, skills
+from heptarm.arm.link.local_simulator import PrivateCabinet
+from heptarm.arm.link.target import Target
 from heptarm.devices.pose_stream import PoseInput, PoseStream
 from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
-from tests.cli.running import refused
+from tests.cli.running import HEPTARM, Command, refused
 from tests.conftest import RunningCabinet
 from tests.simulators import FASTER
 
@@ -178,11 +182,46 @@ def test_an_arm_follows_a_second_one_that_is_pushed(arm: ha.Arm, tmp_path: Path)
     assert 0.02 < arm.wait_for_rest().pose.y - start.y < 0.08
 
 
+@pytest.mark.slow
+@pytest.mark.long
+def test_the_command_between_two_arms_records_joints_and_gripper_to_its_end(tmp_path: Path) -> None:
+    leader = PrivateCabinet.start(Target(model="iiwa7"))
+    follower = PrivateCabinet.start(Target(model="iiwa14", options=(("scene", "bins"),)))
+    try:
+        targets = [f"sim://{cabinet.host}:{cabinet.port}" for cabinet in (leader, follower)]
+        for target in targets:
+            with ha.connect(target, watchdog=5.0, timeout=30.0) as one:
+                one.move(ha.ptp(ha.deg(0, 25, 0, -90, 0, 65, 0)), speed=0.5)
+        options = ("--for", "8", "--record", str(tmp_path / "set"), "--task", "Look", "--scale", "0.5")
+        grips = ("--gripper", "scene", "--grip", "MediaFlange.UserButton")
+        command = [*HEPTARM, "teleop", "--leader", targets[0], "--follower", targets[1], *options, *grips]
+        with Command(command, stdin=DEVNULL, stdout=PIPE, stderr=STDOUT, text=True) as process:
+            assert process.stdout is not None
+            assert "compliant" in process.stdout.readline()
+            assert leader.operate("push 0 15 0 300") == ("", "")
+            time.sleep(3.0)
+            assert leader.operate("set MediaFlange.UserButton true") == ("", "")
+            said = process.communicate(timeout=120)[0]
+        assert process.returncode == 0 and "1 episodes in" in said, said
+        (episode,) = ha.load_episodes(tmp_path / "set")
+        began, ended = episode["pose"][0, :3], episode["pose"][-1, :3]
+        assert ended[1] - began[1] > 0.01 and episode.task == "Look"
+        assert episode["gripper"][0] == 1.0 and episode["gripper"][-1] == 0.0, "the press closed it"
+        assert episode.action.shape == (len(episode), 8) and episode.action[-1, 7] == 0.0
+        assert np.abs(episode.action[:, :7] - episode["q"]).max() < 0.1
+    finally:
+        leader.close()
+        follower.close()
+
+
 def test_the_command_refuses_what_does_not_fit() -> None:
     cases: list[tuple[tuple[str, ...], str]] = [
         ((), "one of --leader, --device and --poses, got none"),
         (("--poses", "0", "--device", "keyboard"), "got device, poses"),
         (("--poses", "0", "--reflect", "0.5"), "reflect needs a leader"),
+        (("--poses", "0", "--gripper", "scene", "--grip", "A"), "grip needs a leader and a gripper"),
+        (("--leader", "a", "--gripper", "scene"), "gripper needs grip"),
+        (("--poses", "0", "--gripper", "opens=A"), "signals of a gripper must be NAME=Group.Signal"),
         (("--poses", "0", "--workspace", "1,2"), "workspace must be X,Y,Z,X,Y,Z"),
         (("--poses", "0", "--for", "-1"), "for must be"),
     ]

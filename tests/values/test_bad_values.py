@@ -100,6 +100,7 @@ EXPECTED: dict[str, type[Exception]] = {
     "Trajectory.load": heptarm.CommandRejected,
     "load": heptarm.CommandRejected,
     "load_episodes": heptarm.CommandRejected,
+    "save_hdf5": heptarm.CommandRejected,
     "save_lerobot": heptarm.CommandRejected,
     "mesh": heptarm.CommandRejected,
     "CollisionModel.color": heptarm.CommandRejected,

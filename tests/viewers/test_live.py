@@ -8,6 +8,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,10 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.cli.record import convert
 from heptarm.errors import CommandRejected, LimitError, MissingExtra, ShapeError
+from heptarm.record.demonstration import in_steps
+from heptarm.viewers.recorded import save_rerun
 from heptarm.wire import messages as wire
 from tests.arm.peer import Peer
 
@@ -81,6 +85,34 @@ def test_states_and_events_are_in_the_file_as_rerun_reads_it(peer: Peer, tmp_pat
     assert len({path.rpartition("/")[0] for path in shapes}) == 8, "each link has its shape"
     texts = [text for (text,) in read.rows["/arm/events"]["text"]]
     assert any("begin here" in text for text in texts) and any("motion 11" in text for text in texts)
+
+
+def test_an_episode_is_a_file_of_rerun_with_its_pictures_streams_and_actions(
+    peer: Peer, tmp_path: Path
+) -> None:
+    folder, file = tmp_path / "set", tmp_path / "episode.rrd"
+    picture = np.full((8, 12, 3), 90, np.uint8)
+    with (
+        peer.arm() as arm,
+        arm.episodes(folder, cameras=[lambda: picture], streams={"force": None}) as episodes,
+        episodes.episode() as episode,
+    ):
+        states = arm.state.stamp
+        until(lambda: episodes.push("force", [1.0, 2.0]) is None and arm.state.stamp - states > 200_000_000)
+        episode.succeed()
+    run = ha.load(folder / "episode-00000.mcap")
+    with pytest.raises(CommandRejected, match="no states of a known robot"):
+        save_rerun(replace(run, facts={"robot": "iiwa99"}), file)
+    pytest.importorskip("rerun")
+    assert convert(run.path, file) == 0
+    with pytest.raises(CommandRejected, match="exists"):
+        save_rerun(run, file)
+    read = Read(file)
+    np.testing.assert_allclose(read.numbers("/arm/q", "scalars"), run["q"])
+    np.testing.assert_allclose(read.numbers("/arm/stream/force", "scalars"), run.streams["force"].values)
+    assert len(read.rows["/arm/camera/camera"]["blob"]) == len(run.views["camera"])
+    assert read.numbers("/arm/action", "scalars").shape == in_steps(run).action.shape
+    assert ["label: success"] in read.rows["/arm/events"]["text"]
 
 
 def test_the_chain_of_links_ends_at_the_flange() -> None:

@@ -21,7 +21,9 @@ from lerobot.robots import Robot, RobotConfig
 from lerobot.utils.errors import DeviceAlreadyConnectedError, DeviceNotConnectedError
 
 import heptarm as ha
-from heptarm.sim.plant.scene import Wiring
+from heptarm.values.io import GripperWiring
+from lerobot_robot_heptarm.scenes import GRIPPER
+from lerobot_robot_heptarm.stepped import SteppedArm
 
 #: Names of the joints, as in data sets.
 JOINTS = tuple(f"joint_{axis}" for axis in range(1, 8))
@@ -60,7 +62,7 @@ class HeptarmRobotConfig(RobotConfig):
         watchdog: longest gap between two actions; a longer one ends the stream, and the arm rests [s], up to 2.
         tool: a tool that the cabinet knows, attached while connected; "": none.
         gripper: signals of a gripper, as `heptarm panel --gripper` takes them: "open=NAME close=NAME is_open=NAME
-            is_closed=NAME"; "scene": that of a virtual arm's scene; "": there is none.
+            is_closed=NAME"; "scene": that of a virtual arm's scene, and the tool unless there is another; "": none.
         state: what observations have beside the joints and the gripper: any of "velocities" [rad/s], "torques", the
             external ones of the joints [Nm], "pose" of the tool frame in the base [m, rad, KUKA's angles] and "wrench",
             the external one there [N, Nm].
@@ -115,13 +117,13 @@ class HeptarmRobot(Robot):
         super().__init__(config)
         self.config = config
         self.cameras = make_cameras_from_configs(config.cameras)
-        self._arm: ha.Arm | None = None
-        self._wiring = Wiring()
+        self._arm: Any = None
+        self._wiring = GripperWiring()
         self._opens: bool | None = None
         self._block = ExitStack()
         self._stream: Any = None
         self._stream_block = ExitStack()
-        self._last = 0.0
+        self._last, self._is_stepped = 0.0, False
         self._observed = -np.inf
 
     # --------------------------------------------------------------------------------- what it has
@@ -173,16 +175,22 @@ class HeptarmRobot(Robot):
         block = ExitStack()
         with block:
             arm = block.enter_context(ha.connect(self.config.target, watchdog=5.0))
-            if self.config.tool:
-                block.enter_context(arm.tool(self.config.tool))
+            if self.config.tool or self.config.gripper == "scene":
+                block.enter_context(arm.tool(self.config.tool or GRIPPER))
             if self._has_gripper:
-                self._wiring = Wiring() if self.config.gripper == "scene" else Wiring.of(self.config.gripper)
+                self._wiring = GripperWiring.of(self.config.gripper)
                 _ = arm.io[self._wiring.is_open]  # a name that the cabinet lacks is refused here
             self._arm, self._block = arm, block.pop_all()
             _robots.append(self)
         for camera in self.cameras.values():
             camera.connect()
         self.configure()
+
+    def attach(self, arm: SteppedArm) -> None:
+        """Use a simulated robot that is moved on step by step, in place of one that is connected."""
+        self._end_stream()
+        self._arm, self._is_stepped, self._opens = arm, True, None
+        self._wiring = GripperWiring.of(self.config.gripper)
 
     @property
     def is_calibrated(self) -> bool:
@@ -205,7 +213,8 @@ class HeptarmRobot(Robot):
             self._end_stream()
         finally:
             self._arm = self._opens = None
-            _robots.remove(self)
+            if self in _robots:
+                _robots.remove(self)
             self._block.close()
 
     # --------------------------------------------------------------------------------- at work
@@ -242,7 +251,8 @@ class HeptarmRobot(Robot):
         q = np.array([float(action[f"{joint}.pos"]) for joint in JOINTS])
         sent = q if not np.isfinite(q).all() else q.clip(arm.robot.q_min, arm.robot.q_max)
         now = time.monotonic()
-        if self._stream is not None and now - self._last > 0.8 * self.config.watchdog:
+        silence = 0.0 if self._is_stepped else now - self._last
+        if self._stream is not None and silence > 0.8 * self.config.watchdog:
             self._end_stream()
         if self._stream is None:
             self._begin_stream()

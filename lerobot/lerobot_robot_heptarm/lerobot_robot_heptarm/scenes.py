@@ -16,6 +16,8 @@ import heptarm as ha
 #: Where an episode begins and ends, and the tip of the scenes' gripper in the flange frame.
 HOME = ha.deg(0, 25, 0, -90, 0, 65, 0)
 _TIP = ha.Pose.at(0, 0, 0.16)
+#: The scenes' gripper: without its load the joints sag, and far enough a drive error stops the arm.
+GRIPPER = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=_TIP)
 #: Places along a way in a second [1/s].
 FINE = 100
 

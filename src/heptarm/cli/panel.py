@@ -48,8 +48,8 @@ def panel(
     play: Annotated[
         Path | None,
         Parameter(
-            help="Play this recording (MCAP) instead of connecting to an arm; one that heptarm twin --save wrote has "
-            "the twin as a ghost."
+            help="Play this recording (MCAP), or the episodes of this folder, instead of connecting to an arm; a "
+            "recording that heptarm twin --save wrote has the twin as a ghost."
         ),
     ] = None,
     target: CommandTargets = NO_TARGETS,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -14,16 +15,18 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop.client import Client
 from heptarm.record.convert import convert as convert_recording
-from heptarm.record.demonstration import load_episodes
+from heptarm.record.demonstration import Demonstrations, SignalStatistics, load_episodes
 from heptarm.record.fri_client import record_client
+from heptarm.record.hdf5 import save_hdf5
 from heptarm.record.lerobot import save_lerobot
 from heptarm.record.recorder import Recorder
-from heptarm.record.recording import load
+from heptarm.record.recording import Recording, load
 from heptarm.values.camera import Camera
 from heptarm.values.checks import within
 from heptarm.values.files import refuse_existing
 from heptarm.values.state import GROUP_NAMES
 from heptarm.viewers.live import LiveView
+from heptarm.viewers.recorded import save_rerun
 
 _Number = TypeVar("_Number", int, float)
 CameraAsked = Annotated[
@@ -202,13 +205,18 @@ def convert(
     file: Annotated[Path, Parameter(help="Recording, MCAP; or a folder of episodes.")],
     out: Annotated[
         Path,
-        Parameter(help="File to write: .parquet, .csv or .npz; or a folder for pictures, or for a data set."),
+        Parameter(
+            help="File to write: .parquet, .csv, .npz, or .rrd for rerun; or a folder for pictures, or a data set."
+        ),
     ],
     /,
     *,
     to: Annotated[
-        Literal["lerobot"] | None,
-        Parameter(help="Make a data set for LeRobot (version 3.0) of a folder of episodes."),
+        Literal["lerobot", "hdf5"] | None,
+        Parameter(
+            help="Make a data set of a folder of episodes: a folder for LeRobot (version 3.0), or an HDF5 file in the "
+            "layout of robomimic."
+        ),
     ] = None,
     label: Annotated[
         tuple[str, ...],
@@ -224,7 +232,7 @@ def convert(
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> int:
-    """Convert a recording to Parquet, CSV or NumPy, its pictures to JPEG files, or episodes to a data set.
+    """Convert a recording to Parquet, CSV, NumPy or rerun, its pictures to JPEG files, or episodes to a data set.
 
     For example:
 
@@ -233,14 +241,18 @@ def convert(
         heptarm convert insert/ data/insert --to lerobot
     """
     if to is not None:
-        return _to_lerobot(file, out, label or ("success",), rate, overwrite=overwrite, as_json=as_json)
+        chosen = load_episodes(file, labels=label or ("success",), rate=rate)
+        save = save_lerobot if to == "lerobot" else save_hdf5
+        return _made(chosen, save(chosen, out, overwrite=overwrite), as_json=as_json)
     if label or rate is not None:
         raise CommandRejected(
             "label and rate are of data sets",
             parameter="label" if label else "rate",
-            hint="give --to lerobot, or leave them out",
+            hint="give --to lerobot or --to hdf5, or leave them out",
         )
     run = load(file, arm=arm)
+    if out.suffix == ".rrd":
+        return _for_rerun(run, out, overwrite=overwrite, as_json=as_json)
     files = convert_recording(run, out, overwrite=overwrite)
     count = len(run.pictures)
     if as_json:
@@ -257,15 +269,21 @@ def convert(
     return 0
 
 
-def _to_lerobot(
-    folder: Path, out: Path, labels: tuple[str, ...], rate: float | None, *, overwrite: bool, as_json: bool
-) -> int:
-    """Make a data set of a folder of episodes."""
-    found = load_episodes(folder, labels=labels, rate=rate)
-    where = save_lerobot(found, out, overwrite=overwrite)
+def _for_rerun(run: Recording, out: Path, *, overwrite: bool, as_json: bool) -> int:
+    """Write a recording for the rerun viewer."""
+    save_rerun(run, out, overwrite=overwrite)
+    if as_json:
+        emit({"files": [str(out)], "states": len(run), "complete": run.complete})
+    else:
+        print(f"{len(run)} states in {out}; `rerun {out}` shows them")
+    return 0
+
+
+def _made(found: Demonstrations, where: Path, *, as_json: bool) -> int:
+    """Report the data set that was made of episodes."""
     steps = sum(map(len, found))
     if as_json:
-        emit({"folder": str(where), "episodes": len(found), "steps": steps})
+        emit({"out": str(where), "episodes": len(found), "steps": steps})
     else:
         print(f"{len(found)} episodes, {steps} steps in {where}")
     return 0
@@ -277,6 +295,12 @@ def episodes(
     ],
     /,
     *,
+    statistics: Annotated[
+        bool,
+        Parameter(
+            negative="", help="Also how each number is spread: least, largest, mean, standard deviation."
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> int:
     """List the episodes of a folder: label, duration, steps, what was dropped or corrected.
@@ -300,4 +324,23 @@ def episodes(
             print(episode)
     if not as_json:
         print(found)
+    if statistics:
+        _show(found.statistics(), as_json=as_json)
     return 0
+
+
+def _show(statistics: Mapping[str, SignalStatistics], *, as_json: bool) -> None:
+    """Show how the numbers of a set are spread."""
+    columns = ("min", "max", "mean", "std")
+    if as_json:
+        rows = {
+            name: {column: getattr(spread, column).tolist() for column in columns}
+            for name, spread in statistics.items()
+        }
+        emit({"statistics": rows})
+        return
+    print("".join([f"{'':14}", *(f"{column:>11}" for column in columns)]))
+    for name, spread in statistics.items():
+        for number in range(len(spread.min)):
+            label = name if len(spread.min) == 1 else f"{name}[{number}]"
+            print(f"{label:14}" + "".join(f"{getattr(spread, column)[number]:11.4g}" for column in columns))

@@ -6,23 +6,28 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from cyclopts import Parameter
 
+from heptarm.arm.arm import Arm
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.cli.jog import DEVICES
 from heptarm.cli.options import COMMON, Access, CommandTarget
 from heptarm.cli.output import emit
 from heptarm.cli.record import numbers_of
-from heptarm.devices.pose_stream import PORT, pose_stream
+from heptarm.devices.pose_stream import PORT, PoseDevice, pose_stream
 from heptarm.errors import CommandRejected
 from heptarm.record.episodes import Episode
+from heptarm.skills.gripper import TwoSignalGripper
 from heptarm.skills.pose_following import SPEED, LeaderArm, follow_poses
 from heptarm.skills.teleoperation import teleoperate
 from heptarm.values.camera import Camera
 from heptarm.values.checks import integer, within
+from heptarm.values.io import GripperWiring
 from heptarm.values.workspace import Workspace
 
 _ACCESS = Access()
@@ -58,6 +63,25 @@ def teleop(
         str,
         Parameter(help="Signal of the leader's IO that is held while the follower follows. Default: always."),
     ] = "",
+    gripper: Annotated[
+        str,
+        Parameter(
+            help='Signals of the follower\'s gripper: "open=OUTPUT close=OUTPUT is_open=INPUT is_closed=INPUT", those '
+            'that are not named on the media flange; "scene": the gripper of a ready scene. Default: none.'
+        ),
+    ] = "",
+    grip: Annotated[
+        str,
+        Parameter(
+            help="Signal of the leader's IO whose press opens and closes the gripper. Devices and poses have a button."
+        ),
+    ] = "",
+    tool: Annotated[
+        str,
+        Parameter(
+            help="Tool on the follower's flange, of its project or saved target, attached meanwhile: its load and TCP."
+        ),
+    ] = "",
     reflect: Annotated[
         float, Parameter(help="Fraction of the follower's force that the leader's hand feels, over FRI.")
     ] = 0.0,
@@ -87,6 +111,8 @@ def teleop(
         heptarm teleop --leader sim://iiwa7 --follower sim://iiwa14 --scale 0.5
 
         heptarm teleop --poses 30310 --target lab1 --record insert --task "Insert the peg" --episodes 20
+
+    With a gripper the actions of an episode are the joints and the gripper, 1 open, 0 closed.
     """
     limit = None if seconds is None else within(seconds, "for", 0.0, 86400.0, above=True, unit="s")
     chosen = [
@@ -99,41 +125,53 @@ def teleop(
             f"there must be one of --leader, --device and --poses, got {', '.join(chosen) or 'none'}",
             parameter="leader",
         )
-    if reflect and leader is None:
-        raise CommandRejected(
-            "reflect needs a leader that an FRI session moves", parameter="reflect", value=reflect
-        )
+    _check_options(leader, reflect=reflect, gripper=gripper, grip=grip)
+    wiring = GripperWiring.of(gripper) if gripper else None
     box = None if not workspace else _box(workspace)
     target = access.target if follower is None else replace(access.target, text=follower)
     with ExitStack() as stack:
         arm = stack.enter_context(target.connect())
         access.ask_first(arm, f"Let the real {arm.robot.title} follow?")
+        if tool:
+            stack.enter_context(arm.tool(tool))
+        fingers = None if wiring is None else TwoSignalGripper(arm, **asdict(wiring))
         if box is not None:
             arm.workspace = box
-        move: Callable[[], ServoStats]
+        guide: PoseDevice
         if device is not None:
             opened = DEVICES[device]()
             stack.callback(opened.close)
-            move = lambda: teleoperate(arm, opened, duration=limit)  # noqa: E731
         elif poses is not None:
-            stream = stack.enter_context(pose_stream(poses, host=host))
+            guide = stream = stack.enter_context(pose_stream(poses, host=host))
             _tell(f"waiting for poses at UDP port {stream.port}; hold clutch to move, quit ends", access)
-            move = lambda: follow_poses(arm, stream, scale=scale, speed=speed, duration=limit)  # noqa: E731
         else:
-            guide = stack.enter_context(CommandTarget(text=leader).connect())
-            access.ask_first(guide, f"Make the real {guide.robot.title} compliant? Somebody has to hold it.")
-            guided = stack.enter_context(LeaderArm(guide, clutch=clutch, reflect=reflect))
+            second = stack.enter_context(CommandTarget(text=leader).connect())
+            access.ask_first(
+                second, f"Make the real {second.robot.title} compliant? Somebody has to hold it."
+            )
+            guide = stack.enter_context(LeaderArm(second, clutch=clutch, gripper=grip, reflect=reflect))
             _tell("the leader is compliant; Ctrl-C ends", access)
-            move = lambda: follow_poses(arm, guided, scale=scale, speed=speed, duration=limit)  # noqa: E731
+
+        def move(acts: Callable[[object], bool] | None = None) -> ServoStats:
+            if device is not None:
+                return teleoperate(arm, opened, gripper=fingers, duration=limit, while_true=acts)
+            return follow_poses(
+                arm, guide, scale=scale, gripper=fingers, speed=speed, duration=limit, while_true=acts
+            )
+
         stats = []
         if record is None:
             stats.append(_moved(move))
         else:
             cameras = {"scene": Camera(size=(96, 96), rate=min(60.0, rate))} if camera else {}
-            recorded = stack.enter_context(arm.episodes(record, rate=rate, task=task, cameras=cameras))
+            streams = {} if fingers is None else {"gripper": lambda: float(fingers.is_open)}
+            recorded = stack.enter_context(
+                arm.episodes(record, rate=rate, task=task, cameras=cameras, streams=streams)
+            )
             for _ in range(integer(episodes, "episodes", 1, 100_000)):
                 with recorded.episode() as episode:
-                    stats.append(_moved(move))
+                    acts = None if wiring is None else _acting(arm, wiring, episode)
+                    stats.append(_moved(partial(move, acts)))
                     _label(episode)
     if access.as_json:
         emit(
@@ -149,6 +187,43 @@ def teleop(
         if record is not None:
             print(f"{len(stats)} episodes in {record}")
     return 0
+
+
+def _check_options(leader: str | None, *, reflect: float, gripper: str, grip: str) -> None:
+    """Refuse options of a leader without one, and a gripper that no button moves.
+
+    Raises:
+        CommandRejected: there are such.
+    """
+    if reflect and leader is None:
+        raise CommandRejected(
+            "reflect needs a leader that an FRI session moves", parameter="reflect", value=reflect
+        )
+    if grip and (leader is None or not gripper):
+        raise CommandRejected(
+            "grip needs a leader and a gripper that its signal moves",
+            parameter="grip",
+            value=grip,
+            hint="devices and poses have a button for the gripper",
+        )
+    if gripper and leader is not None and not grip:
+        raise CommandRejected(
+            "gripper needs grip, the leader's signal that opens and closes it",
+            parameter="gripper",
+            value=gripper,
+            hint="for example --grip UserButton",
+        )
+
+
+def _acting(arm: Arm, wiring: GripperWiring, episode: Episode) -> Callable[[object], bool]:
+    """What records the commanded joints and gripper at each reading of the device."""
+
+    def act(_: object) -> bool:
+        state = arm.state
+        episode.act([*np.where(np.isnan(state.q_cmd), state.q, state.q_cmd), float(arm.io[wiring.open])])
+        return True
+
+    return act
 
 
 def _moved(move: Callable[[], ServoStats]) -> ServoStats | None:

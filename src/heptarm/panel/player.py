@@ -1,16 +1,19 @@
-"""A recording on the page of the panel: the arm as it moved, by a slider or in time; pictures, its twin as a ghost."""
+"""Recordings on the page of the panel: the arm as it moved, by a slider or in time; pictures, its twin as a ghost."""
 
 from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from heptarm.errors import CommandRejected
 from heptarm.io.panel_box import PlanOutline
 from heptarm.panel.process import RATE, PanelOptions, open_server
+from heptarm.record.episodes import LABEL, NUMBER, REASON, TASK, episode_files
 from heptarm.record.recording import Recording, load
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose
@@ -19,16 +22,28 @@ from heptarm.values.pose import Pose
 SPEEDS = {"1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "5": 5.0}
 #: Steps of the slider [s], and events that are listed.
 _STEP, _EVENTS = 0.01, 5
+#: Numbers of a stream that are shown.
+_NUMBERS = 8
 #: Most points of the path that is drawn.
 _POINTS = 2000
 
 
 def open_player(file: Path, options: PanelOptions) -> Player:
-    """A page that plays a file; of one that `Twin.save` wrote the twin is the ghost.
+    """A page that plays a file, or the episodes of a folder; of one that `Twin.save` wrote the twin is the ghost.
 
     Raises:
-        CommandRejected: the file is no recording, or cannot be played.
+        CommandRejected: the file is no recording, or cannot be played; or the folder has no episodes.
     """
+    if file.is_dir():
+        episodes = [path for _, path in episode_files(file)]
+        if not episodes:
+            raise CommandRejected(
+                f"{file} has no episodes",
+                parameter="play",
+                value=str(file),
+                hint="arm.episodes(folder) and heptarm teleop --record record some",
+            )
+        return Player(load(episodes[0]), options, episodes=episodes)
     try:
         recorded = load(file, arm="recorded")
     except CommandRejected:
@@ -43,6 +58,7 @@ class Player:
         recording: what is played.
         options: of the panel; those that concern control do not matter.
         ghost: another recording over the same time line, drawn translucent; None: none.
+        episodes: files among which the page chooses; the recording is the first one's. None: there are no others.
 
     Attributes:
         url: with the token, to print once.
@@ -53,9 +69,13 @@ class Player:
     """
 
     def __init__(
-        self, recording: Recording, options: PanelOptions, *, ghost: Recording | None = None
+        self,
+        recording: Recording,
+        options: PanelOptions,
+        *,
+        ghost: Recording | None = None,
+        episodes: Sequence[Path] = (),
     ) -> None:
-        self._recording = recording
         self._t, self._q = _positions(recording)
         shadow = None if ghost is None else _positions(ghost)
         server, guard = open_server(options, {})
@@ -73,23 +93,57 @@ class Player:
         if ghost is not None and shadow is not None:
             path = np.asarray(ghost["xyz"] if "xyz" in ghost else np.zeros((0, 3)))
             self._outline = PlanOutline(robot, *shadow, _thinned(path), np.zeros(0))
-        if "xyz" in recording:
-            self._marks.show_trail(_thinned(recording["xyz"]))
         self._ended = threading.Event()
-        begin, end = float(self._t[0]), float(self._t[-1])
-        self.slider = server.gui.add_slider("time [s]", begin, max(end, begin + _STEP), _STEP, begin)
+        self._episodes = {path.stem: path for path in episodes}
+        #: Which episode is shown; None: there are no others.
+        self.episode = server.gui.add_dropdown("episode", tuple(self._episodes)) if self._episodes else None
+        self._played = "" if self.episode is None else str(self.episode.value)
+        begin = float(self._t[0])
+        self.slider = server.gui.add_slider("time [s]", begin, begin + _STEP, _STEP, begin)
         self.is_playing = server.gui.add_checkbox("play", True)
         self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1")
+        #: Label and task of an episode, and what its streams gave.
+        self.about = server.gui.add_markdown("")
         self.events = server.gui.add_markdown("")
-        pictures = {**recording.views, **({"camera": recording.pictures} if len(recording.pictures) else {})}
         #: What the cameras saw, by their names; each with the picture that is shown.
-        self.pictures = {name: server.gui.add_image(view[0], label=name) for name, view in pictures.items()}
-        self._views, self._shown = pictures, dict.fromkeys(pictures, 0)
+        self.pictures: dict[str, Any] = {}
         server.initial_camera.position = (1.7, -1.5, 1.15)
         server.initial_camera.look_at = (0.15, 0.0, 0.5)
         guard.port = server.get_port()  # from now on it lets in who has the token
         self.url = guard.url
+        self._take(recording)
+
+    def _take(self, recording: Recording) -> None:
+        """Show another recording from its beginning.
+
+        Raises:
+            CommandRejected: it has no joint positions; what was shown stays.
+        """
+        self._t, self._q = _positions(recording)
+        self._recording = recording
+        begin, end = float(self._t[0]), float(self._t[-1])
+        self.slider.min, self.slider.max = begin, max(end, begin + _STEP)
+        self.slider.value = begin
+        self._marks.show_trail(_thinned(recording["xyz"]) if "xyz" in recording else np.zeros((0, 3)))
+        for picture in self.pictures.values():
+            picture.remove()
+        views = {**recording.views, **({"camera": recording.pictures} if len(recording.pictures) else {})}
+        self._views = {name: view for name, view in views.items() if len(view)}
+        self.pictures = {
+            name: self.server.gui.add_image(view[0], label=name) for name, view in self._views.items()
+        }
+        self._shown = dict.fromkeys(self._views, 0)
         self.show(begin)
+
+    def _choose(self) -> None:
+        """Show the episode that is chosen on the page."""
+        if self.episode is None or self.episode.value == self._played:
+            return
+        self._played = str(self.episode.value)
+        try:
+            self._take(load(self._episodes[self._played]))
+        except CommandRejected as error:
+            self.about.content = str(error)
 
     def show(self, t: float) -> None:
         """Draw both arms at a time of the recording [s]."""
@@ -107,6 +161,7 @@ class Player:
             index = int(np.abs(view.t - t).argmin())
             if index != self._shown[name]:
                 self._shown[name], self.pictures[name].image = index, view[index]
+        self.about.content = _about(run, t)
         past = [event for event in run.events if event.t <= t and event.kind != "signals"]
         self.events.content = "\n".join(
             f"- `{event.t:.2f} s` {event.text[:120]}" for event in past[-_EVENTS:]
@@ -114,6 +169,7 @@ class Player:
 
     def step(self, seconds: float) -> None:
         """Draw one picture, so many seconds after the last one; at the end it begins again."""
+        self._choose()
         t = float(self.slider.value)
         if self.is_playing.value:
             t += seconds * SPEEDS[self._speed.value]
@@ -135,6 +191,20 @@ class Player:
         """End the server."""
         self._ended.set()
         self.server.stop()
+
+
+def _about(run: Recording, t: float) -> str:
+    """Label and task of an episode, and the newest numbers of its streams at a time of it [s]."""
+    rows = []
+    if NUMBER in run.facts:
+        label = run.outcome.get(LABEL, "unfinished")
+        reason = f" ({run.outcome[REASON]})" if run.outcome.get(REASON) else ""
+        rows.append(f"**{label}**{reason} {run.facts.get(TASK, '')}")
+    for name, stream in run.streams.items():
+        if len(stream) and stream.t[0] <= t:
+            row = stream.values[int(np.searchsorted(stream.t, t, side="right")) - 1]
+            rows.append(f"{name}: {', '.join(f'{value:.3g}' for value in row[:_NUMBERS])}")
+    return "\n\n".join(rows)
 
 
 def _positions(recording: Recording) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +34,7 @@ from heptarm.panel import frame, texts
 from heptarm.panel.guard import Page, PageGuard, free_port, is_local
 from heptarm.panel.model import PanelArm, groups_for
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
+from heptarm.values.io import GripperWiring
 from heptarm.wire.messages import StopKind
 
 if TYPE_CHECKING:
@@ -359,11 +360,11 @@ def _gripper_of(arm: Arm, options: PanelOptions) -> Gripper | None:
     Raises:
         CommandRejected: its signals are named in a wrong way, or there are none of these names.
     """
-    from heptarm.sim.plant.scene import GRIPPER, Scene, Wiring
+    from heptarm.sim.plant.scene import GRIPPER, Scene
 
     try:
         if options.gripper:
-            wiring = Wiring.of(options.gripper)
+            wiring = GripperWiring.of(options.gripper)
         elif arm.is_virtual and options.scene:
             scene = Scene.of(options.scene)
             if all(actuator.name != GRIPPER for actuator in scene.read().actuators):
@@ -373,13 +374,7 @@ def _gripper_of(arm: Arm, options: PanelOptions) -> Gripper | None:
             return None
     except ValueError as error:
         raise CommandRejected(str(error), parameter="gripper", value=options.gripper) from None
-    return TwoSignalGripper(
-        arm,
-        open=wiring.open,
-        close=wiring.close,
-        is_open=wiring.is_open,
-        is_closed=wiring.is_closed,
-    )
+    return TwoSignalGripper(arm, **asdict(wiring))
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -108,6 +108,23 @@ class Demonstration:
         return f"<Demonstration {self.path.name}, {self.label}, {len(self)} steps>"
 
 
+@dataclass(frozen=True, eq=False)
+class SignalStatistics:
+    """How the numbers of a signal are spread over all steps of all episodes; shape (m,) each.
+
+    Attributes:
+        min: least.
+        max: largest.
+        mean: mean.
+        std: standard deviation.
+    """
+
+    min: Array
+    max: Array
+    mean: Array
+    std: Array
+
+
 class Demonstrations(Sealed, Sequence[Demonstration]):
     """Episodes of a folder; made by `load_episodes`.
 
@@ -139,6 +156,31 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
         """Number of episodes by label."""
         counts = Counter(episode.label for episode in self._episodes)
         return {label: counts[label] for label in LABELS if counts[label]}
+
+    def statistics(self) -> dict[str, SignalStatistics]:
+        """Least, largest, mean and standard deviation of each signal, stream and the action, by name.
+
+        A number that never changes, or is far outside of the others, shows here before a policy learns from it.
+
+        Raises:
+            CommandRejected: the episodes have different numbers of a signal.
+        """
+        found = {}
+        for name in dict.fromkeys(name for episode in self for name in (*episode.signals, ACTION)):
+            parts = [episode.action if name == ACTION else episode.signals.get(name) for episode in self]
+            rows = [part for part in parts if part is not None and len(part)]
+            sizes = sorted({part.shape[1] for part in rows})
+            if len(sizes) > 1:
+                raise CommandRejected(
+                    f"all episodes must have the same numbers of {name}, got {' and '.join(map(str, sizes))}",
+                    parameter="episodes",
+                    hint="choose episodes of one kind: load_episodes(folder)[first:last]",
+                )
+            if rows:
+                whole = np.concatenate(rows)
+                spread = (whole.min(axis=0), whole.max(axis=0), whole.mean(axis=0), whole.std(axis=0))
+                found[name] = SignalStatistics(*map(frozen, spread))
+        return found
 
     def __str__(self) -> str:
         """A few lines: how many of which label, how long, what was dropped."""

@@ -6,7 +6,6 @@ The layout follows LeRobot's documentation: `meta/info.json`, `meta/stats.json`,
 
 from __future__ import annotations
 
-import io
 import json
 import shutil
 from collections.abc import Mapping, Sequence
@@ -18,6 +17,7 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
 from heptarm.record.demonstration import Demonstration, Demonstrations
+from heptarm.record.pictures import decoded
 from heptarm.values.checks import Array, flag, instance
 from heptarm.values.files import path_of, unwritable
 
@@ -226,14 +226,8 @@ def _shapes(episode: Demonstration) -> dict[str, tuple[int, ...]]:
     }
     shapes["action"] = (episode.action.shape[1],)
     for name, files in episode.views.items():
-        shapes[f"observation.images.{name}"] = _decoded(files[0]).shape
+        shapes[f"observation.images.{name}"] = decoded(files[0]).shape
     return shapes
-
-
-def _decoded(file: bytes) -> npt.NDArray[np.uint8]:
-    image = require("PIL.Image", extra="record")
-    with image.open(io.BytesIO(file)) as opened:
-        return np.asarray(opened.convert("RGB"))
 
 
 def _schema(arrow: Any, features: Mapping[str, Mapping[str, Any]]) -> Any:
@@ -328,7 +322,7 @@ def _statistics(
             files = episode.views[name.removeprefix("observation.images.")]
             chosen = np.unique(np.linspace(0, len(files) - 1, min(_LOOKS, len(files))).round().astype(int))
             pixels = (
-                np.concatenate([_decoded(files[index])[::4, ::4].reshape(-1, 3) for index in chosen]) / 255.0
+                np.concatenate([decoded(files[index])[::4, ::4].reshape(-1, 3) for index in chosen]) / 255.0
             )
             found[name] = {
                 key: [[[value]] for value in row] if key != "count" else row

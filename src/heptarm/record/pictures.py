@@ -15,6 +15,17 @@ from heptarm.values.checks import Array, finite, flag, frozen, integer, scalar
 from heptarm.values.files import path_of, refuse_existing
 
 
+def decoded(file: bytes) -> npt.NDArray[np.uint8]:
+    """The picture of a JPEG file: red, green, blue, shape (height, width, 3).
+
+    Raises:
+        MissingExtra: the package Pillow is not installed.
+    """
+    image = require("PIL.Image", extra="record")
+    with image.open(io.BytesIO(file)) as opened:
+        return np.asarray(opened.convert("RGB"))
+
+
 @dataclass(frozen=True, eq=False)
 class Pictures:
     """Pictures of a simulated camera, in order; `heptarm.load(...).pictures`.
@@ -52,9 +63,7 @@ class Pictures:
         return (self._decoded(index) for index in range(len(self)))
 
     def _decoded(self, index: int) -> npt.NDArray[np.uint8]:
-        image = require("PIL.Image", extra="record")
-        with image.open(io.BytesIO(self.files[index])) as opened:
-            return np.asarray(opened.convert("RGB"))
+        return decoded(self.files[index])
 
     def at(self, t: float) -> npt.NDArray[np.uint8]:
         """The picture that is nearest to a time of the recording [s], shape (height, width, 3).

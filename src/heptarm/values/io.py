@@ -152,3 +152,40 @@ class SignalValues(Mapping[str, SignalValue]):
     def __repr__(self) -> str:
         """Short form."""
         return f"SignalValues({self._values})"
+
+
+@dataclass(frozen=True, slots=True)
+class GripperWiring:
+    """Signals of a gripper by their names in the IO image, "Group.Name".
+
+    Attributes:
+        open: output that opens it.
+        close: output that closes it.
+        is_open: input of the switch at the open end.
+        is_closed: input of the switch at the closed end: it is closed, with nothing between the fingers.
+    """
+
+    open: str = "MediaFlange.OutputX3Pin1"
+    close: str = "MediaFlange.OutputX3Pin2"
+    is_open: str = "MediaFlange.InputX3Pin3"
+    is_closed: str = "MediaFlange.InputX3Pin4"
+
+    @staticmethod
+    def of(text: str) -> GripperWiring:
+        """A wiring from "open=Group.Name close=Group.Name ..."; signals that are not named keep their default.
+
+        "scene" is the gripper of the ready scenes, which is wired by default.
+
+        Raises:
+            CommandRejected: the text names something else.
+        """
+        pairs = [part.partition("=") for part in text.split() if text != "scene"]
+        if not all(name in GripperWiring.__slots__ and signal for name, _, signal in pairs):
+            names = ", ".join(GripperWiring.__slots__)
+            raise CommandRejected(
+                f"signals of a gripper must be NAME=Group.Signal with the names {names}, got {text!r}",
+                parameter="gripper",
+                value=text,
+                hint='for example "open=Cell.Open close=Cell.Close", or "scene"',
+            )
+        return GripperWiring(**{name: signal for name, _, signal in pairs})

@@ -121,7 +121,7 @@ class LiveView(Sealed):
             _check_display()
             rerun.spawn(port=_PORT, connect=False, hide_welcome_screen=True)
             outputs.append(rerun.GrpcSink(f"rerun+http://127.0.0.1:{_PORT}/proxy"))
-        recording.set_sinks(*outputs, default_blueprint=_blueprint(tuple(self._arms)))
+        recording.set_sinks(*outputs, default_blueprint=blueprint(tuple(self._arms)))
         return [
             RerunStream(
                 recording,
@@ -229,8 +229,8 @@ def _check_display() -> None:
         )
 
 
-def _blueprint(names: Sequence[str]) -> Any:
-    """What the viewer shows first: the arms, plots of their signals, their events."""
+def blueprint(names: Sequence[str], *, more: Sequence[Any] = ()) -> Any:
+    """What the viewer shows first: the arms, plots of their signals, their events, and more views below the plots."""
     views = require("rerun.blueprint", extra="rerun")
     plots = [
         views.TimeSeriesView(
@@ -246,7 +246,7 @@ def _blueprint(names: Sequence[str]) -> Any:
                 views.TextLogView(origin="/", contents=[f"/{name}/events" for name in names], name="Events"),
                 row_shares=[3, 1],
             ),
-            views.Vertical(*plots),
+            views.Vertical(*plots, *more),
             column_shares=[3, 2],
         ),
         collapse_panels=True,

@@ -137,14 +137,21 @@ class RerunStream:
         model: of the arm, such as "iiwa14".
         name: entity that everything is below.
         place: of the base in the scene, x y z [m].
-        epoch: nanoseconds since 1970 at our clock's zero.
+        epoch: nanoseconds since 1970 at our clock's zero; None: times are from the beginning of a recording.
     """
 
     def __init__(
-        self, recording: Any, model: str, *, name: str, place: Sequence[float] = (0.0, 0.0, 0.0), epoch: int
+        self,
+        recording: Any,
+        model: str,
+        *,
+        name: str,
+        place: Sequence[float] = (0.0, 0.0, 0.0),
+        epoch: int | None,
     ) -> None:
         self._rerun = require("rerun", extra="rerun")
-        self._recording, self._name, self._epoch = recording, name, epoch
+        self._recording, self._name = recording, name
+        self._epoch, self._is_dated = epoch or 0, epoch is not None
         self._chain = JointChain(model, f"{name}/base")
         self._trail: deque[Array] = deque(maxlen=_MOST_PLACES)
         self._named: set[str] = set()
@@ -160,12 +167,30 @@ class RerunStream:
     ) -> None:
         """Send pushed states: transforms, scalars, contact and trail."""
         rows = state_rows([sample.body for sample in samples])
-        times = sampling_times(rows["stamp"], to_ours) + self._epoch
-        found = signals_of(rows)
-        self._send_chain(times, found["q"])
-        self._send_tcp(times, found["xyz"], found["quat"], found["force"])
+        self.signals(sampling_times(rows["stamp"], to_ours) + self._epoch, signals_of(rows))
+
+    def signals(self, times: npt.NDArray[np.int64], found: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Send the signals of states by their names; times of the time line, shape (n,) [ns]."""
+        if "q" in found:
+            self._send_chain(times, found["q"])
+        if all(name in found for name in ("xyz", "quat", "force")):
+            self._send_tcp(times, found["xyz"], found["quat"], found["force"])
         for name in STATE_SIGNALS:
-            self._send_scalars(name, name, times, found[name])
+            if name in found:
+                self._send_scalars(name, name, times, found[name])
+
+    def numbers(self, path: str, times: npt.NDArray[np.int64], values: Array) -> None:
+        """Send numbers of a stream as scalars, shape (n, m)."""
+        self._send_scalars(path, path.rpartition("/")[2], times, values)
+
+    def pictures(self, path: str, times: npt.NDArray[np.int64], files: Sequence[bytes]) -> None:
+        """Send pictures, each the bytes of a JPEG file."""
+        columns = self._rerun.EncodedImage.columns(blob=files, media_type=["image/jpeg"] * len(files))
+        self._send(path, times, columns)
+
+    def text(self, path: str, times: npt.NDArray[np.int64], texts: Sequence[str]) -> None:
+        """Send lines of text."""
+        self._send(path, times, self._rerun.TextLog.columns(text=texts))
 
     def cycles(self, words: npt.NDArray[np.float64]) -> None:
         """Send FRI cycles, shape (n, 122), as scalars."""
@@ -200,8 +225,14 @@ class RerunStream:
 
     def _send(self, path: str, times: npt.NDArray[np.int64], columns: Any) -> None:
         time.sleep(0.0)  # the thread that receives states is not held up by the interpreter's lock
-        at = self._rerun.TimeColumn(TIMELINE, timestamp=times.astype("datetime64[ns]"))
+        at = self._rerun.TimeColumn(TIMELINE, **self._moment(times))
         self._recording.send_columns(f"{self._name}/{path}" if path else self._name, [at], columns)
+
+    def _moment(self, times: Any) -> dict[str, Any]:
+        """Times in [ns] as rerun takes them."""
+        if self._is_dated:
+            return {"timestamp": times.astype("datetime64[ns]")}
+        return {"duration": times.astype("timedelta64[ns]")}
 
     def _send_chain(self, times: npt.NDArray[np.int64], q: Array) -> None:
         known = ~np.isnan(q).any(axis=1)
@@ -229,7 +260,7 @@ class RerunStream:
                 self._trail.append(place)
         if len(self._trail) > max(1, before) or before == _MOST_PLACES:
             line = self._rerun.LineStrips3D([np.array(self._trail)], colors=_BLUE)
-            self._recording.set_time(TIMELINE, timestamp=times[-1].astype("datetime64[ns]"))
+            self._recording.set_time(TIMELINE, **self._moment(times[-1]))
             self._recording.log(f"{self._name}/base/trail", line)
 
     def _send_scalars(self, path: str, name: str, times: npt.NDArray[np.int64], values: Array) -> None:

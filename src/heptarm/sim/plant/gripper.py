@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from heptarm.sim.plant.io_image import IoImage
-from heptarm.sim.plant.scene import GRIPPER, PREFIX, Wiring
+from heptarm.sim.plant.scene import GRIPPER, PREFIX
+from heptarm.values.io import GripperWiring
 
 #: Part of the stroke at each end in which the switch of that end is on.
 SWITCHED = 0.03
@@ -29,7 +30,9 @@ class SimulatedGripper:
         ValueError: its joints have no range, or its signals do not fit the image.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, signals: IoImage, wiring: Wiring) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, signals: IoImage, wiring: GripperWiring
+    ) -> None:
         index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PREFIX + GRIPPER)
         joints = driven_joints(model)
         low, high = model.jnt_range[joints].T

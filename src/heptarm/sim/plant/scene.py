@@ -18,6 +18,7 @@ import numpy as np
 from heptarm.errors import CommandRejected
 from heptarm.values.checks import shown
 from heptarm.values.files import read_xml, unreadable
+from heptarm.values.io import GripperWiring
 from heptarm.values.pose import Pose
 from heptarm.values.shape import ORIGIN
 
@@ -52,38 +53,6 @@ _NAMES = (
 _LARGEST_MESH = 30.0
 #: Parts of scenes, which are no scene by themselves.
 _PARTS = ("two-finger-gripper",)
-
-
-@dataclass(frozen=True, slots=True)
-class Wiring:
-    """Signals of a gripper by their names in the IO image, "Group.Name".
-
-    Attributes:
-        open: output that opens it.
-        close: output that closes it.
-        is_open: input of the switch at the open end.
-        is_closed: input of the switch at the closed end: it is closed, with nothing between the fingers.
-    """
-
-    open: str = "MediaFlange.OutputX3Pin1"
-    close: str = "MediaFlange.OutputX3Pin2"
-    is_open: str = "MediaFlange.InputX3Pin3"
-    is_closed: str = "MediaFlange.InputX3Pin4"
-
-    @staticmethod
-    def of(text: str) -> Wiring:
-        """A wiring from "open=Group.Name close=Group.Name ..."; signals that are not named keep their default.
-
-        Raises:
-            ValueError: the text names something else.
-        """
-        pairs = [part.partition("=") for part in text.split()]
-        if not all(name in Wiring.__slots__ and signal for name, _, signal in pairs):
-            raise ValueError(
-                f"signals of a gripper must be NAME=Group.Signal with the names {', '.join(Wiring.__slots__)}, "
-                f"got {text!r}"
-            )
-        return Wiring(**{name: signal for name, _, signal in pairs})
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,13 +156,13 @@ class Scene:
         return None if found is None else Pose.of(found.pos, np.roll(found.quat, -1))
 
     @property
-    def wiring(self) -> Wiring:
+    def wiring(self) -> GripperWiring:
         """Signals of its gripper.
 
         Raises:
             ValueError: the text `gripper` of the scene names something else.
         """
-        return Wiring.of(" ".join(text.data for text in self.read().texts if text.name == GRIPPER))
+        return GripperWiring.of(" ".join(text.data for text in self.read().texts if text.name == GRIPPER))
 
 
 def _check_numbers(file: Path) -> None:
