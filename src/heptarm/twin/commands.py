@@ -51,7 +51,7 @@ _LOADS = (wire.FriCommandMode.TORQUE, wire.FriCommandMode.WRENCH)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Session:
+class RecordedSession:
     """An FRI session whose client superposed a load.
 
     Attributes:
@@ -83,7 +83,7 @@ class Section:
     until: float
     start: Array
     program: wire.Run | None = None
-    session: Session | None = None
+    session: RecordedSession | None = None
     stream: Trajectory | None = None
     mode: wire.Mode | None = None
 
@@ -244,7 +244,7 @@ def _stream(
     """A section of set-points: of a stream of targets, an FRI session, another client, or one that began before."""
     name = "" if request is None else request.name
     mode: wire.Mode | None = None
-    session: Session | None = None
+    session: RecordedSession | None = None
     t, q = run.t, run["q" if measured else "q_cmd"]
     if request is not None and name == "ServoOpen":
         mode = restored(request.content, wire.ServoOpen).mode
@@ -254,7 +254,7 @@ def _stream(
         if opened.command in _LOADS:
             sent = [one for one in FriCommands.of(run) if motion.begin <= one.begin <= until]
             if sent and sent[0].is_answered.any():
-                session = Session(opened, sent[0])
+                session = RecordedSession(opened, sent[0])
             else:
                 notes.append(
                     f"motion {motion.id}: the {opened.command.name.lower()} that its FRI client superposed is left "

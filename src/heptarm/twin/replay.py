@@ -20,7 +20,7 @@ from heptarm.arm.translate.modes import mode_message, read_mode
 from heptarm.errors import CommandRejected, HeptarmError, MotionError
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.record.recording import Recording, load
-from heptarm.twin.commands import Commands, RepeatedStep, Section, Session, commands_of
+from heptarm.twin.commands import Commands, RepeatedStep, Section, RecordedSession, commands_of
 from heptarm.twin.comparison import (
     SETTLE,
     Repetition,
@@ -294,7 +294,7 @@ class _Run:
         self._numbers[section.motion.id] = number
         self.repetitions.append(Repetition(section, number, refusal))
 
-    def _answer(self, section: Section, session: Session) -> None:
+    def _answer(self, section: Section, session: RecordedSession) -> None:
         """Repeat what an FRI client superposed, by an FRI client."""
         self._wait_for_rest()
         self._approach(section)
