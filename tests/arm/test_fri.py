@@ -410,7 +410,7 @@ def test_a_block_whose_end_got_no_answer_is_left_all_the_same(
 ) -> None:
     home, request = arm.state.q, arm.connection.request
 
-    def unanswered(message: object, *rest: Any) -> Any:
+    def unanswered(message: Any, *rest: Any) -> Any:
         if isinstance(message, wire.FriClose):
             raise ha.Timeout("no answer")
         return request(message, *rest)

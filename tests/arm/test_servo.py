@@ -320,7 +320,7 @@ def test_a_block_whose_end_got_no_answer_is_left_all_the_same(
     """The motion of the block runs on until the watchdog time ends it; `move` is not refused as inside the block."""
     home, request = arm.state.q, arm.connection.request
 
-    def unanswered(message: object, *rest: Any) -> Any:
+    def unanswered(message: Any, *rest: Any) -> Any:
         if isinstance(message, wire.Cancel):
             raise ha.Timeout("no answer")
         return request(message, *rest)

@@ -20,7 +20,7 @@ from heptarm.arm.translate.modes import mode_message, read_mode
 from heptarm.errors import CommandRejected, HeptarmError, MotionError
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.record.recording import Recording, load
-from heptarm.twin.commands import Commands, RepeatedStep, Section, RecordedSession, commands_of
+from heptarm.twin.commands import Commands, RecordedSession, RepeatedStep, Section, commands_of
 from heptarm.twin.comparison import (
     SETTLE,
     Repetition,
