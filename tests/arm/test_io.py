@@ -85,6 +85,7 @@ def test_what_cannot_be_written_is_refused(arm: ha.Arm) -> None:
         with pytest.raises(kind, match=words):
             arm.io.set({"OutputX3Pin11": True, name: value})  # type: ignore[dict-item]
     assert "Cell.Level" in arm.io and "lamp" not in arm.io
+    assert arm.io.get("lamp") is None and arm.io.get("lamp", 0) == 0
     with pytest.raises(ha.ShapeError):
         arm.io.set({})
     with pytest.raises(ha.CommandRejected, match="led must be one of .*got 'green'"):

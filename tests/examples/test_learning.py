@@ -13,10 +13,12 @@ import pytest
 FOLDER = Path(__file__).parents[2] / "examples" / "learning"
 #: Each file, what it needs, and how little it learns here.
 LIBRARIES = {"with_sb3": ("stable_baselines3", 300), "with_skrl": ("skrl", 40), "with_rsl_rl": ("rsl_rl", 2)}
+#: Those that tests/rl/test_jobs.py runs.
+SCRIPTS = ("pick_place",)
 
 
 def test_every_example_is_known() -> None:
-    assert {file.stem for file in FOLDER.glob("*.py")} == set(LIBRARIES)
+    assert {file.stem for file in FOLDER.glob("*.py")} == {*LIBRARIES, *SCRIPTS}
 
 
 @pytest.mark.long

@@ -23,6 +23,7 @@ def test_by_full_name_by_part_and_as_attribute() -> None:
         _ = SEEN.lamp
     assert "Cell.Level" in error.value.hint
     assert "user_button" in SEEN and "lamp" not in SEEN and 3 not in SEEN
+    assert SEEN.get("lamp", 0.5) == 0.5 and SEEN.get("user_button") is SEEN["user_button"]
 
 
 def test_a_value_of_a_state() -> None:

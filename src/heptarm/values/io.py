@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import ItemsView, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.checks import Value, shown
@@ -69,14 +69,6 @@ def find_name(name: str, names: Sequence[str]) -> int:
     )
 
 
-def is_name(name: object, names: Sequence[str]) -> bool:
-    """Whether `find_name` finds a name."""
-    try:
-        return isinstance(name, str) and find_name(name, names) >= 0
-    except CommandRejected:
-        return False
-
-
 def find_signal(name: str, signals: Sequence[Signal]) -> Signal:
     """A signal by its name, as `find_name` finds it.
 
@@ -90,7 +82,25 @@ def _plain(name: str) -> str:
     return name.replace("_", "").casefold()
 
 
-class SignalValues(Mapping[str, SignalValue]):
+class BySignalName(Mapping[str, SignalValue]):
+    """A mapping whose names are found as `find_name` finds them, so that `[]` refuses an unknown one with advice."""
+
+    __slots__ = ()
+
+    def __contains__(self, name: object) -> bool:
+        """Whether one signal has that name."""
+        try:
+            return isinstance(name, str) and find_name(name, tuple(self)) >= 0
+        except CommandRejected:
+            return False
+
+    def get(self, name: str, default: Any = None, /) -> Any:
+        """Value of a signal, or the default where none has that name."""
+        is_known = name in self
+        return self[name] if is_known else default
+
+
+class SignalValues(BySignalName):
     """Values of all signals: `values["MediaFlange.UserButton"]`, or `values.user_button` where that is unique.
 
     Args:
@@ -108,10 +118,6 @@ class SignalValues(Mapping[str, SignalValue]):
         """Value of a signal. Raises CommandRejected as `find_name` does."""
         names = tuple(self._values)
         return self._values[names[find_name(name, names)]]
-
-    def __contains__(self, name: object) -> bool:
-        """Whether one signal has that name."""
-        return is_name(name, tuple(self._values))
 
     def __getattr__(self, name: str) -> SignalValue:
         """Value of a signal."""

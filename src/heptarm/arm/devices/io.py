@@ -8,7 +8,7 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.triggers import output_message
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.checks import finite, shown, within, word
-from heptarm.values.io import Signal, SignalValue, SignalValues, find_name, is_name
+from heptarm.values.io import BySignalName, Signal, SignalValue, SignalValues, find_name
 from heptarm.values.sealed import Sealed
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
@@ -21,7 +21,7 @@ _LAMPS = {"red": "LEDRed", "green": "LEDGreen", "blue": "LEDBlue"}
 _COLOURS = (*_LAMPS, "off")
 
 
-class Io(Sealed, Mapping[str, SignalValue]):
+class Io(Sealed, BySignalName):
     """The cabinet's signals; `arm.io`.
 
     A name is "Group.Name", or the part after a point if only one signal has it; case and underscores do not matter:
@@ -43,10 +43,6 @@ class Io(Sealed, Mapping[str, SignalValue]):
     def __len__(self) -> int:
         """Number of signals."""
         return len(self._connection.signals)
-
-    def __contains__(self, name: object) -> bool:
-        """Whether one signal has that name."""
-        return is_name(name, tuple(self))
 
     def __repr__(self) -> str:
         """Short form: the names of the signals; `print(arm.io.values_now)` shows their values."""
