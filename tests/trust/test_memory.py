@@ -31,7 +31,7 @@ def test_calls_from_java_to_python_leave_nothing_behind() -> None:
         before = cabinet.stats()["memory"]
         call()
         after = cabinet.stats()["memory"]
-    assert after["types"] == before["types"]
+    assert after["types"] <= before["types"]  # those that nobody uses are freed at any time
     assert after["objects"] - before["objects"] < 50
     assert after["java_threads"] <= before["java_threads"]
 
