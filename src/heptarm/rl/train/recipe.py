@@ -6,7 +6,6 @@ from dataclasses import KW_ONLY, asdict, dataclass, field
 from typing import Any
 
 from heptarm.errors import LimitError
-from heptarm.rl.contact.insertion import InsertTask
 from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.task import ReachTask
@@ -15,8 +14,8 @@ from heptarm.rl.train import ppo
 
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
-#: Likewise of a task with contacts, and of an insertion.
-_CONTACT_STEPS, _INSERT_STEPS = 1_200_000, 600_000
+#: Likewise of a task with contacts.
+_CONTACT_STEPS = 1_200_000
 #: Names of settings in checkpoints that were made before the settings had the names of the literature.
 _OLDER = {
     "rate": "learning_rate",
@@ -32,8 +31,6 @@ _OLDER = {
 #: beginning: the teacher has shown what to try.
 LATE = Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0))
 TAUGHT = 100_000
-#: A part is in its hole after a few seconds; an episode of training lasts so long [s].
-INSERTED = 4.5
 CONTACT_SETTINGS = ppo.PpoSettings(
     envs=256,
     horizon=16,
@@ -58,8 +55,6 @@ class Recipe:
         taught: of these steps so many, at the beginning, imitate the task's teacher; then rewards take over. Only tasks
             with a teacher, see `ContactTask.teach`.
         seed: of networks, simulation and shuffling.
-        episode: decisions of an episode in training; 0: those of the task. Shorter ones spend no time on what comes
-            after a success.
         randomisation: what differs between the simulated robots.
         settings: numbers of the algorithm.
     """
@@ -69,13 +64,13 @@ class Recipe:
     steps: int = 0
     taught: int = 0
     seed: int = 0
-    episode: int = 0
     randomisation: Randomisation = STRONG
     settings: ppo.PpoSettings = field(default_factory=ppo.PpoSettings)
 
     def __post_init__(self) -> None:
         if self.steps == 0:
-            object.__setattr__(self, "steps", _enough(self.task))
+            enough = _CONTACT_STEPS if isinstance(self.task, ContactTask) else STEPS[self.task.feature]
+            object.__setattr__(self, "steps", enough)
         if self.steps < 1:
             raise LimitError(f"steps must be at least 1, got {self.steps}", code=2, parameter="steps")
         if self.taught and not self.task.has_teacher:
@@ -84,8 +79,6 @@ class Recipe:
                 code=2,
                 parameter="taught",
             )
-        if self.episode < 0:
-            raise LimitError(f"episode must be 0 or more, got {self.episode}", code=2, parameter="episode")
         if self.seed < 0:
             raise LimitError(f"seed must be 0 or more, got {self.seed}", code=2, parameter="seed")
 
@@ -100,15 +93,7 @@ class Recipe:
         """The settings that suit a task."""
         if isinstance(task, ContactTask):
             taught = TAUGHT if task.has_teacher else 0
-            episode = min(round(INSERTED * task.rate), task.steps) if isinstance(task, InsertTask) else 0
-            return cls(
-                task,
-                taught=taught,
-                seed=seed,
-                episode=episode,
-                randomisation=LATE,
-                settings=CONTACT_SETTINGS,
-            )
+            return cls(task, taught=taught, seed=seed, randomisation=LATE, settings=CONTACT_SETTINGS)
         return cls(task, seed=seed)
 
     def as_dict(self) -> dict[str, Any]:
@@ -125,13 +110,6 @@ class Recipe:
             **{_OLDER.get(k, k): _tuple(v) for k, v in given["settings"].items()}
         )
         return cls(**given)
-
-
-def _enough(task: Task) -> int:
-    """Environment steps after which a policy of a task is good."""
-    if isinstance(task, ContactTask):
-        return _INSERT_STEPS if isinstance(task, InsertTask) else _CONTACT_STEPS
-    return STEPS[task.feature]
 
 
 def _tuple(value: Any) -> Any:

@@ -137,7 +137,7 @@ class Training:
             threads=threads if team.device.type == "cpu" else 1,
         )
         self.arms = simulate(
-            replace(task, steps=recipe.episode or task.steps),
+            task,
             BatchSettings(
                 envs=settings.envs, randomisation=recipe.randomisation, seed=seeds, threads=threads
             ),
