@@ -26,7 +26,7 @@ from heptarm.values.checks import Array
 from heptarm.values.mode.mode import Mode
 from heptarm.when import path
 from heptarm.wire import messages as wire
-from tests.conftest import RunningCabinet
+from tests.conftest import RunningCabinet, start_cabinet
 from tests.long import few, longer
 from tests.retry import retry
 
@@ -143,9 +143,15 @@ SUPERPOSED: list[tuple[Literal["torque", "wrench"], Mode, Callable[..., None], s
 ]
 
 
+@pytest.fixture(scope="module")
+def slow() -> Iterator[RunningCabinet]:
+    """A virtual cabinet that gives answers four times the time: one that comes late is another command to both runs."""
+    yield from start_cabinet(0.25)
+
+
 @pytest.mark.parametrize(("kind", "mode", "law", "sent"), few(SUPERPOSED))
 def test_what_an_fri_client_superposes_is_superposed_again(
-    cabinet: RunningCabinet,
+    slow: RunningCabinet,
     tmp_path: Path,
     kind: Literal["torque", "wrench"],
     mode: Mode,
@@ -156,14 +162,14 @@ def test_what_an_fri_client_superposes_is_superposed_again(
     file = tmp_path / "fri.mcap"
 
     def attempt() -> ha.Twin:
-        with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0, state_rate=250) as arm:
+        with ha.connect(slow.target, watchdog=5.0, timeout=30.0, state_rate=250) as arm:
             arm.move(ha.ptp(HOME))
             recorder = arm.record(file, overwrite=True)
             with recorder, arm.fri(kind, period_ms=5, mode=mode, law=law) as session:
                 while session.active and session.state.t < longer(0.6, 2.0):
                     session.wait(0.05)
             arm.wait_for_rest()
-        return ha.replay_in_sim(file, target=cabinet.target, bands={"q": 2e-3, "q_cmd": 2e-3})
+        return ha.replay_in_sim(file, target=slow.target, bands={"q": 2e-3, "q_cmd": 2e-3})
 
     twin = retry(attempt, missed)
     run = twin.recorded
@@ -175,7 +181,7 @@ def test_what_an_fri_client_superposes_is_superposed_again(
     blind = {name: values for name, values in run.signals.items() if not name.startswith("fri.")}
     (note,) = commands_of(replace(run, signals=blind)).notes
     assert f"the {kind} that its FRI client superposed is left out: the recording has no cycles" in note
-    other = ha.replay_in_sim(run, target=cabinet.target, mode=ha.modes.Position())
+    other = ha.replay_in_sim(run, target=slow.target, mode=ha.modes.Position())
     assert "overlay needs" in other.motions[0].refusal and not other.is_alike
 
 
