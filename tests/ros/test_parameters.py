@@ -80,8 +80,8 @@ def test_twists_of_a_topic_follow_the_posture(cabinet: RunningCabinet) -> None:
         start = arm.state
         servo = configuration.servo
         with pytest.raises(LimitError, match="A1 must be in"):
-            TargetStream(arm, posture=np.full(7, 3.0), timeout=2.0, options=servo)
-        stream = TargetStream(arm, posture=configuration.posture, timeout=2.0, options=servo)
+            TargetStream(arm, posture=np.full(7, 3.0), timeout=2.0, options=servo, shortest=0.13)
+        stream = TargetStream(arm, posture=configuration.posture, timeout=2.0, options=servo, shortest=0.13)
         deadline = time.monotonic() + 60.0
         while abs(arm.state.q[2] + 0.5) > 0.05 and time.monotonic() < deadline:
             stream.twist(np.zeros(6))

@@ -14,7 +14,7 @@ from heptarm.ros.trajectory.point_stream import PointStream, is_streamed
 from heptarm.ros.trajectory.runner import MeasuredJoints, TrajectoryRunner
 from heptarm.ros.trajectory.send_times import PublishInfo, SendTimes
 from heptarm.ros.trajectory.trajectory import KinematicState
-from heptarm.sim.controller.servo import DirectFollower, ServoLimits
+from heptarm.sim.controller.servo import DirectFollower, ServoLimits, SmartFollower
 from heptarm.values.robot import robot
 from tests.long import few
 
@@ -110,6 +110,35 @@ def test_late_and_lost_points_hardly_show_where_the_sender_counts(rate: int, cou
     assert np.abs(np.convolve(ratios, np.ones(40) / 40.0, "valid") - 1.0).max() < 0.02
 
 
+SWING = 0.3, 3.0  # amplitude [rad] and time [s]
+
+
+def swing(time: np.ndarray) -> np.ndarray:
+    """Joint positions of a stream, and those that the arm should have: a cosine from rest to rest [rad]."""
+    amplitude, seconds = SWING
+    return np.asarray(amplitude * (0.5 - 0.5 * np.cos(np.pi * np.clip(time / seconds, 0.0, 1.0))))
+
+
+def held_up(rng: np.random.Generator, came: np.ndarray) -> np.ndarray:
+    """Times at which a receiver that is held up for 30 ms at a time sees the messages that came."""
+    for begin in rng.uniform(10.0, 13.0, 12):
+        held = (came > begin) & (came < begin + 0.03)
+        came[held] = begin + 0.03
+    return came
+
+
+def error_of_the_speed(path: list[float]) -> float:
+    """Largest deviation of the speed over 0.05 s from that of a swing with the lag of the path, of its peak."""
+    amplitude, seconds = SWING
+    moved = np.array(path[50:]) - np.array(path[:-50])
+    times = 1e-3 * np.arange(len(path))
+    middle = slice(900, 2700)
+    wanted = [swing(times - lag) for lag in np.arange(-0.05, 0.15, 0.001)]
+    best = min(wanted, key=lambda track: float(((track - np.array(path))[middle] ** 2).sum()))
+    error = (moved - (best[50:] - best[:-50]))[middle]
+    return float(np.abs(error).max() / 0.05 / (0.5 * np.pi * amplitude / seconds))
+
+
 @pytest.mark.parametrize(
     ("rate", "declared"), few([(50, 0.01), (50, 0.02), (100, 0.1), (250, 0.004), (250, 0.02)])
 )
@@ -118,24 +147,13 @@ def test_the_arm_follows_single_points_on_a_busy_machine(rate: int, declared: fl
 
     The speed over 0.05 s deviates by 15 % of its peak at most.
     """
-    rng, seconds, amplitude = np.random.default_rng(8), 3.0, 0.3
-
-    def swing(time: np.ndarray) -> np.ndarray:
-        return np.asarray(amplitude * (0.5 - 0.5 * np.cos(np.pi * np.clip(time / seconds, 0.0, 1.0))))
-
-    came = np.maximum.accumulate(arrivals(rng, 1.0 / rate, round(seconds * rate)))
-    for begin in rng.uniform(10.0, 13.0, 12):
-        held = (came > begin) & (came < begin + 0.03)
-        came[held] = begin + 0.03
+    rng = np.random.default_rng(8)
+    came = held_up(rng, arrivals(rng, 1.0 / rate, round(SWING[1] * rate)))
     seen = [int(k) for k in np.flatnonzero(np.diff(came, append=np.inf) > 1e-4)]
     ticks = np.unique(arrivals(rng, 0.01, 350))
     options, configuration = NodeConfiguration.of({}).servo, NodeConfiguration.of({})
     runner = TrajectoryRunner(configuration.joints, ARM, configuration.settings)
-    timing = ServoTiming(min_trajectory_time=options.horizon)
-    full = (1.0,) * 7
-    cabinet = DirectFollower(
-        ServoLimits.of(ARM, velocity=full, acceleration=full, timing=timing), np.zeros(7)
-    )
+    cabinet = DirectFollower(servo_limits(options.horizon), np.zeros(7))
     path: list[float] = []
     for when, k in sorted([(float(came[k]), k) for k in seen] + [(float(tick), -1) for tick in ticks]):
         while 10.0 + 1e-3 * len(path) < when:
@@ -148,14 +166,30 @@ def test_the_arm_follows_single_points_on_a_busy_machine(rate: int, declared: fl
             point = TrajectoryPoint(declared, (0.0,) * 6 + (float(swing(np.array((k + 1) / rate))),))
             goal = TrajectoryGoal(configuration.joints, (point,), from_topic=True, sent=PublishInfo(number=k))
             runner.accept(goal, now=when, state=state)
-    moved = np.array(path[50:]) - np.array(path[:-50])
-    times = 1e-3 * np.arange(len(path))
-    lags = np.arange(-0.05, 0.15, 0.001)
-    middle = slice(900, 2700)
-    wanted = [swing(times - lag) for lag in lags]
-    best = min(wanted, key=lambda track: float(((track - np.array(path))[middle] ** 2).sum()))
-    error = (moved - (best[50:] - best[:-50]))[middle]
-    assert np.abs(error).max() / 0.05 < 0.15 * 0.5 * np.pi * amplitude / seconds
+    assert error_of_the_speed(path) < 0.15
+
+
+@pytest.mark.parametrize(("rate", "busy"), few([(100, True), (50, True), (250, True), (50, False)]))
+def test_the_arm_follows_servo_targets_without_velocities_on_a_busy_machine(rate: int, busy: bool) -> None:
+    """They come late by milliseconds, and held up for 10 to 50 ms: on a simulated clock, as the test above."""
+    rng, count = np.random.default_rng(8), round(SWING[1] * rate)
+    came = arrivals(rng, 1.0 / rate, count) if busy else 10.0 + np.arange(count) / rate
+    shortest = NodeConfiguration.of({}).values["servo.min_trajectory_time"]
+    cabinet = SmartFollower(servo_limits(shortest), np.zeros(7))
+    path: list[float] = []
+    for k in np.flatnonzero(np.diff(came, append=np.inf) > 1e-4):
+        while 10.0 + 1e-3 * len(path) < came[k]:
+            path.append(float(cabinet.advance(1e-3)[6]))
+        cabinet.aim(swing(np.array((k + 1) / rate)) * np.eye(7)[6])
+    assert error_of_the_speed(path) < (0.15 if busy else 0.05)
+
+
+def servo_limits(shortest: float) -> ServoLimits:
+    """Those of a servo motion of a node, with a shortest trajectory to a target [s]."""
+    options = NodeConfiguration.of({}).servo
+    speed, acceleration = (options.speed,) * 7, (options.acceleration,) * 7
+    timing = ServoTiming(min_trajectory_time=shortest)
+    return ServoLimits.of(ARM, velocity=speed, acceleration=acceleration, timing=timing)
 
 
 def test_a_pause_between_two_streams_is_no_jitter_of_the_second() -> None:

@@ -14,6 +14,10 @@ from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm_ros1 import convert
+from heptarm_ros1.newest import NewestMessage
+
+#: Messages of a topic without numbers that are counted in one burst.
+_BURST = 1000
 
 
 class Commands:
@@ -24,34 +28,51 @@ class Commands:
         for package in table.missing:
             rospy.logwarn(f"{package} is not installed: topics and services with its types are left out")
         topics, requests = TopicDispatcher(context), ServiceDispatcher(context)
-        self._subscribers = [_subscriber(topics, row) for row in table.topics]
+        self._subscribers = [_Subscriber(topics, row) for row in table.topics]
         self._services = [_service(requests, row) for row in table.services]
 
     def destroy(self) -> None:
         """Destroy subscribers and services."""
         for subscriber in self._subscribers:
-            subscriber.unregister()
+            subscriber.end()
         for service in self._services:
             service.shutdown("the node was cleaned up")
 
 
-def _subscriber(topics: TopicDispatcher, row: Topic) -> rospy.Subscriber:
-    name = convert.name(row.name)
+class _Subscriber:
+    """Passes the messages of a topic to its handler.
 
-    def callback(message: Any) -> None:
+    Args:
+        topics: handles them.
+        row: of the topic.
+    """
+
+    def __init__(self, topics: TopicDispatcher, row: Topic) -> None:
+        self._topics, self._row, self._name = topics, row, convert.name(row.name)
+        kind = class_of(row.type, "msg")
+        self._newest: NewestMessage | None = None
+        take, depth = self._on_message, row.depth
+        if row.counted and "header" not in kind.__slots__:
+            self._newest = NewestMessage(self._name, self._handle)
+            take, depth = self._newest.put, _BURST
+        self._subscriber = rospy.Subscriber(self._name, kind, take, queue_size=depth, tcp_nodelay=True)
+
+    def end(self) -> None:
+        """Handle no more messages."""
+        self._subscriber.unregister()
+        if self._newest is not None:
+            self._newest.end()
+
+    def _on_message(self, message: Any) -> None:
+        header = getattr(message, "header", None)
+        self._handle(message, None if header is None else header.seq)
+
+    def _handle(self, message: Any, number: int | None) -> None:
+        """Handle a message; ROS 1 numbers those with a header."""
         try:
-            topics.handle(row, message, _sent(message))
+            self._topics.handle(self._row, message, PublishInfo(number=number))
         except HeptarmError as error:
-            rospy.logwarn_throttle(1.0, f"{name}: {error}")
-
-    kind = class_of(row.type, "msg")
-    return rospy.Subscriber(name, kind, callback, queue_size=row.depth, tcp_nodelay=True)
-
-
-def _sent(message: Any) -> PublishInfo:
-    """As which message of its publisher it was published: ROS 1 numbers those with a header."""
-    header = getattr(message, "header", None)
-    return PublishInfo() if header is None else PublishInfo(number=header.seq)
+            rospy.logwarn_throttle(1.0, f"{self._name}: {error}")
 
 
 def _service(requests: ServiceDispatcher, row: Service) -> rospy.Service:

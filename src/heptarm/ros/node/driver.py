@@ -139,6 +139,7 @@ class Driver:
             self._arm,
             timeout=values["command_timeout"],
             options=configuration.servo,
+            shortest=values["servo.min_trajectory_time"],
             line_speed=values["servo.line_speed"],
             turn_speed=values["servo.turn_speed"],
             elbow=values["servo.elbow"],

@@ -171,6 +171,14 @@ PARAMETERS = (
         1.0,
     ),
     Parameter(
+        "servo.min_trajectory_time",
+        0.13,
+        "shortest trajectory to a target without a velocity on servo/joint and servo/pose: shorter gaps between messages "
+        "do not show in the speed, and the arm lags by about two thirds of it [s]",
+        0.001,
+        1.0,
+    ),
+    Parameter(
         "servo.line_speed",
         0.25,
         "speed limit of servo/lin along each axis of the base, and of servo/twist [m/s]",

@@ -56,6 +56,8 @@ class TargetStream:
         arm: in control.
         timeout: the arm brakes if no target arrives for this time [s].
         options: speed and acceleration limits.
+        shortest: trajectory to a target without a velocity [s]: gaps between targets that are shorter do not show in
+            the speed of the arm, and it lags the more the longer this is.
         line_speed: along each axis of the base on straight lines, and of twists [m/s].
         turn_speed: of twists [rad/s].
         elbow: of twists and poses, see `Arm.servo`.
@@ -71,6 +73,7 @@ class TargetStream:
         *,
         timeout: float,
         options: ServoOptions,
+        shortest: float,
         line_speed: float = 0.25,
         turn_speed: float = 0.5,
         elbow: Elbow = "keep",
@@ -80,7 +83,7 @@ class TargetStream:
             arm.robot.check(posture, "posture")
         self._arm = arm
         self._timeout = timeout
-        self._options = options
+        self._options, self._shortest = options, shortest
         self._line_speed, self._turn_speed, self._elbow = line_speed, turn_speed, elbow
         self._posture = posture
         self._clock = RealClock()
@@ -123,7 +126,7 @@ class TargetStream:
         with self._lock:
             target = array(q, 7, "position")
             velocity = None if dq is None else array(dq, 7, "velocity")
-            servo = self._joint_servo(limits)
+            servo = self._joint_servo(limits, shortest=self._shortest if velocity is None else None)
             sent = servo.set(target, velocity)
             self._again = lambda: servo.set(target, velocity)
             self._path = None
@@ -245,9 +248,11 @@ class TargetStream:
                 if result is not None and result.cause is Cause.CONDITION:
                     self._blocked = "the guard" if result.stopped_by is None else str(result.stopped_by)
 
-    def _joint_servo(self, limits: StreamLimits | None = None) -> JointServo:
+    def _joint_servo(
+        self, limits: StreamLimits | None = None, *, shortest: float | None = None
+    ) -> JointServo:
         servo = self._servo
-        settings = self._settings_of("joint", limits)
+        settings = self._settings_of("joint", limits) | {"min_trajectory_time": shortest}
         if not isinstance(servo, JointServo) or not servo.active or self._opened != settings:
             self._prepare()
             servo = self._servo = self._arm.servo("joint", until=self._guard, **settings).__enter__()
@@ -275,6 +280,7 @@ class TargetStream:
             "mode": options.mode,
         }
         if kind == "pose":
+            settings["min_trajectory_time"] = self._shortest
             settings |= {"elbow": self._elbow} if self._posture is None else {"posture": self._posture}
         if kind != "lin":
             chosen = options if limits is None else limits
