@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -11,9 +14,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 
+import heptarm as ha
 from heptarm import Arm
 from heptarm.bridge.kst import serve_kst
 from heptarm.modes import CartesianImpedance
+from tests.conftest import RunningCabinet
 
 PATIENCE = 60.0
 HOME = [0.0, math.radians(30), 0.0, -math.pi / 2, 0.0, math.radians(60), 0.0]
@@ -58,11 +63,15 @@ class Program:
         self.connection.close()
 
 
-@pytest.fixture
-def program(arm: Arm) -> Iterator[Program]:
-    ended = threading.Event()
+def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as one:
         port: int = one.getsockname()[1]
+    return port
+
+
+@pytest.fixture
+def program(arm: Arm) -> Iterator[Program]:
+    ended, port = threading.Event(), free_port()
     thread = threading.Thread(target=serve_kst, args=(arm,), kwargs={"port": port, "ended": ended})
     thread.start()
     try:
@@ -198,3 +207,39 @@ def test_the_state_is_known_during_a_motion_and_its_program_may_go(program: Prog
     program.close()
     arm.wait_for_rest(timeout=PATIENCE)
     assert arm.state.q[0] < 1.0
+
+
+def test_a_bridge_that_stood_still_takes_control_again_unless_another_has_it(cabinet: RunningCabinet) -> None:
+    port = free_port()
+    command = [sys.executable, "-m", "heptarm", "bridge", "kst", f"--port={port}", f"--target={cabinet.target}"]
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as bridge,
+        ha.connect(cabinet.target, control=False, timeout=30.0) as other,
+    ):
+        assert bridge.stdout is not None
+        program = Program(port)
+
+        def stands_still() -> None:
+            bridge.send_signal(signal.SIGSTOP)
+            deadline = time.monotonic() + PATIENCE
+            while other.controller:
+                assert time.monotonic() < deadline, "the cabinet notices no silence"
+                time.sleep(0.05)
+
+        try:
+            program.done("jRelVel_0.5_", f"jp_{joined(HOME)}")
+            stands_still()
+            bridge.send_signal(signal.SIGCONT)
+            assert program.move("doPTPinJS") == "done", "it has taken control again"
+            stands_still()
+            other.take_control()
+            bridge.send_signal(signal.SIGCONT)
+            assert program.ask("doPTPinJS") == "nak"
+            other.release_control()
+            assert program.move("doPTPinJS") == "done"
+        finally:
+            program.close()
+            bridge.send_signal(signal.SIGCONT)
+            bridge.send_signal(signal.SIGINT)
+            said = bridge.stdout.read()
+    assert said.count("took it again") == 2 and "controls the robot" in said, said

@@ -17,6 +17,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.motion.servo import Servo
 from heptarm.errors import HeptarmError, NotReady, StaleState
+from heptarm.skills.control import keep_control
 from heptarm.values.checks import Array
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
@@ -52,6 +53,14 @@ class BridgedArm:
         self._again: Callable[[], object] | None = None
         self._ended = threading.Event()  # ends the thread that sends the newest target again
         self._fired: Condition | None = None
+
+    def keep_control(self) -> None:
+        """Take control again if it was lost and nobody else has taken it.
+
+        A machine that stands still for longer than the watchdog of the arm loses it: the arm brakes.
+        """
+        if keep_control(self.arm):
+            _log.warning("the bridge had lost control and took it again; the arm had been stopped")
 
     # ---------------------------------------------------------------------------------- motions
 

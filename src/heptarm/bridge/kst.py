@@ -101,6 +101,7 @@ class KstBridge:
         if text == "end":
             return False
         word = _word(text)
+        self._bridged.keep_control()
         try:
             values = [float(one) for one in text[len(word) :].split("_") if one]
             command = _COMMANDS.get(word)

@@ -129,6 +129,7 @@ class LibiiwaBridge:
             ConnectionLost: the cabinet cannot be reached.
         """
         self._interrupted = interrupted
+        self._bridged.keep_control()
         code, arguments = _code(request[0]), [float(value) for value in request[1:]]
         return [float(self._carry_out(code, arguments)), *self._state()]
 

@@ -38,6 +38,7 @@ from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.ros.trajectory.servo_execution import ServoExecution
 from heptarm.ros.trajectory.spline_execution import SplineExecution
 from heptarm.ros.trajectory.trajectory import TrajectorySample
+from heptarm.skills.control import keep_control
 from heptarm.values.checks import Array
 from heptarm.values.condition.collision import Collision
 from heptarm.values.condition.condition import Condition
@@ -352,8 +353,7 @@ class Driver:
 
     def _regain_control(self) -> None:
         """Take control again if it was lost during a short silence and no other client has taken it."""
-        if not self._arm.in_control and not self._arm.controller:
-            self._arm.take_control()
+        if keep_control(self._arm):
             _log.warning("took control again")
 
     # --------------------------------------------------------------------------------- commands
