@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from heptarm.errors import CommandRejected
+from heptarm.sim.runtime.application import missing_options
 from heptarm.sim.runtime.station import find_station, read_station, simulated_robot
 from heptarm.values.simulator_options import SimulatorOptions
 from tests.sim.station_setup import setup
@@ -50,6 +51,30 @@ def test_what_contradicts_the_project_is_said(tmp_path: Path) -> None:
     assert "has the flange touch" in notes[1] and "simulated is the flange plain" in notes[1]
     name, (note,) = chosen(tmp_path, setup("com.kuka/KR_Agilus", "KR6", None))
     assert name == "iiwa14" and "names no robot that heptarm knows" in note
+
+
+def test_options_of_a_project_that_its_cabinet_lacks_are_said(tmp_path: Path) -> None:
+    source = tmp_path / "src" / "Own.java"
+    source.parent.mkdir()
+    used = ("fastRobotInterface.FRISession", "motionModel.smartServoLIN.SmartServoLIN")
+    source.write_text(
+        "".join(f"import com.kuka.connectivity.{name};\n" for name in used)
+        + "// import com.kuka.connectivity.motionModel.directServo.DirectServo;\n"
+    )
+    items = {
+        "com.kuka.connectivity.smartServo": "1.17.0",
+        "com.kuka.connectivity.smartServoLIN": "1.15.0",
+        "com.kuka.connectivity.smartServoLIN.exampleApplications": "NONE",
+        "com.kuka.connectivity.fastRobotInterface": "NONE",
+        "com.kuka.connectivity.fastRobotInterface.clientSDK": "1.0",
+    }
+    (tmp_path / "StationSetup.cat").write_text(setup(software=items))
+    options = read_station(tmp_path / "StationSetup.cat").options
+    assert options == {"Smart Servo Motion Extension", "Smart Servo Linear Motion Extension"}
+    (note,) = missing_options(tmp_path)
+    assert '"Fast Robot Interface Extension"' in note and "StationSetup.cat" in note
+    (tmp_path / "StationSetup.cat").write_text(setup())
+    assert missing_options(tmp_path) == [], "a file that lists no software says nothing of options"
 
 
 def test_no_station_setup_is_an_iiwa_14(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from rich.markup import escape
 from heptarm.cli.output import emit
 from heptarm.cli.sim.child import Child, cabinet_command, first_line, relay_answers
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.sim.runtime.application import Application, Survey, find_projects, survey
+from heptarm.sim.runtime.application import Application, Survey, find_projects, missing_options, survey
 from heptarm.values.simulator_options import SimulatorOptions
 
 
@@ -81,8 +81,9 @@ def run(folder: Path, *, jars: tuple[Path, ...], seconds: float, as_json: bool) 
                     f"[{_STYLES[row.outcome]}]{row.outcome.value:8}[/] {name}: {row.name}{text}",
                     soft_wrap=True,
                 )
-        if found.hint and not as_json:
-            console.print(f"         {name}: {escape(found.hint)}", soft_wrap=True)
+        if not as_json:
+            for note in (*filter(None, [found.hint]), *missing_options(project)):
+                console.print(f"         {name}: {escape(note)}", soft_wrap=True)
     if as_json:
         emit(
             {

@@ -181,11 +181,11 @@ def _compiled(
     Raises:
         HeptarmError: it does not compile, or there is no such application.
     """
-    from heptarm.sim.runtime.application import compile_application, unused_addresses
+    from heptarm.sim.runtime.application import compile_application, missing_options, unused_addresses
 
     application = compile_application(folder, out, main=main, addresses=addresses, jars=jars)
     data_file = options.project or application.project
-    notes = [*application.left_out]
+    notes = [*application.left_out, *missing_options(folder)]
     for address in unused_addresses(folder, data_file, addresses):
         notes.append(
             f"--map: {address} is in no string of the sources and in no process data; where it comes from "

@@ -62,6 +62,14 @@ _OTHER_SYSTEMS = (
         "the project is for Sunrise.OS 2, whose packages differ: the virtual cabinet has 1.x",
     ),
 )
+#: What of Sunrise needs an option of the cabinet, and what that is called.
+_NEED_OPTIONS = (
+    (r"motionModel\.(smartServo\.|SmartServo\b|ISmartServoRuntime\b)", "Smart Servo Motion Extension"),
+    (r"motionModel\.(smartServoLIN\.|SmartServoLIN\b)", "Smart Servo Linear Motion Extension"),
+    (r"motionModel\.(directServo\.|DirectServo\b)", "Direct Servo Motion Extension"),
+    (r"connectivity\.(fri|fastRobotInterface)\.", "Fast Robot Interface Extension"),
+    (r"motionModel\.HandGuidingMotion\b|\bhandGuiding\(", "Hand-Guiding Support"),
+)
 #: javac reports the first 100 errors only, and none in method bodies after a wrong import.
 _EVERY_ERROR = ("-Xmaxerrs", "100000", "--should-stop=ifError=FLOW")
 _ERROR = re.compile(r"^(.+?\.java):(\d+): error: (.*)$")
@@ -189,6 +197,25 @@ def unused_addresses(folder: Path, data: Path | None, addresses: AddressMap) -> 
         if match[1]
     )
     return addresses.unused([*literals, read_source(data) if data is not None else ""])
+
+
+def missing_options(folder: Path) -> list[str]:
+    """What the project's sources use of options that its station setup does not install on the cabinet.
+
+    Raises:
+        CommandRejected: the station setup cannot be read.
+    """
+    file = _configuration(folder)[1]
+    installed = None if file is None else station.read_station(file).options
+    if installed is None:
+        return []
+    texts = [_without_comments(read_source(source)) for source in _sources(folder, "java")]
+    return [
+        f'the project uses the option "{title}", which its station setup does not install ({file}): the virtual cabinet '
+        "has it, the project's robot does not"
+        for pattern, title in _NEED_OPTIONS
+        if title not in installed and any(re.search(pattern, text) for text in texts)
+    ]
 
 
 def _modern(text: str, own: frozenset[str] = frozenset()) -> str:

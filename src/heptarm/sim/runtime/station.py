@@ -1,4 +1,7 @@
-"""A Sunrise project's StationSetup.cat: which robot the project is for, and which media flange it has."""
+"""A Sunrise project's StationSetup.cat: which robot the project is for, its media flange, the options of its cabinet.
+
+The safety configuration beside it, `SafetyConfiguration.sconf`, is binary and its format is not public: it is not read.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,17 @@ _DEFAULT = "iiwa14"
 _LBR = re.compile(r"LBR.*?_(7|14)(?:kg|_R8)", re.IGNORECASE)
 #: Names of a flange by Workbench's name of its machine data.
 _MACHINE_DATA = {"M0": "plain", "MFT": "touch"}
+#: Options of a cabinet by Workbench's names of their items, of Sunrise 1.5 and later: what they are called.
+_OPTIONS = (
+    (re.compile(r"smartServo(ApiExtension)?$", re.IGNORECASE), "Smart Servo Motion Extension"),
+    (re.compile(r"smartServoLIN(ApiExtension)?$", re.IGNORECASE), "Smart Servo Linear Motion Extension"),
+    (re.compile(r"directServo(ApiExtension)?$", re.IGNORECASE), "Direct Servo Motion Extension"),
+    (
+        re.compile(r"(connectivity\.fastRobotInterface|FastRobotInterfaceApiExtension)$", re.IGNORECASE),
+        "Fast Robot Interface Extension",
+    ),
+    (re.compile(r"HandGuidingFeature$"), "Hand-Guiding Support"),
+)
 #: So many folders above that of the project's data may have the station setup.
 _ABOVE = 2
 
@@ -32,12 +46,14 @@ class StationSetup:
         model: name of the robot without flange; "": one that heptarm does not know, or none.
         flange: its media flange; None: the file names none, or one whose height is not established.
         flange_title: Workbench's name of that flange; "": the file names none.
+        options: titles of the options that the cabinet has; None: the file lists no software.
     """
 
     file: Path
     model: str
     flange: Flange | None
     flange_title: str
+    options: frozenset[str] | None = None
 
 
 def find_station(place: Path) -> Path | None:
@@ -60,14 +76,26 @@ def read_station(file: Path) -> StationSetup:
     Raises:
         CommandRejected: the file cannot be read, or is not XML.
     """
-    for item in read_xml(file, "a station setup", name="project").iter("TopologyItem"):
+    tree = read_xml(file, "a station setup", name="project")
+    options = _options(tree)
+    for item in tree.iter("TopologyItem"):
         names = (item.get("itemPath", ""), item.get("name", ""))
         match = next((found for name in names if (found := _LBR.search(name))), None)
         if match is not None:
             kind = "med" if "med" in "".join(names).lower() else "iiwa"
             flange, title = _flange(item)
-            return StationSetup(file, f"{kind}{match[1]}", flange, title)
-    return StationSetup(file, "", None, "")
+            return StationSetup(file, f"{kind}{match[1]}", flange, title, options)
+    return StationSetup(file, "", None, "", options)
+
+
+def _options(tree: ElementTree.Element) -> frozenset[str] | None:
+    """Titles of the options that a station setup selects; None: it lists no software."""
+    items = list(tree.iter("SoftwareItem"))
+    selected = [
+        item.get("itemPath", "") for item in items if item.get("selectedVersion", "NONE") not in ("", "NONE")
+    ]
+    chosen = (title for pattern, title in _OPTIONS if any(pattern.search(path) for path in selected))
+    return frozenset(chosen) if items else None
 
 
 def _flange(item: ElementTree.Element) -> tuple[Flange | None, str]:
