@@ -211,7 +211,15 @@ def test_the_state_is_known_during_a_motion_and_its_program_may_go(program: Prog
 
 def test_a_bridge_that_stood_still_takes_control_again_unless_another_has_it(cabinet: RunningCabinet) -> None:
     port = free_port()
-    command = [sys.executable, "-m", "heptarm", "bridge", "kst", f"--port={port}", f"--target={cabinet.target}"]
+    command = [
+        sys.executable,
+        "-m",
+        "heptarm",
+        "bridge",
+        "kst",
+        f"--port={port}",
+        f"--target={cabinet.target}",
+    ]
     with (
         subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as bridge,
         ha.connect(cabinet.target, control=False, timeout=30.0) as other,

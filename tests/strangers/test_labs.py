@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import math
 import socket
 import struct
@@ -14,9 +15,12 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from heptarm import _resources
+from heptarm.errors import Timeout
+from heptarm.fri import Client, CommandMode
 from heptarm.sim.runtime import application, moved
 from tests.cli.running import run
 from tests.long import longer
@@ -25,7 +29,7 @@ pytestmark = pytest.mark.computing  # a compiler, and a program whose clock is t
 LABS = Path(__file__).parent / "labs"
 APPLICATIONS = (
     *("Motions", "BrakeCheck", "TaughtLine", "DataEditor", "BitOrders"),
-    *("Bridge", "TouchSweep", "LcmLikeBridge", "OldServer"),
+    *("Bridge", "TouchSweep", "LcmLikeBridge", "OldServer", "ServoInteraction"),
 )
 #: Largest deviation of a joint from its target [rad].
 MILLIRADIAN = 1e-3
@@ -46,6 +50,7 @@ ENDS = {
     "TouchSweep": (0.3, 0.4, 0.2, -1.3, 0.1, 1.0, 0.4),
     "LcmLikeBridge": LCM_TARGETS[-1],
     "OldServer": OLD_TARGETS[-1],
+    "ServoInteraction": (0.1, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0),
 }
 #: What else they report.
 SAID = (
@@ -56,6 +61,7 @@ SAID = (
     "BitOrders Done:BOOLEAN:1:false Step:UNSIGNED_INTEGER:4 2 true",
     "Bridge true",
     "TouchSweep true true true",
+    "ServoInteraction true true true true",
 )
 
 
@@ -126,32 +132,75 @@ def listen(pc: socket.socket, heard: list[tuple[float, ...]]) -> Callable[[Repor
     return until_it_ends
 
 
-def test_applications_of_other_labs_run_and_are_driven_to_a_milliradian(tmp_path: Path) -> None:
-    out, file = tmp_path / "classes", tmp_path / "report.txt"
-    compiled = application.survey(LABS, out)
-    assert compiled.failed == ()
-    medley = next(one for one in compiled.applications if one.main == "labs.Medley")
-    assert {f"labs.{name}" for name in APPLICATIONS} < {one.main for one in compiled.applications}
+@pytest.fixture(scope="module")
+def labs(tmp_path_factory: pytest.TempPathFactory) -> application.Survey:
+    return application.survey(LABS, tmp_path_factory.mktemp("labs"))
+
+
+def cabinet_of(main: str, labs: application.Survey, folder: Path, speed: str, **data: str | int) -> list[str]:
+    """The command of a virtual cabinet that runs an application with process data, whose dots are underscores here."""
+    one = next(one for one in labs.applications if one.main == main)
+    given = {name.replace("_", "."): value for name, value in data.items()}
+    numbers = "".join(
+        f'<processData dataType="java.lang.Integer" id="{name}" value="{value}"/>'
+        for name, value in given.items()
+        if isinstance(value, int)
+    )
+    project = folder / "RoboticsAPI.data.xml"
+    assert one.project is not None
+    text = one.project.read_text().replace("<processDataContainer>", f"<processDataContainer>{numbers}")
+    project.write_text(text)
+    command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--application", main]
+    command += ["--classpath", str(one.classes), "--speed", speed, "--project", str(project)]
+    command += ["--station", str(one.station)]
+    for name, value in given.items():
+        command += ["--data", f"{name}={value}"]
+    return command
+
+
+def test_an_fri_sample_runs_to_its_end_with_its_client(tmp_path: Path, labs: application.Survey) -> None:
+    """The client turns A7 by 0.05 rad, then commands no wrench."""
+    file = tmp_path / "report.txt"
+    with Client(0) as client:
+        data: dict[str, str | int] = {"lab_file": str(file), "lab_fri": client.port}
+        command = cabinet_of("labs.FriSine", labs, tmp_path, "1", **data)
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ) as cabinet:
+            start = client.wait("COMMANDING_ACTIVE", timeout=PATIENCE)
+            pushes = False
+            with contextlib.suppress(Timeout):
+                for state in client:
+                    if state.mode is CommandMode.WRENCH:
+                        pushes = True
+                        client.command(wrench=np.zeros(6))
+                    elif pushes:  # the application closes its session
+                        break
+                    elif state.is_commanding:
+                        turned = 0.05 * min(1.0, state.t - start.t)
+                        client.command(q=start.q_ipo + turned * np.eye(7)[6])
+            log = cabinet.communicate(timeout=PATIENCE)[0]
+    said, where = file.read_text().splitlines()
+    assert cabinet.returncode == 0 and said == "FriSine true true true", log
+    assert near(tuple(map(float, where.split()[1:])), (0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.1))
+
+
+def test_applications_of_other_labs_run_and_are_driven_to_a_milliradian(
+    tmp_path: Path, labs: application.Survey
+) -> None:
+    file = tmp_path / "report.txt"
+    assert labs.failed == ()
+    assert {f"labs.{name}" for name in APPLICATIONS} < {one.main for one in labs.applications}
     heard: list[tuple[float, ...]] = []
     failures: list[BaseException] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pc:
         pc.bind(("127.0.0.1", 0))
-        data = {
-            "lab.file": str(file),
-            "lab.applications": " ".join(APPLICATIONS),
-            "lab.port": str(pc.getsockname()[1]),
+        data: dict[str, str | int] = {
+            "lab_file": str(file),
+            "lab_applications": " ".join(APPLICATIONS),
+            "lab_port": int(pc.getsockname()[1]),
         }
-        project = tmp_path / "RoboticsAPI.data.xml"
-        port = f'<processData dataType="java.lang.Integer" id="lab.port" value="{data["lab.port"]}"/>'
-        assert medley.project is not None
-        project.write_text(
-            medley.project.read_text().replace("<processDataContainer>", f"<processDataContainer>{port}")
-        )
-        command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--application", "labs.Medley"]
-        command += ["--classpath", str(out), "--speed", SPEED, "--project", str(project)]
-        command += ["--station", str(medley.station)]
-        for name, value in data.items():
-            command += ["--data", f"{name}={value}"]
+        command = cabinet_of("labs.Medley", labs, tmp_path, SPEED, **data)
         with subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         ) as cabinet:

@@ -1,4 +1,4 @@
-"""Control that a short silence has cost: for programs that carry out the commands of others, and last longer than these."""
+"""Control that a short silence has cost: for programs that carry out the commands of others, one after the other."""
 
 from __future__ import annotations
 

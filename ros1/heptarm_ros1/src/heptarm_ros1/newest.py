@@ -25,7 +25,9 @@ class NewestMessage:
         self._newest: tuple[Any, int] | None = None
         self._count = 0
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name=f"heptarm{name.replace('/', '-')}", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, name=f"heptarm{name.replace('/', '-')}", daemon=True
+        )
         self._thread.start()
 
     def put(self, message: Any) -> None:

@@ -173,8 +173,8 @@ PARAMETERS = (
     Parameter(
         "servo.min_trajectory_time",
         0.13,
-        "shortest trajectory to a target without a velocity on servo/joint and servo/pose: shorter gaps between messages "
-        "do not show in the speed, and the arm lags by about two thirds of it [s]",
+        "shortest trajectory to a target without a velocity on servo/joint and servo/pose: shorter gaps between "
+        "messages do not show in the speed, and the arm lags by about two thirds of it [s]",
         0.001,
         1.0,
     ),

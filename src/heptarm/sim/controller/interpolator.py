@@ -655,8 +655,10 @@ class Interpolator:
     def _hold(self, run: RunningMotion) -> tuple[float, float]:
         """Wait for the end of a hold, or take the set-points of an FRI overlay."""
         is_hold = isinstance(run.plan.motion, Hold)
-        if self.action is not None and is_hold and not (run.cancelled or run.failure):
+        ends = run.cancelled or run.failure or run.time >= run.plan.duration
+        if self.action is not None and is_hold and not ends:
             run.phase = "overlaid"
+            run.time += self.step
             self._command.after = (
                 self._held(run) if self.action.is_missing else self._overlaid(run, self.action)
             )

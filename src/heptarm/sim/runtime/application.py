@@ -211,8 +211,8 @@ def missing_options(folder: Path) -> list[str]:
         return []
     texts = [_without_comments(read_source(source)) for source in _sources(folder, "java")]
     return [
-        f'the project uses the option "{title}", which its station setup does not install ({file}): the virtual cabinet '
-        "has it, the project's robot does not"
+        f'the project uses the option "{title}", which its station setup does not install ({file}): the virtual '
+        "cabinet has it, the project's robot does not"
         for pattern, title in _NEED_OPTIONS
         if title not in installed and any(re.search(pattern, text) for text in texts)
     ]
