@@ -24,7 +24,14 @@ from tests.simulators import FASTER
 if TYPE_CHECKING:
     from heptarm import Arm
 
-pytest_plugins = ["tests.forks", "tests.processes", "tests.hangs", "tests.retry", "tests.browser"]
+pytest_plugins = [
+    "tests.forks",
+    "tests.processes",
+    "tests.hangs",
+    "tests.retry",
+    "tests.browser",
+    "tests.doubled",
+]
 
 _LATE = ("slow", "browser")
 #: Folders with what takes long.

@@ -17,6 +17,7 @@ from typing import IO, Any, ClassVar
 from unittest.mock import patch
 
 import heptarm.cli
+from tests.doubled import check_lines
 from tests.forks import Forks, Popen
 from tests.interrupts import ctrl_c_interrupts
 from tests.long import LONG
@@ -60,7 +61,9 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]
                 raise
         return subprocess.CompletedProcess(process.args, process.returncode, *said)
 
-    return retry(attempt, silent)
+    done = retry(attempt, silent)
+    check_lines(done.stderr)
+    return done
 
 
 def refused(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -33,6 +33,7 @@ from heptarm.ros.trajectory.trajectory import KinematicState
 from tests.conformance import logs
 from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import ROOT, Stage
+from tests.doubled import check_lines
 
 #: Time limit of quick operations on a busy machine [s].
 PATIENCE = 120.0
@@ -150,7 +151,9 @@ class NodeProcess:
         if self.process.poll() is None:
             self.process.send_signal(number)
         try:
-            return self.process.wait(PATIENCE)
+            code = self.process.wait(PATIENCE)
+            check_lines(self.said)
+            return code
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -160,7 +163,9 @@ class NodeProcess:
 def call(name: str, kind: Any, /, **request: object) -> Any:
     """Call a service."""
     rospy.wait_for_service(name, PATIENCE)
-    return rospy.ServiceProxy(name, kind)(**request)
+    answer = rospy.ServiceProxy(name, kind)(**request)
+    check_lines(str(getattr(answer, "message", "")))
+    return answer
 
 
 #: What fills the lists of `collect`.

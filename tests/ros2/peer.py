@@ -38,6 +38,7 @@ from heptarm.ros.trajectory.trajectory import KinematicState
 from tests.conformance import logs
 from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import Stage
+from tests.doubled import check_lines
 
 #: Discovery can take some seconds, and a busy machine many more [s].
 PATIENCE = 120.0
@@ -117,6 +118,7 @@ class NodeProcess:
         code = self.end()
         print(self.said)
         assert code == 0, self.said
+        check_lines(self.said)
 
 
 class Ros:

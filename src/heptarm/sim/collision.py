@@ -335,7 +335,7 @@ class CollisionModel(Sealed):
                     f"{name} would be {-distance * 1e3:.0f} mm inside link_0, the base of the arm, which never moves",
                     parameter="at",
                     value=name,
-                    hint="give its pose in the base of the arm [m], or leave out the points on the arm itself",
+                    hint="give its pose in the base [m], or leave out the points on the arm itself",
                 )
 
     @_changes
