@@ -15,6 +15,8 @@ from heptarm.errors import HeptarmError
 
 #: What a text quotes, and how Python shows objects: it may well repeat itself.
 _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"|<[^<>]*>|\[[^\[\]]*\]")
+#: Lists of figures repeat themselves.
+_COUNTS = re.compile(r"\d").search
 #: So many words in a row are no chance.
 _MANY = 5
 _found: list[str] = []
@@ -37,9 +39,7 @@ def doubled(text: str) -> str:
     words = [word for clause in clauses for word in clause]
     runs = [" ".join(words[k : k + _MANY]) for k in range(len(words) - _MANY + 1)]
     again = (run for k, run in enumerate(runs) if run in runs[: max(0, k - _MANY + 1)])
-    return next(
-        (run for run in again if not any(letter.isdigit() for letter in run)), ""
-    )  # no list of figures
+    return next((run for run in again if not _COUNTS(run)), "")
 
 
 def check_lines(text: str) -> None:
