@@ -252,6 +252,8 @@ def test_a_folder_of_projects_is_surveyed_class_by_class(tmp_path: Path) -> None
         "{ }", '{ throw new IllegalStateException("no gripper"); }'
     )
     (sources / "Throws.java").write_text(begin + throws)
+    for name, field in (("Platform", "com.kuka.nav.robot.MobileRobot"), ("Newer", "com.kuka.geometry.Frame")):
+        (sources / f"{name}.java").write_text(f"package app; class {name} {{ {field} one; }}")
     found = run("check", "--projects", str(tmp_path / "lab"), "--run", str(longer(0, 60)))
     assert found.returncode == 1
     if longer(False, True):  # two cabinets
@@ -265,7 +267,13 @@ def test_a_folder_of_projects_is_surveyed_class_by_class(tmp_path: Path) -> None
     assert (
         "FlatBufferBuilder" not in found.stdout
     )  # what follows from the missing jar, and is none of Sunrise's
-    assert "0 of 1 projects compile wholly; 2 of 3 classes" in found.stdout
+    assert "0 of 1 projects compile wholly; 2 of 5 classes" in found.stdout
+    assert (
+        "a mobile platform (KMR, KMP): the virtual cabinet has the arm only; it would need a" in found.stdout
+    )
+    assert (
+        "for Sunrise.OS 2, whose packages differ: the virtual cabinet has 1.x; it would need" in found.stdout
+    )
 
 
 def test_names_of_older_releases_are_read_as_those_of_today() -> None:

@@ -156,8 +156,9 @@ def address(request: pytest.FixtureRequest) -> Iterator[str]:
 
 
 @pytest.mark.long
-def test_what_is_known_runs_and_the_rest_is_refused(address: str) -> None:
+def test_what_is_known_runs_and_the_rest_is_refused(address: str, caplog: pytest.LogCaptureFixture) -> None:
     with ha.connect(address, timeout=30.0, watchdog=5.0) as arm:
+        assert "never run on such a cabinet; it can: " in caplog.text and "sunrise2_preview" in caplog.text
         report = testing.run(arm, only=SCENARIOS, ask=lambda question: True)
         shown = {outcome.scenario.name for outcome in report.outcomes if outcome.verdict is Verdict.SHOWN}
         assert shown == set(SCENARIOS), [(o.scenario.name, o.text) for o in report.outcomes]

@@ -157,6 +157,11 @@ def connect(
             private.close()
         raise
     _log.info("connected to %s (%s), %s", chosen, arm.robot.title, "in control" if control else "observing")
+    if "sunrise2_preview" in arm.capabilities:
+        _log.warning(
+            "this cabinet has a preview for Sunrise 2.x, never run on such a cabinet; it can: %s",
+            ", ".join(arm.capabilities),
+        )
     return arm
 
 

@@ -9,12 +9,12 @@ import rospy
 from heptarm.errors import HeptarmError
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.newest_message import NewestMessage
 from heptarm.ros.interface.offered import offered
 from heptarm.ros.interface.service import Service, ServiceDispatcher
 from heptarm.ros.interface.topics import Topic, TopicDispatcher
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm_ros1 import convert
-from heptarm_ros1.newest import NewestMessage
 
 #: Messages of a topic without numbers that are counted in one burst.
 _BURST = 1000

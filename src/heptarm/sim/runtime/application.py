@@ -54,12 +54,14 @@ _CONSEQUENCE = ("method does not override or implement", "exception ")
 _OTHER_SYSTEMS = (
     (
         r"com\.kuka\.(nav|resource|kmpOmniMove|roboticsAPI\.deviceModel\.kmp|roboticsAPI\.motionModel\.kmp)\b",
-        "the project drives a mobile platform (KMR, KMP): the virtual cabinet has the arm only",
+        "the project drives a mobile platform (KMR, KMP): the virtual cabinet has the arm only; it would need a "
+        "simulated platform and doubles of com.kuka.nav",
     ),
     (
         r"com\.kuka\.(sensitivity|geometry|math|device|servoing|fri|scenegraph|threading|statistics|time|motion|condition|io|"
         r"handguiding|jogging|statuscontroller|med\.devicemodel|med\.cyclicbraketest)\b",
-        "the project is for Sunrise.OS 2, whose packages differ: the virtual cabinet has 1.x",
+        "the project is for Sunrise.OS 2, whose packages differ: the virtual cabinet has 1.x; it would need doubles of "
+        "those packages, whose behaviour is not public",
     ),
 )
 #: What of Sunrise needs an option of the cabinet, and what that is called.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from heptarm_ros1.newest import NewestMessage
+from heptarm.ros.interface.newest_message import NewestMessage
 
 
 def test_messages_that_come_together_are_all_counted_and_the_newest_is_handled() -> None:
