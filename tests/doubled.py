@@ -1,4 +1,4 @@
-"""No error says the same thing twice: a text that was put around another one, or the hint beside it, may repeat it.
+"""No error contains the same sentence twice: a text that was put around another one, or the hint, may repeat it.
 
 Every text of an error that a test provokes in this process is looked at, and every line that a node of ROS or a command
 of the command line prints in a test.
@@ -23,19 +23,19 @@ _found: list[str] = []
 
 
 def doubled(text: str) -> str:
-    """What a line says twice: a clause of two words and more, or five words in a row; "": nothing.
+    """What a line contains twice: a clause of two words and more, or five words in a row; "": nothing.
 
     Args:
         text: one line.
     """
     text = _QUOTED.sub("_", text.lower())
     clauses = [clause.split() for clause in re.split(r"[:;,.()]+(?:\s|$)|\s\(", text)]
-    said: set[str] = set()
+    before: set[str] = set()
     for clause in clauses:
         whole = " ".join(clause)
-        if len([word for word in clause if word.isalpha()]) > 1 and whole in said and not _COUNTS(whole):
+        if len([word for word in clause if word.isalpha()]) > 1 and whole in before and not _COUNTS(whole):
             return whole
-        said.add(whole)
+        before.add(whole)
     words = [word for clause in clauses for word in clause]
     runs = [" ".join(words[k : k + _MANY]) for k in range(len(words) - _MANY + 1)]
     again = (run for k, run in enumerate(runs) if run in runs[: max(0, k - _MANY + 1)])
@@ -46,10 +46,10 @@ def check_lines(text: str) -> None:
     """Check what a program has printed.
 
     Raises:
-        AssertionError: a line says something twice.
+        AssertionError: a line contains something twice.
     """
     for line in text.splitlines():
-        assert not doubled(line), f"{doubled(line)!r} is said twice: {line}"
+        assert not doubled(line), f"{doubled(line)!r} is there twice: {line}"
 
 
 def pytest_configure() -> None:
@@ -66,8 +66,8 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call() -> Generator[None, object, object]:
-    """Fail the test that has provoked a text which says something twice."""
+    """Fail the test that has provoked a text which repeats itself."""
     _found.clear()
     result = yield
-    assert not _found, f"an error says something twice: {_found[0]}"
+    assert not _found, f"an error repeats itself: {_found[0]}"
     return result

@@ -1,4 +1,4 @@
-"""The look for texts that say something twice finds them."""
+"""The look for texts that repeat themselves finds them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests import doubled
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "repeated"),
     [
         ("no connection: the cabinet is silent: the cabinet is silent (check the cable)", "the cabinet is silent"),
         ("refused since the arm is far away, and refused since the arm is far", "refused since the arm is"),
@@ -18,8 +18,8 @@ from tests import doubled
         ("error: error", ""),
     ],
 )  # fmt: skip
-def test_what_is_said_twice_is_found(text: str, said: str) -> None:
-    assert doubled.doubled(text) == said
+def test_what_is_repeated_is_found(text: str, repeated: str) -> None:
+    assert doubled.doubled(text) == repeated
 
 
 def test_an_error_of_this_process_is_looked_at() -> None:

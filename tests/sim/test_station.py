@@ -74,7 +74,7 @@ def test_options_of_a_project_that_its_cabinet_lacks_are_said(tmp_path: Path) ->
     (note,) = missing_options(tmp_path)
     assert '"Fast Robot Interface Extension"' in note and "StationSetup.cat" in note
     (tmp_path / "StationSetup.cat").write_text(setup())
-    assert missing_options(tmp_path) == [], "a file that lists no software says nothing of options"
+    assert missing_options(tmp_path) == [], "a file that lists no software leaves options open"
 
 
 def test_no_station_setup_is_an_iiwa_14(tmp_path: Path) -> None:

@@ -31,12 +31,12 @@ public class ServoInteraction extends RoboticsAPIApplication {
         JointPosition start = new JointPosition(0.1, 0.5, 0, -1.2, 0, 0.9, 0);
         lbr.move(ptp(start).setJointVelocityRel(0.5));
         boolean isValid = ServoMotion.validateForImpedanceMode(lbr);
-        boolean isSoft = smart(start);
+        boolean isCompliant = smart(start);
         boolean isStraight = straight();
         lbr.move(ptp(start).setJointVelocityRel(0.5));
         boolean isDirect = direct(start);
         lbr.move(ptp(start).setJointVelocityRel(0.5));
-        Report.line(getApplicationData(), "ServoInteraction " + isValid + " " + isSoft + " " + isStraight + " " + isDirect);
+        Report.line(getApplicationData(), "ServoInteraction " + isValid + " " + isCompliant + " " + isStraight + " " + isDirect);
         Report.joints(getApplicationData(), "ServoInteraction", lbr);
     }
 
