@@ -73,7 +73,7 @@ public final class ControlAuthority {
                         + controller.name() + " controls this robot: observe it with control=False");
             }
             throw new CommandRejected(Code.CONTROL_TAKEN, "controller", controller.name(), "",
-                    controller.name() + " (session " + controller.session() + ") controls this robot; wait until it releases control");
+                    controller.name() + " (session " + controller.session() + ") controls this robot");
         }
         boolean changed = controller == null;
         if (changed && executor.status().id == 0) {
