@@ -16,7 +16,7 @@ from typing import Any, Literal
 from heptarm.arm.arm import Arm
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.motion.servo import Servo
-from heptarm.errors import HeptarmError, NotReady, StaleState
+from heptarm.errors import HeptarmError, NotInControl, NotReady, StaleState
 from heptarm.skills.control import keep_control
 from heptarm.values.checks import Array
 from heptarm.values.condition.condition import Condition
@@ -54,13 +54,27 @@ class BridgedArm:
         self._ended = threading.Event()  # ends the thread that sends the newest target again
         self._fired: Condition | None = None
 
-    def keep_control(self) -> None:
-        """Take control again if it was lost and nobody else has taken it.
+    def in_control(self, carry_out: Callable[[], object]) -> None:
+        """Carry out a command of the program; take control again before, if it was lost and nobody else has taken it.
 
         A machine that stands still for longer than the watchdog of the arm loses it: the arm brakes.
+
+        Raises:
+            HeptarmError: refused; the text gives the reason.
         """
-        if keep_control(self.arm):
+        self._keep_control()
+        try:
+            carry_out()
+        except NotInControl:
+            if not self._keep_control():  # the loss was known before
+                raise
+            carry_out()
+
+    def _keep_control(self) -> bool:
+        is_taken = keep_control(self.arm)
+        if is_taken:
             _log.warning("the bridge had lost control and took it again; the arm had been stopped")
+        return is_taken
 
     # ---------------------------------------------------------------------------------- motions
 

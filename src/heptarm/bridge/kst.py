@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import reduce
+from functools import partial, reduce
 from operator import or_
 from types import MappingProxyType
 from typing import Any, Literal
@@ -101,7 +101,6 @@ class KstBridge:
         if text == "end":
             return False
         word = _word(text)
-        self._bridged.keep_control()
         try:
             values = [float(one) for one in text[len(word) :].split("_") if one]
             command = _COMMANDS.get(word)
@@ -109,7 +108,7 @@ class KstBridge:
                 raise CommandRejected(
                     f"line must be one of KST's commands, got {line[:40]!r}", parameter="line"
                 )
-            command(self, values)
+            self._bridged.in_control(partial(command, self, values))
         except ConnectionLost:
             raise
         except (HeptarmError, ValueError) as error:

@@ -16,7 +16,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, replace
-from functools import reduce
+from functools import partial, reduce
 from math import isfinite, isnan, nan, pi, radians
 from operator import or_
 from types import MappingProxyType
@@ -129,7 +129,6 @@ class LibiiwaBridge:
             ConnectionLost: the cabinet cannot be reached.
         """
         self._interrupted = interrupted
-        self._bridged.keep_control()
         code, arguments = _code(request[0]), [float(value) for value in request[1:]]
         return [float(self._carry_out(code, arguments)), *self._state()]
 
@@ -147,7 +146,7 @@ class LibiiwaBridge:
                 raise CommandRejected(f"code must be one of libiiwa's commands, got {code}", parameter="code")
             if code in _RESETS:
                 self._bridged.halt()
-            command(self, arguments)
+            self._bridged.in_control(partial(command, self, arguments))
         except ConnectionLost:
             raise
         except HeptarmError as error:
