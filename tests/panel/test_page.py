@@ -19,6 +19,7 @@ from tests.cli.running import sim
 
 pytest.importorskip("viser")
 webdriver = pytest.importorskip("selenium.webdriver")
+selenium = pytest.importorskip("selenium.common.exceptions")
 
 #: A browser that draws by software burdens the whole machine, and a held button has to ask in time.
 pytestmark = [pytest.mark.browser, pytest.mark.alone]
@@ -31,8 +32,8 @@ def until(condition: Callable[[], object], what: str) -> None:
         try:
             if condition():
                 return
-        except webdriver.support.wait.NoSuchElementException:
-            pass
+        except (selenium.NoSuchElementException, selenium.StaleElementReferenceException):
+            pass  # the page draws it anew
         assert time.monotonic() < deadline, what
         time.sleep(0.1)
 
@@ -47,6 +48,11 @@ class Page:
         assert browser.title == "heptarm"
         browser.switch_to.frame("view")
         until(lambda: "A7" in self.text, "the panel never appeared")
+
+    def resize(self, width: int = 0, height: int = 0) -> None:
+        """Have another window, to the pixel, which a real one cannot be as narrow as a phone; 0: the window's own."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
     @property
     def text(self) -> str:
@@ -88,7 +94,11 @@ class Page:
         self.browser.find_element("xpath", f"//label[normalize-space()={label!r}]").click()
 
     def tab(self, label: str) -> None:
-        self.browser.find_element("xpath", f"//*[normalize-space(text())={label!r}]").click()
+        def chosen() -> bool:
+            self.browser.find_element("xpath", f"//*[normalize-space(text())={label!r}]").click()
+            return True
+
+        until(chosen, f"there is no tab {label}")
 
     @contextmanager
     def held(self, label: str) -> Iterator[None]:
@@ -190,20 +200,30 @@ def test_a_panel_that_only_shows_has_a_stop_and_nothing_else(
                 handle.wait(timeout=PATIENCE)
 
 
-#: A phone, the smallest window in which STOP once scrolled away, and two others [pixels].
-SIZES = ((390, 844), (1024, 700), (1280, 900), (2560, 1440))
+#: A phone, an upright tablet, the smallest window in which STOP once scrolled away, and a large one [pixels].
+SIZES = ((390, 844), (768, 1024), (1024, 700), (2560, 1440))
+TABS = ("Jog", "Program", "IO, tools", "Calibrate", "Operator")
 #: Scrolls whatever can be scrolled, to its end.
 SCROLL = (
     """for (const one of document.querySelectorAll("*")) { one.scrollTop = 1e6; one.scrollLeft = 1e6; }"""
 )
-#: Clicks what is labelled so.
-CLICK = """const all = [...document.querySelectorAll("button, span, p")];
-all.find((one) => one.textContent.trim() === arguments[0])?.click();"""
 #: Whether the button is what is seen at its middle and near its corners, and within the window.
 SEEN = """const box = arguments[0].getBoundingClientRect();
 return box.top >= 0 && box.left >= 0 && box.bottom <= innerHeight && box.right <= innerWidth && box.height >= 44 &&
   [[.5, .5], [.05, .1], [.95, .1], [.05, .9], [.95, .9]].every(([x, y]) =>
     document.elementFromPoint(box.left + x * box.width, box.top + y * box.height) === arguments[0]);"""
+#: What is wrong without any scrolling: buttons that jog out of sight, the picture too small or covered in its middle.
+LAYOUT = """const wrong = [], picture = document.querySelector("canvas[data-engine]").getBoundingClientRect();
+for (const joint of [1, 2, 3, 4, 5, 6, 7]) for (const sign of "−+") {
+  const button = [...document.querySelectorAll("button")].find((one) => one.textContent.trim() === `A${joint} ${sign}`);
+  const box = button?.getBoundingClientRect();
+  const at = box && document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
+  if (!at || !button.contains(at)) wrong.push(`A${joint} ${sign}`);
+}
+const middle = document.elementFromPoint(picture.left + picture.width / 2, picture.top + picture.height / 2);
+if (picture.width < 300 || picture.height < 220 || middle?.dataset.engine === undefined) wrong.push("picture");
+if (document.getElementById("webgl-software-rendering")?.checkVisibility()) wrong.push("banner");
+return wrong;"""
 
 
 def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel, PanelArm]) -> None:
@@ -219,6 +239,12 @@ def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel
         with page.around() as button:
             browser.execute_script(SCROLL)
             assert browser.execute_script(SEEN, button), where
+
+    def check_at_all_sizes(where: str) -> None:
+        for width, height in SIZES:
+            page.resize(width, height)
+            check(f"{where} at {width} x {height}")
+        page.resize()
 
     def stops(press: Callable[[], object]) -> None:
         with ha.connect(target, name="program", watchdog=5.0, timeout=PATIENCE) as program:
@@ -243,15 +269,27 @@ def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel
         return press
 
     for width, height in SIZES:
-        browser.set_window_size(width, height)
-        for tab in ("Jog", "Program", "IO, tools", "Operator"):
-            browser.execute_script(CLICK, tab)  # a narrow page may have it behind a fold
+        page.resize(width, height)
+        until(lambda: browser.execute_script(LAYOUT) == [], f"not all in sight at {width} x {height}")
+        for tab in TABS:
+            page.tab(tab)
             check(f"{tab} at {width} x {height}")
+        page.tab(TABS[0])
+        stops(page.stop)
+    page.resize()
     page = Page(browser, panel.url)
+    model.take_control()
+    model.teach("P1")
+    model.preview(speed=0.5)
+    page.shows("nothing moves")
+    check_at_all_sizes("with a preview")
+    model.hide_plan()
+    model.release_control()
     page.tab("Operator")
     page.press("Emergency stop")
     page.shows("press Clear under Operator")
-    check("after an emergency stop")
+    check_at_all_sizes("after an emergency stop")
+    page.tab("Operator")  # a narrow page draws its tabs anew
     page.press("Clear")
     page.press("Recover")
     until(
