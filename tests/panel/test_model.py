@@ -590,6 +590,22 @@ def test_a_page_of_two_arms_draws_both_and_its_stop_stops_both(model: PanelArm) 
         panel.close()
 
 
+def test_control_that_a_late_heartbeat_has_lost_is_taken_by_one_press(model: PanelArm) -> None:
+    model.release_control()
+    with ha.connect(address(model), control=False, watchdog=0.3, timeout=PATIENCE) as arm:
+        page = PanelArm(arm, halt=lambda: None)
+        page.take_control()
+        assert page.poll().in_control
+        heartbeat = arm.connection.link._heartbeat
+        heartbeat.due = time.monotonic_ns() + 10**12
+        until(lambda: not page.poll().in_control)
+        heartbeat.due = 0
+        page.take_control()
+        assert page.poll().in_control
+        arm.move(ha.hold(0.1))
+        page.release_control()
+
+
 def test_the_weight_of_a_tool_that_is_not_attached_is_no_external_force(model: PanelArm) -> None:
     mounted = Scene.of("table").load
     assert mounted is not None and mounted.mass == pytest.approx(1.0) and 0.02 < mounted.com[2] < 0.1

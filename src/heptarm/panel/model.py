@@ -343,7 +343,7 @@ class PanelArm:
         """Take control of the arm; raises NotInControl if another client has it."""
         self._check_allowed()
         self.arm.take_control()
-        self._say("This page controls the arm")
+        self._say("The panel controls the arm")
 
     def release_control(self) -> None:
         """Stop jogging and give control back."""
