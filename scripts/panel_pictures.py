@@ -119,8 +119,6 @@ def main(folder: Path) -> int:
         browser.get(ready["panel"])
         browser.switch_to.frame("view")
         settled(browser)
-        for note in browser.find_elements("css selector", ".mantine-Notification-closeButton"):
-            note.click()  # there is no graphics card
         with ha.connect(ready["target"], name="cell", watchdog=5.0, timeout=30.0) as arm:
             arm.move(ha.ptp(ha.deg(-20, 25, 0, -80, 0, 75, 0), speed=0.4))
             for x, y, z in ((0.0, 0.25, 0.05), (0.08, 0.0, 0.1), (0.0, -0.25, -0.05), (-0.08, 0.0, -0.1)):

@@ -1,4 +1,4 @@
-"""The documentation's site: it builds, its links have targets, and every page fits a desktop and a phone."""
+"""The documentation's site: it builds, its links have targets, and every page fits a desktop, a tablet and a phone."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from scripts.publish_site import publish
 from tests.drawing import until
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Width and height of a desktop and of a phone [px].
-SIZES = ((1280, 900), (390, 844))
+#: Width and height of a desktop, of an upright tablet and of a phone [px].
+SIZES = ((1280, 900), (768, 1024), (390, 844))
 #: What is wider than the window, and images that do not load; wide tables and code scroll in boxes of their own.
 LOOK = """
 const width = document.documentElement.clientWidth;
@@ -148,7 +148,7 @@ class QuietHandler(SimpleHTTPRequestHandler):
 
 
 @pytest.mark.browser
-def test_every_page_fits_a_desktop_and_a_phone(site: Path, browser: Any) -> None:
+def test_every_page_fits_a_desktop_a_tablet_and_a_phone(site: Path, browser: Any) -> None:
     wrong = []
     for page in sorted(site.rglob("*.html")):
         name = page.relative_to(site).as_posix()

@@ -27,6 +27,7 @@ from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import PanelOptions, model_of
 from heptarm.record.mcap_file import RecordingFile
+from heptarm.sim.plant.scene import Scene
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 from tests.cli.running import run
@@ -587,6 +588,39 @@ def test_a_page_of_two_arms_draws_both_and_its_stop_stops_both(model: PanelArm) 
         assert sorted(halted) == ["left", "right"]
     finally:
         panel.close()
+
+
+def test_control_that_a_late_heartbeat_has_lost_is_taken_by_one_press(model: PanelArm) -> None:
+    model.release_control()
+    with ha.connect(address(model), control=False, watchdog=0.3, timeout=PATIENCE) as arm:
+        page = PanelArm(arm, halt=lambda: None)
+        page.take_control()
+        assert page.poll().in_control
+        heartbeat = arm.connection.link._heartbeat
+        heartbeat.due = time.monotonic_ns() + 10**12
+        until(lambda: not page.poll().in_control)
+        heartbeat.due = 0
+        page.take_control()
+        assert page.poll().in_control
+        arm.move(ha.hold(0.1))
+        page.release_control()
+
+
+def test_the_weight_of_a_tool_that_is_not_attached_is_no_external_force(model: PanelArm) -> None:
+    mounted = Scene.of("table").load
+    assert mounted is not None and mounted.mass == pytest.approx(1.0) and 0.02 < mounted.com[2] < 0.1
+    seen = PanelArm(model.arm, halt=lambda: None, mounted=mounted)
+    until(lambda: seen.poll().wrench is not None)
+    shown = seen.poll()
+    state, wrench = shown.state, shown.wrench
+    assert state is not None and wrench is not None
+    assert shown.undeclared == pytest.approx(9.81)
+    assert wrench.force - state.wrench.force == pytest.approx([0, 0, 9.81])
+    lever = state.pose.rotation @ mounted.com
+    assert wrench.torque - state.wrench.torque == pytest.approx(np.cross(lever, [0, 0, 9.81]))
+    with model.arm.tool(ha.Tool("gripper", mass=1.0, com=mounted.com)):
+        until(lambda: seen.poll().undeclared == 0.0)
+    assert Scene.of("cage").load is None, "nothing is mounted"
 
 
 def test_a_page_draws_the_world_of_a_program_and_plans_around_it(

@@ -24,6 +24,8 @@ def readout(**changes: object) -> Readout:
         "is_virtual": True,
         "state": None,
         "tcp": None,
+        "wrench": None,
+        "undeclared": 0.0,
         "is_connected": True,
         "in_control": False,
         "controller": "",
@@ -60,8 +62,11 @@ def test_the_place_is_in_millimetres_and_degrees() -> None:
 
 
 def test_the_force_is_its_size_and_its_parts() -> None:
-    html = texts.wrench(State(Groups(wrench=Wrench(1, np.array([3.0, 0.0, -4.0]), np.zeros(3)))))
-    assert ">5.0<" in html and "-4.0" in html
+    load = Wrench(1, np.array([3.0, 0.0, -4.0]), np.zeros(3))
+    html = texts.wrench(load, 0.0)
+    assert ">5.0<" in html and "-4.0" in html and "attach" not in html
+    assert "the tool's 9.8 N: attach it" in texts.wrench(load, 9.81)
+    assert texts.wrench(None, 0.0) == ""
 
 
 def test_nothing_from_outside_is_html() -> None:

@@ -21,6 +21,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from heptarm._library import Unavailable
 from heptarm.arm.devices.camera import (
     OLDEST,
     CalledSource,
@@ -166,7 +167,10 @@ class ArmVerbs(Sealed):
         groups = None if newest is None else newest.groups
         if groups is None or groups.joints is None or groups.pose is None:
             return
-        expected = self._tooling.reached(groups.joints.q, TOOL)
+        try:
+            expected = self._tooling.reached(groups.joints.q, TOOL)
+        except Unavailable:
+            return  # without its compiled part heptarm moves the arm, and computes no kinematics
         if expected is not None and (
             text := flange_warning(self.robot, groups.joints, groups.pose, expected)
         ):

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Literal, Protocol, TypeVar, cast
 
-from heptarm._library import extension_file
+from heptarm._library import Unavailable, extension_file
 from heptarm.wire.messages import Message
 from heptarm.wire.session import Session
 
@@ -71,8 +71,8 @@ def compiled_link(
 ) -> tuple[Exchange[P], ReceiveState] | None:
     """The functions of a connection.
 
-    None: no socket, or a Python without its lock, which protects the counts; then `heptarm.wire.session` alone writes
-    and reads the frames, as it does in every case but the usual one.
+    None: no socket, no compiled part (Windows), or a Python without its lock, which protects the counts; then
+    `heptarm.wire.session` alone writes and reads the frames, as it does in every case but the usual one.
 
     Args:
         session: it sends `simple_requests` of this session.
@@ -82,13 +82,13 @@ def compiled_link(
         spare: what is put there; without any, nothing is sent.
         reading: lock of the thread that reads the socket.
         sending: lock of the thread that writes to it.
-
-    Raises:
-        Unavailable: the compiled part of heptarm is missing.
     """
     if socket() < 0 or not getattr(sys, "_is_gil_enabled", lambda: True)():
         return None
-    extension_file()  # reports what is missing
+    try:
+        extension_file()
+    except Unavailable:
+        return None
     from heptarm._native import exchange_functions
 
     locks = reading.acquire, reading.release, sending.acquire, sending.release

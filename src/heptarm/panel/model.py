@@ -19,6 +19,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, MotionError
 from heptarm.io.panel_box import PlanOutline
+from heptarm.model.dynamics import GRAVITY
 from heptarm.panel.jog import Jog, Jogger
 from heptarm.panel.points import PointList, TaughtPoint
 from heptarm.panel.wizard import Wizard, WizardSettings
@@ -28,7 +29,8 @@ from heptarm.values.checks import Array, Value, within
 from heptarm.values.io import SignalValue
 from heptarm.values.motion.planned_path import Path as PlannedPath
 from heptarm.values.pose import Pose
-from heptarm.values.state import GROUP_NAMES, Safety, State
+from heptarm.values.robot import Body
+from heptarm.values.state import GROUP_NAMES, Safety, State, Wrench
 from heptarm.values.world import WorldOutline
 
 if TYPE_CHECKING:
@@ -93,6 +95,8 @@ class Readout(Value):
         is_virtual: the robot is simulated.
         state: the newest state; None: none was received.
         tcp: pose of the motion frame in the base; None: not known.
+        wrench: external force and torque beside `undeclared`; None: not known.
+        undeclared: weight on the flange that no load data state [N].
         is_connected: the connection is there, and the state is fresh.
         in_control: this panel controls the arm.
         controller: name of the client that controls it; empty: nobody.
@@ -111,6 +115,8 @@ class Readout(Value):
     is_virtual: bool
     state: State | None
     tcp: Pose | None
+    wrench: Wrench | None
+    undeclared: float
     is_connected: bool
     in_control: bool
     controller: str
@@ -134,6 +140,7 @@ class PanelArm:
         may_control: whether this panel may do more than look and stop.
         folder: where recordings go.
         gripper: that its buttons open and close; None: there is none.
+        mounted: what a scene mounts on the flange of a virtual robot; None: nothing.
         scene: bodies around which it plans paths, as of `heptarm.CollisionModel`; empty: none.
         target: what the arm is connected to; a saved one gets what the wizard measures.
 
@@ -152,6 +159,7 @@ class PanelArm:
         may_control: bool = True,
         folder: Path = Path(),
         gripper: Gripper | None = None,
+        mounted: Body | None = None,
         scene: str = "",
         target: str = "",
     ) -> None:
@@ -162,6 +170,7 @@ class PanelArm:
         self._model: CollisionModel | None = None
         self._found: tuple[PlannedPath, float] | None = None
         self.gripper = gripper
+        self._mounted = mounted
         self.wizard = Wizard(arm, target, show=self.show_plan, report=self.report)
         self.plan: PlanOutline | None = None
         self._plan_since = 0.0
@@ -194,9 +203,10 @@ class PanelArm:
         except HeptarmError:
             is_connected = False
         tcp = None if state is None or state.groups.pose is None else state.pose
+        wrench, undeclared = (None, 0.0) if state is None else self._external(state)
         if state is not None and is_connected and state.stamp != self._seen:
             self._seen = state.stamp
-            self._note(state, tcp)
+            self._note(state, tcp, wrench)
         stands = () if state is None else self._reasons(state.groups.safety)
         if self._recorder is not None and not self._recorder.is_running:
             self._end_recording()  # a full disk has ended it
@@ -210,6 +220,8 @@ class PanelArm:
             is_virtual=arm.is_virtual,
             state=state,
             tcp=tcp,
+            wrench=wrench,
+            undeclared=undeclared,
             is_connected=is_connected,
             in_control=arm.in_control,
             controller=arm.controller,
@@ -223,10 +235,21 @@ class PanelArm:
             recording="" if self._recorder is None else self._recorder.path.name,
         )
 
-    def _note(self, state: State, tcp: Pose | None) -> None:
-        if state.groups.wrench is not None:
-            force = float(np.linalg.norm(state.wrench.force))
-            self._forces.append((time.monotonic(), force))
+    def _external(self, state: State) -> tuple[Wrench | None, float]:
+        """The external wrench without the weight of a tool that is not attached, and that weight [N]."""
+        groups = state.groups
+        if groups.wrench is None or self._mounted is None or groups.pose is None or groups.mode is None:
+            return groups.wrench, 0.0
+        if state.tool:
+            return state.wrench, 0.0
+        weight = self._mounted.mass * np.array(GRAVITY)
+        torque = np.cross(state.pose.rotation @ self._mounted.com, weight)  # the motion frame is the flange
+        force, torque = state.wrench.force - weight, state.wrench.torque - torque
+        return replace(state.wrench, force=force, torque=torque), float(np.linalg.norm(weight))
+
+    def _note(self, state: State, tcp: Pose | None, wrench: Wrench | None) -> None:
+        if wrench is not None:
+            self._forces.append((time.monotonic(), float(np.linalg.norm(wrench.force))))
         if tcp is not None and (not self._path or float(np.linalg.norm(tcp.xyz - self._path[-1])) > _STEP):
             self._path.append(tcp.xyz)
         safety = state.groups.safety
@@ -320,7 +343,7 @@ class PanelArm:
         """Take control of the arm; raises NotInControl if another client has it."""
         self._check_allowed()
         self.arm.take_control()
-        self._say("This page controls the arm")
+        self._say("The panel controls the arm")
 
     def release_control(self) -> None:
         """Stop jogging and give control back."""

@@ -145,7 +145,7 @@ class ArmPage:
         self._world.show(state.q)
         self._world.carry(self.model.arm.shapes)
         if tcp is not None:
-            force = None if state.groups.wrench is None else state.wrench.force
+            force = None if readout.wrench is None else readout.wrench.force
             self._marks.show(tcp, np.array(self._world.flange.xpos), force)
         self._marks.show_target(readout.target)
         self._ghost.show(self.model.plan, self.model.plan_time)
@@ -170,7 +170,7 @@ class ArmPage:
             self._drive.visible = model.has_path
         _put(self._joints, texts.joints(state, model.arm.robot))
         _put(self._place, texts.place(readout.tcp, state))
-        _put(self._wrench, texts.wrench(state))
+        _put(self._wrench, texts.wrench(readout.wrench, readout.undeclared))
         path = model.path
         if path.shape != self._trail or readout.is_jogging or readout.running:
             self._trail = path.shape
@@ -210,7 +210,8 @@ class ArmPage:
         self._plot.data = (times, forces)
 
     def _scales(self) -> dict[str, Any]:
-        return {"x": {"time": False, "range": (-HISTORY, 0.0)}, "y": {"range": (0.0, self._top)}}
+        # with a range of x, too, viser 1.1 draws no axes
+        return {"x": {"time": False}, "y": {"range": (0.0, self._top)}}
 
     def _write_points(self) -> None:
         points = tuple(self.model.points)
@@ -296,7 +297,7 @@ class ArmPage:
 
     def _make_jog(self) -> None:
         arm = self.model.arm
-        self._grid()
+        self._gui.add_html(texts.KEYS)
         self._speed = self._gui.add_slider("Speed [%]", 1, 100, 1, _SLOW)
         self._frame = self._gui.add_dropdown(
             "Jog",

@@ -35,6 +35,7 @@ from heptarm.panel.guard import Page, PageGuard, free_port, is_local
 from heptarm.panel.model import PanelArm, groups_for
 from heptarm.skills.gripper import Gripper, TwoSignalGripper
 from heptarm.values.io import GripperWiring
+from heptarm.values.robot import Body
 from heptarm.wire.messages import StopKind
 
 if TYPE_CHECKING:
@@ -345,6 +346,7 @@ def model_of(
     return PanelArm(
         arm,
         gripper=_gripper_of(arm, options) if options.may_control else None,
+        mounted=_mounted_on(arm, options),
         halt=halting(arm, chosen.host, chosen.port),
         operate=operate,
         may_control=options.may_control,
@@ -375,6 +377,18 @@ def _gripper_of(arm: Arm, options: PanelOptions) -> Gripper | None:
     except ValueError as error:
         raise CommandRejected(str(error), parameter="gripper", value=options.gripper) from None
     return TwoSignalGripper(arm, **asdict(wiring))
+
+
+def _mounted_on(arm: Arm, options: PanelOptions) -> Body | None:
+    """What the scene of a virtual robot mounts on its flange; None: nothing."""
+    from heptarm.sim.plant.scene import Scene
+
+    if not arm.is_virtual or not options.scene:
+        return None
+    try:
+        return Scene.of(options.scene).load
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="scene", value=options.scene) from None
 
 
 def main(argv: list[str] | None = None) -> int:

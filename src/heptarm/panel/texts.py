@@ -16,12 +16,14 @@ from heptarm.values.checks import Array
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
-from heptarm.values.state import State
+from heptarm.values.state import State, Wrench
 from heptarm.values.text import fixed
 
 #: Inputs that are listed; a project may have hundreds.
 MOST_SIGNALS = 60
-#: The look of the panel. `:has` finds the containers and buttons beside the panel's own marks.
+#: The look of the panel. `:has` finds the containers and buttons beside the panel's own marks. On a phone viser puts
+#: all controls on a narrow sheet over the picture, and on an upright tablet it leaves the picture a strip between two
+#: panels: there the picture is above, and what jogs below it.
 STYLE = """<style>
 .ha{font-size:13px;line-height:1.35;padding:2px 12px 6px;font-variant-numeric:tabular-nums}
 .ha h4{margin:8px 0 3px;font-size:11px;letter-spacing:.08em;text-transform:uppercase;opacity:.6;font-weight:600}
@@ -50,8 +52,32 @@ div:has(> div > .ha-grid) > div:has(> button){margin-left:4px;margin-right:4px}
 div:has(> div > .ha-grid) > div > button{height:2.4em !important;touch-action:none;user-select:none;
 -webkit-user-select:none;-webkit-touch-callout:none}
 div:has(> .ha-wide) + div:has(> button){grid-column:1/-1}
+#webgl-software-rendering{display:none}
+@media (min-width:36.01em) and (max-width:1023px) and (orientation:portrait){
+[data-dock-root] > div:not([data-dock-region]):has(canvas){inset:0 0 65% 0 !important}
+[data-dock-root] > [data-dock-region]{top:35% !important;width:50% !important}
+[data-dock-root] > div:not([data-dock-region]):not(:has(canvas)){box-shadow:none !important}
+[data-dock-region] > div > div:has(> [data-dock-column]){width:100% !important}
+[data-dock-region-resize]{display:none}
+}
+@media (max-width:1023px) and (orientation:portrait){
+div:has(> div > .ha-grid){grid-template-columns:repeat(3,minmax(0,1fr))}
+div:has(> div > .ha-grid) > div > button{padding-inline:4px !important}
+}
+@media ((max-width:1023px) and (orientation:portrait)) or (max-height:799px){
+div:has(> div > .ha-keys){grid-template-columns:repeat(4,minmax(0,1fr))}
+.ha.head{min-height:0}.ha.news{height:60px}
+}
+@media (max-width:36em){
+#root:has(div[style*="width: 20em"] > div:last-child:not([style*="display: none"])) [data-dock-root] > div:has(canvas){
+bottom:70% !important}
+.mantine-Paper-root:has(> div > div > div > div > div[style*="width: 20em"]){
+width:100% !important;max-height:70% !important}
+.mantine-Paper-root div[style*="width: 20em"]{width:100% !important}
+.mantine-Paper-root div[style*="width: 20em"] > div:first-child{height:2.2em !important}
+}
 </style>"""
-GRID, WIDE = (f'<div class="ha-{name}"></div>' for name in ("grid", "wide"))
+GRID, KEYS, WIDE = (f'<div class="ha-{names}"></div>' for names in ("grid", "grid ha-keys", "wide"))
 _LEVELS = {"info": "good", "warning": "warn", "error": "bad"}
 
 
@@ -168,15 +194,20 @@ def place(tcp: Pose | None, state: State | None) -> str:
     )
 
 
-def wrench(state: State | None) -> str:
-    """External force and torque at the motion frame, base axes."""
-    if state is None or state.groups.wrench is None:
+def wrench(load: Wrench | None, undeclared: float) -> str:
+    """External force and torque at the motion frame, base axes, and what they leave out.
+
+    Args:
+        load: without what is undeclared; None: not known.
+        undeclared: weight on the flange that no load data state [N].
+    """
+    if load is None:
         return ""
-    load = state.wrench
+    beside = f"beside the tool's {undeclared:.1f} N: attach it" if undeclared else ""
     doubt = "" if load.valid() else _chip("inaccurate here", "warn")
     return (
         f'<div class="ha"><h4>External force at the TCP</h4><span class="big">'
-        f'{np.linalg.norm(load.force):.1f}</span> <span class="unit">N</span> {doubt}'
+        f'{np.linalg.norm(load.force):.1f}</span> <span class="unit">N {beside}</span> {doubt}'
         f'<div class="six">{_six("Fx Fy Fz", load.force, 1, "N")}{_six("Tx Ty Tz", load.torque, 2, "Nm")}</div></div>'
     )
 

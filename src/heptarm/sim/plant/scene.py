@@ -20,6 +20,7 @@ from heptarm.values.checks import shown
 from heptarm.values.files import read_xml, unreadable
 from heptarm.values.io import GripperWiring
 from heptarm.values.pose import Pose
+from heptarm.values.robot import Body
 from heptarm.values.shape import ORIGIN
 
 FOLDER = Path(__file__).parents[1] / "scenes"
@@ -117,7 +118,7 @@ class Scene:
             ("geom", model.ngeom, ("geom_pos", "geom_quat", "geom_size", "geom_friction", "geom_solref")),
             ("site", model.nsite, ("site_pos", "site_quat")),
         ):
-            for array in arrays:
+            for array in arrays if count else ():
                 rows = np.isfinite(getattr(model, array).reshape(count, -1)).all(axis=1)
                 if not rows.all():
                     name = plain(getattr(model, kind)(int(np.argmin(rows))).name)
@@ -154,6 +155,25 @@ class Scene:
         """Where the scene has a site of that name, such as the base of another arm; None: it has none."""
         found = next((site for site in self.read().worldbody.sites if site.name == name), None)
         return None if found is None else Pose.of(found.pos, np.roll(found.quat, -1))
+
+    @property
+    def load(self) -> Body | None:
+        """Mass and centre of what the scene mounts on the flange; None: it mounts nothing.
+
+        Raises:
+            CommandRejected: MuJoCo cannot compile the scene.
+        """
+        if _top_level(self.read(), TOOL) is None:
+            return None
+        flange = mujoco.MjSpec()
+        flange.worldbody.add_body(name="flange").add_site(name="flange")
+        self.attach_to(flange)
+        model = self.compile(flange)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        tool = find_body(model, TOOL)
+        return Body(float(model.body_subtreemass[tool]), data.subtree_com[tool])
 
     @property
     def wiring(self) -> GripperWiring:
