@@ -44,6 +44,11 @@ static void take(struct commands *c, const double *numbers, word when, word give
     c->at = when;
 }
 
+/* Time for which a command is fresh [s]: a program that sends one for each command period is not late by that alone. */
+static double patience_of(const struct fri_loop *l) {
+    return most(l->seam->patience, 1.5e-9 * (double)(l->session.period * l->session.multiplier));
+}
+
 /* Read the newest command of the user's process, if there is a new one. */
 void fri_take_command(struct fri_loop *l) {
     word count = __atomic_load_n(&l->header[H_COMMANDS], __ATOMIC_ACQUIRE);
@@ -66,7 +71,7 @@ void fri_take_command(struct fri_loop *l) {
     }
     double numbers[COMMAND_WORDS];
     memcpy(numbers, copy, sizeof numbers);
-    take(&l->commands, numbers, copy[C_AT], copy[C_GIVEN], l->seam->patience);
+    take(&l->commands, numbers, copy[C_AT], copy[C_GIVEN], patience_of(l));
 }
 
 /* Age of the last command [s]; whether it has expired, and whether the arm has to brake. */
@@ -74,7 +79,7 @@ static double age_of(struct fri_loop *l) {
     struct commands *c = &l->commands;
     c->is_filled = c->is_braking = 0;
     if (!c->at) return 0.0;
-    double age = (double)(l->session.received - c->at) * 1e-9, late = age - l->seam->patience;
+    double age = (double)(l->session.received - c->at) * 1e-9, late = age - patience_of(l);
     c->is_filled = late > 0.0;
     c->is_braking = l->seam->missing != HOLD && late > (l->seam->missing == EXTRAPOLATE ? l->seam->over : 0.0);
     return age;
@@ -108,7 +113,7 @@ void fri_efforts(struct fri_loop *l, double *tau, double *wrench) {
     struct commands *c = &l->commands;
     double fraction = 1.0;
     if (c->at && l->seam->missing != HOLD) {
-        double late = (double)(l->session.received - c->at) * 1e-9 - l->seam->patience;
+        double late = (double)(l->session.received - c->at) * 1e-9 - patience_of(l);
         if (l->seam->missing == EXTRAPOLATE) late -= l->seam->over;
         if (late > 0.0) fraction = l->seam->over > 0.0 ? most(0.0, 1.0 - late / l->seam->over) : 0.0;
     }

@@ -67,15 +67,15 @@ class Twins:
             )
             assert not differ.size, (differ, one[differ], two[differ])
 
-    def step(self, **changes: object) -> None:
-        """The next message of the controller, after some changes."""
+    def step(self, *, gap: int = MS, **changes: object) -> None:
+        """The next message of the controller, after some changes and a time [ns]."""
         controller = self.pure.controller
         for name, value in changes.items():
             setattr(controller, name, value)
         datagram = controller.datagram()
         controller.sequence += 1
         controller._reflected = max(0, self.pure.cycle.session.sent - 1)
-        self.message(datagram)
+        self.message(datagram, gap)
 
     def command(self, **numbers: Sequence[float]) -> None:
         """A command for both."""
@@ -98,14 +98,14 @@ class Twins:
         for bench in (self.pure, self.other):
             bench.layout.outputs.write(io or {}, frames or {})
 
-    def activate(self) -> None:
+    def activate(self, *, gap: int = MS) -> None:
         for state in (
             SessionState.MONITORING_READY,
             SessionState.COMMANDING_WAIT,
             SessionState.COMMANDING_ACTIVE,
         ):
             for _ in range(4):
-                self.step(state=state)
+                self.step(gap=gap, state=state)
 
     def check(self) -> None:
         """Counts, histograms and the guards' reports are equal too."""
@@ -144,6 +144,23 @@ def test_the_policies(missing: Missing) -> None:
         twins.step()
     twins.check()
     assert twins.other.counters.filled > 50
+
+
+def test_a_command_for_each_message_of_a_slow_session_is_fresh() -> None:
+    """Messages every 100 ms, and a patience of half of that: no program could send in time."""
+    twins, period = Twins(policy=Policy(patience=0.05)), 100 * MS
+    twins.pure.controller.period_ms = 100
+    twins.activate(gap=period)
+    for k in range(40):
+        goal = [value + 0.001 * k for value in IPO]
+        twins.command(q=goal)
+        twins.step(gap=period)
+    twins.check()
+    assert twins.other.counters.filled == 0
+    assert twins.other.states[-1].q_sent == pytest.approx(goal, abs=0.01)
+    for _ in range(2):
+        twins.step(gap=period)
+    assert twins.other.counters.filled == 2, "without another one it expires"
 
 
 @pytest.mark.parametrize("law", [offset, torque])

@@ -101,6 +101,12 @@ def test_the_episodes_of_a_folder_are_chosen_on_the_page(tmp_path: Path) -> None
         player.episode.value = "episode-00001"
         player.step(0.05)
         assert player.about.content == "**failure** (it jammed) Look\n\nforce: 5.5"
+        (tmp_path / "episode-00000.mcap").write_bytes(b"cut")
+        player.episode.value = "episode-00000"
+        player.step(0.05)
+        player.step(0.05)
+        assert "episode-00000.mcap must be a recording" in player.about.content
+        assert player.episode.value == "episode-00001", "what was shown stays"
     with pytest.raises(ha.CommandRejected, match="has no episodes"):
         (tmp_path / "empty").mkdir()
         open_player(tmp_path / "empty", PanelOptions(port=0))

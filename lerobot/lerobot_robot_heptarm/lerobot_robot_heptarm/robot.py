@@ -182,8 +182,12 @@ class HeptarmRobot(Robot):
                 _ = arm.io[self._wiring.is_open]  # a name that the cabinet lacks is refused here
             self._arm, self._block = arm, block.pop_all()
             _robots.append(self)
-        for camera in self.cameras.values():
-            camera.connect()
+        try:
+            for camera in self.cameras.values():
+                camera.connect()
+        except BaseException:
+            self.disconnect()
+            raise
         self.configure()
 
     def attach(self, arm: SteppedArm) -> None:
@@ -209,7 +213,8 @@ class HeptarmRobot(Robot):
             raise DeviceNotConnectedError(f"{self} is not connected")
         try:
             for camera in self.cameras.values():
-                camera.disconnect()
+                if camera.is_connected:
+                    camera.disconnect()
             self._end_stream()
         finally:
             self._arm = self._opens = None

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import heptarm as ha
+from heptarm import model
 
 #: Where an episode begins and ends, and the tip of the scenes' gripper in the flange frame.
 HOME = ha.deg(0, 25, 0, -90, 0, 65, 0)
@@ -118,10 +119,10 @@ def way(arm: ha.Arm, legs: list[Leg]) -> Iterator[tuple[np.ndarray, bool]]:
 
     They lead from where the arm is to the first place, from there along straight lines, and back to `HOME`.
     """
-    down = ha.Pose.from_matrix(ha.model.forward(arm.robot, HOME)) @ _TIP
+    down = ha.Pose.from_matrix(model.forward(arm.robot, HOME)) @ _TIP
 
     def solved(place: np.ndarray, near: np.ndarray) -> np.ndarray:
-        return ha.model.solve(arm.robot, ha.Pose.of(place, down.quat) @ _TIP.inverse(), near=near)
+        return model.solve(arm.robot, ha.Pose.of(place, down.quat) @ _TIP.inverse(), near=near)
 
     here = np.array(legs[0].place)
     q = solved(here, HOME)

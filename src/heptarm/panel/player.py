@@ -84,7 +84,8 @@ class Player:
         from heptarm.sim.plant.scene import Scene
 
         self.server = server
-        robot, meshes = recording.facts["robot"], ArmMeshes.of(options.meshes)
+        self._robot = robot = recording.facts["robot"]
+        meshes = ArmMeshes.of(options.meshes)
         scene = Scene.of(options.scene) if options.scene else None
         self._world = DrawnWorld(server, robot, scene, None, meshes, root="/arm")
         self._marks = DrawnMarks(server, "/arm")
@@ -98,6 +99,7 @@ class Player:
         #: Which episode is shown; None: there are no others.
         self.episode = server.gui.add_dropdown("episode", tuple(self._episodes)) if self._episodes else None
         self._played = "" if self.episode is None else str(self.episode.value)
+        self._refusal = ""  # of the episode that was chosen last
         begin = float(self._t[0])
         self.slider = server.gui.add_slider("time [s]", begin, begin + _STEP, _STEP, begin)
         self.is_playing = server.gui.add_checkbox("play", True)
@@ -117,9 +119,17 @@ class Player:
         """Show another recording from its beginning.
 
         Raises:
-            CommandRejected: it has no joint positions; what was shown stays.
+            CommandRejected: it has no joint positions, or is of another robot; what was shown stays.
         """
-        self._t, self._q = _positions(recording)
+        t, q = _positions(recording)
+        if recording.facts["robot"] != self._robot:
+            raise CommandRejected(
+                f"{recording.path.name} is of an {recording.facts['robot']}, the page shows an {self._robot}",
+                parameter="play",
+                value=str(recording.path),
+                hint="play it by itself",
+            )
+        self._t, self._q = t, q
         self._recording = recording
         begin, end = float(self._t[0]), float(self._t[-1])
         self.slider.min, self.slider.max = begin, max(end, begin + _STEP)
@@ -139,11 +149,12 @@ class Player:
         """Show the episode that is chosen on the page."""
         if self.episode is None or self.episode.value == self._played:
             return
-        self._played = str(self.episode.value)
+        chosen, self._refusal = str(self.episode.value), ""
         try:
-            self._take(load(self._episodes[self._played]))
+            self._take(load(self._episodes[chosen]))
+            self._played = chosen
         except CommandRejected as error:
-            self.about.content = str(error)
+            self.episode.value, self._refusal = self._played, str(error)
 
     def show(self, t: float) -> None:
         """Draw both arms at a time of the recording [s]."""
@@ -161,7 +172,7 @@ class Player:
             index = int(np.abs(view.t - t).argmin())
             if index != self._shown[name]:
                 self._shown[name], self.pictures[name].image = index, view[index]
-        self.about.content = _about(run, t)
+        self.about.content = self._refusal or _about(run, t)
         past = [event for event in run.events if event.t <= t and event.kind != "signals"]
         self.events.content = "\n".join(
             f"- `{event.t:.2f} s` {event.text[:120]}" for event in past[-_EVENTS:]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from math import isnan
 from pathlib import Path
 from typing import Any, Literal
@@ -170,6 +170,18 @@ def _check_robot(arm: Arm, commands: Commands, run: Recording) -> None:
         )
 
 
+@dataclass(slots=True)
+class _Seen:
+    """Number of the motion that the twin runs; 0: none was seen."""
+
+    number: int = 0
+
+    def note(self, state: State) -> None:
+        """Look for it in a state."""
+        if not self.number and state.motion is not None and state.motion.active:
+            self.number = state.motion.id
+
+
 class _Run:
     """What is going on in a virtual cabinet while a recording is repeated.
 
@@ -273,26 +285,11 @@ class _Run:
         mode = (
             self._mode if self._mode is not None else None if section.mode is None else _mode_of(section.mode)
         )
-        number = 0
-
-        def note(state: State) -> None:
-            nonlocal number
-            motion = None if number else state.motion
-            if motion is not None and motion.active:
-                number = motion.id
-
-        refusal = ""
         stamp = self._now()
         for step in self._stops_within(section):
             self._schedule(step.word, stamp + (step.t - section.motion.begin))
-        try:
-            self._follow(section.stream, mode, note)
-        except MotionError:
-            pass  # the twin's recording has its cause
-        except HeptarmError as error:
-            refusal = str(error)
-        self._numbers[section.motion.id] = number
-        self.repetitions.append(Repetition(section, number, refusal))
+        with self._repetition(section) as seen:
+            self._follow(section.stream, mode, seen.note)
 
     def _answer(self, section: Section, session: RecordedSession) -> None:
         """Repeat what an FRI client superposed, by an FRI client."""
@@ -305,9 +302,9 @@ class _Run:
         kind, load = (
             ("torque", "tau") if opened.command is wire.FriCommandMode.TORQUE else ("wrench", "wrench")
         )
-        number, refusal = 0, ""
-        try:
-            with self._arm.fri(
+        with (
+            self._repetition(section) as seen,
+            self._arm.fri(
                 kind,
                 period_ms=round(1e3 * opened.period),
                 multiplier=opened.receive_multiplier,
@@ -315,19 +312,27 @@ class _Run:
                 law=RecordedLaw(commands, load, speed=self._speed),
                 limits=_unlimited(self._arm.robot),
                 timeout=_BEGINS,
-            ) as client:
-                motion, stamp = self._arm.state.motion, self._now()
-                number = 0 if motion is None else motion.id
-                for step in self._stops_within(section):
-                    self._schedule(step.word, stamp + (step.t - commands.begin) / self._speed)
-                while client.active and client.state.t < commands.t[-1] / self._speed:
-                    client.wait(_LOOKS)
+            ) as client,
+        ):
+            stamp = self._now()
+            seen.note(self._arm.state)
+            for step in self._stops_within(section):
+                self._schedule(step.word, stamp + (step.t - commands.begin) / self._speed)
+            while client.active and client.state.t < commands.t[-1] / self._speed:
+                client.wait(_LOOKS)
+
+    @contextmanager
+    def _repetition(self, section: Section) -> Iterator[_Seen]:
+        """Note what becomes of a motion that a client repeats here, or why it is refused."""
+        seen, refusal = _Seen(), ""
+        try:
+            yield seen
         except MotionError:
             pass  # the twin's recording has its cause
         except HeptarmError as error:
             refusal = str(error)
-        self._numbers[section.motion.id] = number
-        self.repetitions.append(Repetition(section, number, refusal))
+        self._numbers[section.motion.id] = seen.number
+        self.repetitions.append(Repetition(section, seen.number, refusal))
 
     def _follow(self, stream: Trajectory, mode: Mode | None, note: Callable[[State], None]) -> None:
         """Follow set-points by the simulator's clock, which a busy machine holds up, until the arm has settled.

@@ -547,7 +547,8 @@ class Cycle:
             guard.stop()
             pose_commander.guard.stop()
         if session.is_commanding:
-            period = session.period * session.multiplier * 1e-9 or 1e-3
+            self.fallback.period = session.period * session.multiplier * 1e-9
+            period = self.fallback.period or 1e-3
             if not (pose_commander.guard if by_pose else guard).is_started:
                 if by_pose:
                     pose_commander.begin(period, again=again)

@@ -33,6 +33,7 @@ class CommandFallback:
         "e1",
         "is_braking",
         "is_filled",
+        "period",
         "policy",
         "pose",
         "q",
@@ -44,6 +45,7 @@ class CommandFallback:
 
     def __init__(self, policy: Policy) -> None:
         self.policy = policy
+        self.period = 0.0  # between two commands that the cabinet takes [s]
         self.start()
 
     def start(self) -> None:
@@ -80,7 +82,7 @@ class CommandFallback:
         """
         gap = (at - self.at) * 1e-9
         # only two commands of one stream give its velocity, not two with a pause between them
-        is_stream = 0.0 < gap <= self.policy.patience
+        is_stream = 0.0 < gap <= self.patience
         if q is not None:
             if self.q is not None and is_stream:
                 self.slope = [(new - old) / gap for new, old in zip(q, self.q, strict=True)]
@@ -139,13 +141,18 @@ class CommandFallback:
         self._age(now)
         return None if self.is_braking else ipo if self.e1 is None else self.e1
 
+    @property
+    def patience(self) -> float:
+        """Time for which a command is fresh [s]."""
+        return max(self.policy.patience, 1.5 * self.period)
+
     def _age(self, now: int) -> float:
         """Age of the last command [s]; update `is_filled` and `is_braking`."""
         self.is_filled = self.is_braking = False
         if not self.at:
             return 0.0
         age = (now - self.at) * 1e-9
-        late = age - self.policy.patience
+        late = age - self.patience
         self.is_filled = late > 0.0
         missing = self.policy.missing
         if missing is not Missing.HOLD and late > (
@@ -156,7 +163,7 @@ class CommandFallback:
 
     def efforts(self, now: int) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         """Target torques and wrench of this cycle; None where none was ever commanded."""
-        fraction = self._fraction((now - self.at) * 1e-9 - self.policy.patience) if self.at else 1.0
+        fraction = self._fraction((now - self.at) * 1e-9 - self.patience) if self.at else 1.0
         tau, wrench = self.tau, self.wrench
         if fraction == 1.0:
             return tau, wrench

@@ -30,7 +30,7 @@ class Policy:
 
     Attributes:
         missing: behaviour without a fresh command.
-        patience: time for which a command is fresh [s].
+        patience: time for which a command is fresh [s]; it is at least one and a half command periods.
         over: duration of an extrapolation, and of a ramp of torques to zero [s].
 
     Raises:

@@ -25,7 +25,7 @@ from heptarm.sim.plant.world import add_camera, specification
 from heptarm.values.camera import Camera
 from heptarm.values.checks import Array
 
-#: Readings of the torque sensors that a decision averages.
+#: Readings of the torque sensors whose noise a decision averages.
 _READINGS = 4
 #: Apparent mass and inertia at the tip, for the damping of the impedance [kg, kg m²], and its ratio.
 _MASS, _INERTIA, _RATIO = 5.0, 0.2, 0.7
@@ -171,7 +171,7 @@ class BatchContact(TaskBatch):
             self._gripper = model.actuator_ctrlrange[self._grip][::-1].copy()  # opens at the upper end
             for joint in driven_joints(model):
                 self._first[model.jnt_qposadr[joint]] = model.jnt_range[joint, 1]
-        self._substeps = round(task.frequency / task.rate / _READINGS)
+        self._substeps = round(task.frequency / task.rate)
         self._reveal = reveal
         self._single = TORQUE_NOISE * task.model.tau_max
         self._stuck = FRICTION * task.model.tau_max / STICTION_SPEED
@@ -277,9 +277,9 @@ class BatchContact(TaskBatch):
     def _simulate(self, command: Array) -> Array:
         self._control(ALL, command)
         torque = np.zeros((self.envs, 7))
-        for _ in range(_READINGS):
-            self._batch.step(nstep=self._substeps)
-            torque += np.asarray(self._contact)[:, :7] / _READINGS
+        for _ in range(self._substeps):  # a stiff contact chatters: single steps show what no sensor feels
+            self._batch.step()
+            torque += np.asarray(self._contact)[:, :7] / self._substeps
         self.pose[:] = np.asarray(self._length)[:, -6:]
         self._sense(torque)
         self._memory[:] = self.task.remember(self.moment(is_true=True))
