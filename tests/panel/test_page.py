@@ -252,7 +252,7 @@ def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel
             assert browser.execute_script(SEEN, button), where
 
     def check_when_small(where: str) -> None:
-        for width, height in few(SIZES, 2):
+        for width, height in few(SIZES):
             page.resize(width, height)
             check(f"{where} at {width} x {height}")
         page.resize()
@@ -279,7 +279,7 @@ def test_stop_is_in_reach_whatever_the_page_shows(browser: Any, own: tuple[Panel
 
         return press
 
-    for width, height in SIZES:
+    for width, height in few(SIZES, 2):
         page.resize(width, height)
         until(lambda: browser.execute_script(LAYOUT) == [], f"not all in sight at {width} x {height}")
         for tab in TABS:
