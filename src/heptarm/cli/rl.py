@@ -31,7 +31,7 @@ from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
-from heptarm.rl.policy import Policy, shipped, shipped_peg
+from heptarm.rl.policy import Policy, policy_named
 from heptarm.rl.pool import Job
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
@@ -320,7 +320,7 @@ def evaluate(
     from heptarm.rl.evaluate import evaluate as work
 
     _refuse_reports(out, overwrite=overwrite, film=False)
-    network = _load(policies[0] if policies else None)
+    network = policy_named(policies[0] if policies else ReachTask.name)
     known = _randomisation(network, randomisation)
     report = work(network, episodes, randomisation=known, seed=seed, engine=_engine(engine))
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
@@ -332,7 +332,7 @@ def _evaluation(
     """An evaluation as a job, and what distinguishes it."""
     from heptarm.rl.jobs import EvaluateJob
 
-    network = _load(Path(policy))
+    network = policy_named(policy)
     task = network.task
     for name, value in settings.items():
         if name not in ("seed", "randomisation"):
@@ -410,7 +410,7 @@ def deploy(
     scene peg-in-hole; or once at each --at. A recording is written in any case, and compared with the simulator, which
     takes as long as the deployment: --twin none does without.
     """
-    network = _load(policy)
+    network = policy_named(policy or ReachTask.name)
     if isinstance(network.task, ContactTask):
         if ask or follow or film or stiffness is not None:
             raise CommandRejected(
@@ -487,13 +487,6 @@ def _compared(
         "notes": list(found.notes),
     }
     return replace(report, facts={**report.facts, "recording": str(recording), "twin": facts})
-
-
-def _load(file: Path | None) -> Policy[Any]:
-    """The policy of a file, or the included one of a task by its name."""
-    if file is None or str(file) == ReachTask.name:
-        return shipped()
-    return shipped_peg() if str(file) == PegInHole.name else Policy.load(file)
 
 
 @dataclass(frozen=True, slots=True)
