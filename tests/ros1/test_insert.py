@@ -40,11 +40,16 @@ def policy(ros: None) -> Iterator[Callable[[], str]]:
     process.wait(PATIENCE)
 
 
+@pytest.fixture
+def driver(ros: None, place: Stage) -> Iterator[NodeProcess]:
+    """The node of the arm."""
+    running = NodeProcess(place.target, ns="/work", **GRIPPER)
+    yield running
+    assert running.end() == 0, running.said
+
+
 @pytest.mark.long  # what decides is in tests/rl/test_contact_follower.py
-def test_the_example_inserts_a_peg(
-    place: Stage, nodes: Callable[..., NodeProcess], policy: Callable[[], str]
-) -> None:
-    nodes(place.target, ns="/work", **GRIPPER)
+def test_the_example_inserts_a_peg(place: Stage, driver: NodeProcess, policy: Callable[[], str]) -> None:
     Client(place, "/work/heptarm").ready()
     done = subprocess.run(
         [sys.executable, str(ROOT / "examples" / "ros1" / "insert.py"), "__ns:=/work"],

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.cli.jobs import HERE, JOBS, JobOptions, cases_of, name_of
 from heptarm.cli.options import (
     NO_TARGET,
     CommandTarget,
@@ -25,6 +24,7 @@ from heptarm.cli.options import (
     Yes,
 )
 from heptarm.cli.output import confirm, emit
+from heptarm.cli.rl.jobs import HERE, JobOptions, Seeds, Sweeps, cases_of, name_of
 from heptarm.errors import CommandRejected, HeptarmError, NotReady, require
 from heptarm.rl import deploy as deployment
 from heptarm.rl.contact.peg_in_hole import PegInHole
@@ -64,9 +64,6 @@ Engine = Annotated[
 ]
 _POLICY = "File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."
 AnyPolicy = Annotated[Path | None, Parameter(help=_POLICY)]
-Seeds = Annotated[
-    str, Parameter(group=JOBS, help="Several seeds, each a job of its own: 0..4 or 0,3,7. Default: --seed.")
-]
 
 
 def train(
@@ -86,10 +83,7 @@ def train(
     ] = False,
     steps: Annotated[
         int,
-        Parameter(
-            help="Environment steps; 0: 2.2 million, 1.3 with the feature, 0.6 of an insertion, 1.2 of others "
-            "with contacts."
-        ),
+        Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 with contacts."),
     ] = 0,
     seed: Seed = 0,
     fitted: Annotated[
@@ -102,14 +96,7 @@ def train(
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
     engine: Engine = "mujoco",
     seeds: Seeds = "",
-    sweep: Annotated[
-        tuple[str, ...],
-        Parameter(
-            group=JOBS,
-            help="NAME=VALUE,VALUE: train with each value of a setting of algorithm or task, such as "
-            "learning_rate=3e-4,1e-3; may be repeated for all combinations.",
-        ),
-    ] = (),
+    sweep: Sweeps = (),
     jobs: JobOptions = HERE,
     overwrite: Overwrite = False,
     as_json: Json = False,
@@ -287,14 +274,7 @@ def evaluate(
         ),
     ] = None,
     seeds: Seeds = "",
-    sweep: Annotated[
-        tuple[str, ...],
-        Parameter(
-            group=JOBS,
-            help="NAME=VALUE,VALUE: evaluate with each value of a setting of the task, or of randomisation, such as "
-            "clearance=1e-3,2e-4; may be repeated for all combinations.",
-        ),
-    ] = (),
+    sweep: Sweeps = (),
     jobs: JobOptions = HERE,
     overwrite: Overwrite = False,
     as_json: Json = False,
