@@ -30,7 +30,7 @@ def place() -> Iterator[Stage]:
 
 @pytest.fixture
 def policy(ros: None) -> Iterator[Callable[[], str]]:
-    """The node of the policy; returns what it says."""
+    """The node of the policy; returns its log."""
     log = logs.new()
     with log.open("w") as file:
         command = [sys.executable, str(NODE.with_name("reach")), "_policy:=peg-in-hole", "__ns:=/work"]

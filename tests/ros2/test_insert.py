@@ -30,7 +30,7 @@ def place() -> Iterator[Stage]:
 
 @pytest.fixture
 def policy() -> Iterator[Callable[[], str]]:
-    """The node of the policy; returns what it says."""
+    """The node of the policy; returns its log."""
     log = logs.new()
     command = [sys.executable, "-m", "heptarm_ros2.reach"]
     command += ["--ros-args", "-p", "policy:=peg-in-hole", "-r", "__ns:=/work"]

@@ -19,7 +19,7 @@ from heptarm_ros2.process import run
 
 
 class Reach(Node):
-    """Does what `heptarm.ros.policy_node` says; the arm brakes when either node falls silent."""
+    """The node of `heptarm.ros.policy_node`; the arm brakes when either node falls silent."""
 
     def __init__(self, name: str = "reach", **options: Any) -> None:
         super().__init__(name, **options)

@@ -67,7 +67,7 @@ class PolicyRos(Protocol):
 
 
 class PolicyNode:
-    """Lets a policy command the arm: call `decide` so many times a second as `rate` says.
+    """Lets a policy command the arm: call `decide` `rate` times a second.
 
     Args:
         ros: the node's ROS.

@@ -29,7 +29,7 @@ Sweeps = Annotated[
     Parameter(
         group=JOBS,
         help="NAME=VALUE,VALUE: a job for each value of a setting of the task, such as clearance=1e-3,2e-4; of a "
-        "training also of its algorithm, such as gamma=0.95,0.97; or randomisation. May be repeated for all combinations.",
+        "training also of its algorithm, such as gamma=0.95,0.97; or randomisation. Repeat it for all combinations.",
     ),
 ]
 #: Figures that are in files and JSON alone, since they would take the whole width of a table.
