@@ -74,6 +74,9 @@ def test_hdf5_has_the_layout_of_robomimic(tmp_path: Path, monkeypatch: pytest.Mo
             assert group.attrs["num_samples"] == steps and group.attrs["label"] == episode.label
             np.testing.assert_array_equal(group["actions"], episode.action)
             np.testing.assert_array_equal(group["obs/joint_positions"], episode["q"])
+            after = np.minimum(np.arange(steps) + 1, steps - 1)
+            for signal in group["obs"]:
+                np.testing.assert_array_equal(group[f"next_obs/{signal}"], group["obs"][signal][()][after])
             assert group["obs/wrist_image"].shape == (steps, 16, 24, 3)
             assert abs(int(group["obs/wrist_image"][0].mean()) - 10 * episode.number) < 3
             assert group["dones"][()].tolist() == [0] * (steps - 1) + [1]

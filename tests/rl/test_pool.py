@@ -80,7 +80,7 @@ class Interrupted(TrainJob):
                 os.kill(os.getpid(), signal.SIGKILL)
 
         # in a worker of its own
-        Training.update = counted  # type: ignore[method-assign]
+        Training.update = counted  # type: ignore[method-assign, assignment]
         Training.save = killed  # type: ignore[method-assign, assignment]
         trained, _ = TrainJob.run(self)
         assert not folder.exists()

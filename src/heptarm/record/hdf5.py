@@ -1,6 +1,7 @@
 """Episodes as one HDF5 file in the layout of robomimic (Mandlekar et al. 2021), which many imitation learners read.
 
-`data/demo_N` holds an episode: `actions`, `rewards`, `dones`, and in `obs` the observations, shape (steps, ...) each.
+`data/demo_N` holds an episode: `actions`, `rewards`, `dones`, in `obs` the observations, shape (steps, ...) each, and in
+`next_obs` those of the step after, which learners from rewards ask for; they are views of `obs` and take no space.
 `mask/success` and its like name the episodes of a label.
 """
 
@@ -83,6 +84,9 @@ def _write(h5py: Any, out: Any, episodes: list[Demonstration]) -> None:
             pictures = np.stack([decoded(picture) for picture in files])
             chunk = (1, *pictures.shape[1:])
             observations.create_dataset(f"{camera}_image", data=pictures, chunks=chunk, compression="gzip")
+        following = group.create_group("next_obs")
+        for signal, values in observations.items():
+            following.create_virtual_dataset(signal, _shifted(h5py, values))
         masks.setdefault(episode.label, []).append(name)
     first = episodes[0]
     about = {"control_freq": first.rate, "robot": first.robot}
@@ -92,3 +96,13 @@ def _write(h5py: Any, out: Any, episodes: list[Demonstration]) -> None:
     )
     for label, names in masks.items():
         out.create_dataset(f"mask/{label}", data=names, dtype=h5py.string_dtype("ascii"))
+
+
+def _shifted(h5py: Any, values: Any) -> Any:
+    """The layout of a view of a dataset from its second row on; the last row is there twice."""
+    count, source = len(values), h5py.VirtualSource(values)
+    layout = h5py.VirtualLayout(values.shape, values.dtype)
+    if count > 1:
+        layout[: count - 1] = source[1:count]
+    layout[count - 1 :] = source[count - 1 :]
+    return layout
