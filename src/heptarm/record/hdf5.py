@@ -1,6 +1,6 @@
 """Episodes as one HDF5 file in the layout of robomimic (Mandlekar et al. 2021), which many imitation learners read.
 
-`data/demo_N` holds an episode: `actions`, `rewards`, `dones`, in `obs` the observations, shape (steps, ...) each, and in
+`data/demo_N` holds an episode: `actions`, `rewards`, `dones`, in `obs` the observations, shape (steps, ...) each, in
 `next_obs` those of the step after, which learners from rewards ask for; they are views of `obs` and take no space.
 `mask/success` and its like name the episodes of a label.
 """
