@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,13 @@ def test_hdf5_has_the_layout_of_robomimic(tmp_path: Path, monkeypatch: pytest.Mo
         with pytest.raises(MissingExtra, match="h5py") as raised:
             ha.save_hdf5(episodes(), tmp_path / "set.hdf5")
         assert raised.value.hint == "pip install 'heptarm[hdf5]'" and not list(tmp_path.iterdir())
+    blind = replace(demonstration(2, 2, "success"), views={})
+    for save in (ha.save_hdf5, ha.save_lerobot):
+        with pytest.raises(
+            CommandRejected, match="00002.mcap and episode-00000.mcap differ in the camera wrist"
+        ):
+            save(Demonstrations(Path("set"), [*episodes(), blind]), tmp_path / "blind")
+    assert not list(tmp_path.iterdir())
     h5py = pytest.importorskip("h5py")
     file = ha.save_hdf5(episodes(), tmp_path / "set.hdf5")
     with pytest.raises(CommandRejected, match="exists"):

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, require
-from heptarm.record.demonstration import Demonstration, Demonstrations
+from heptarm.errors import require
+from heptarm.record.demonstration import Demonstration, Demonstrations, of_one_kind
 from heptarm.record.pictures import decoded
 from heptarm.values.checks import flag, instance
 from heptarm.values.files import path_of, refuse_existing, unwritable
@@ -38,18 +38,13 @@ def save_hdf5(episodes: Demonstrations, file: str | Path, *, overwrite: bool = F
         overwrite: replace a file that is there.
 
     Raises:
-        CommandRejected: no episodes with steps; or the file exists or cannot be written.
+        CommandRejected: no episodes with steps, or such that differ in streams, cameras or rate; or the file exists or
+            cannot be written.
         MissingExtra: h5py or Pillow is not installed.
     """
     instance(episodes, Demonstrations, "episodes")
     path = refuse_existing(path_of(file, "file"), overwrite=flag(overwrite, "overwrite"), name="file")
-    used = [episode for episode in episodes if len(episode)]
-    if not used:
-        raise CommandRejected(
-            "there must be episodes with steps, got none",
-            parameter="episodes",
-            hint="choose other labels, or record some with arm.episodes(...)",
-        )
+    used = of_one_kind(episodes)
     h5py = require("h5py", extra="hdf5")
     new = path.with_name(f".{path.name}.new")  # what is there stays until the new one is complete
     try:
