@@ -8,13 +8,11 @@ or EGL or OSMesa for MUJOCO_GL.
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import sys
-import tempfile
 import threading
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -42,11 +40,11 @@ QUALITY = 55
 _PERIOD = 0.02
 
 
-def perform(target: str) -> None:
+def perform(arm: ha.Arm) -> None:
     """Take the peg out of its holder and insert it into the hole, 2.3 mm beside where it is expected."""
     gripper_tool = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=ha.Pose.at(0, 0, 0.16))
     peg = ha.Workpiece("peg", mass=0.19, com=(0, 0, 0.025), frames={"tip": ha.Pose.at(0, 0, 0.065)})
-    with ha.connect(target, watchdog=2.0) as arm, arm.tool(gripper_tool):
+    with arm.tool(gripper_tool):
         gripper = ha.TwoSignalGripper(
             arm, open="OutputX3Pin1", close="OutputX3Pin2", is_open="InputX3Pin3", is_closed="InputX3Pin4"
         )
@@ -65,77 +63,108 @@ def perform(target: str) -> None:
         arm.move(ha.ptp(ha.deg(0, 25, 0, -90, 0, 65, 0)), speed=0.5)
 
 
-def recorded(model: mujoco.MjModel) -> Array:
-    """Positions of arm and scene during the performance, shape (n, nq)."""
+@dataclass(frozen=True, slots=True)
+class View:
+    """Where the camera of a film is; it goes round what it looks at, slowly, to and fro.
+
+    Attributes:
+        lookat: what it looks at [m].
+        distance: from there [m].
+        azimuth: about the vertical axis, in the middle [deg].
+        elevation: above the horizon, negative looks down [deg].
+        turn: how far it goes to either side [deg].
+    """
+
+    lookat: tuple[float, float, float] = (0.36, 0.0, 0.38)
+    distance: float = 1.45
+    azimuth: float = 142.0
+    elevation: float = -17.0
+    turn: float = 12.0
+
+
+def modelled(scene: str) -> mujoco.MjModel:
+    """The arm in a scene, as it is drawn."""
+    return compiled("iiwa14", scene=Scene.of(scene), meshes=ArmMeshes())
+
+
+def recorded(model: mujoco.MjModel, scene: str, perform: Callable[[ha.Arm], object]) -> Array:
+    """Positions of arm and scene during a performance, shape (n, nq).
+
+    Args:
+        model: of arm and scene.
+        scene: name of the scene.
+        perform: called with a virtual arm in it.
+    """
     found = []
-    with tempfile.TemporaryDirectory(prefix="heptarm-") as folder:
-        path = Path(folder) / "positions"
-        command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--port", "0", "--scene", SCENE]
-        command += ["--positions", str(path), "--parent-pipe"]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
-        cabinet = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
-        )
-        assert cabinet.stdin is not None and cabinet.stdout is not None
-        try:
-            target = f"sim://127.0.0.1:{json.loads(cabinet.stdout.readline())['port']}"
-            file = PositionsFile(path, model.nq)
-            performance = threading.Thread(target=perform, args=(target,))
-            performance.start()
-            while performance.is_alive():
-                now = file.read()
-                if now is not None:
-                    found.append(now)
-                time.sleep(_PERIOD)
-        finally:
-            cabinet.stdin.close()
-            cabinet.wait(30)
+    with ha.connect(f"sim://iiwa14?scene={scene}", watchdog=5.0) as arm:
+        cabinet = arm.connection.cabinet
+        assert cabinet is not None and cabinet.positions is not None
+        file = PositionsFile(cabinet.positions, model.nq)
+        performance = threading.Thread(target=perform, args=(arm,))
+        performance.start()
+        while performance.is_alive():
+            now = file.read()
+            if now is not None:
+                found.append(now)
+            time.sleep(_PERIOD)
     return np.array(found)
 
 
-def chosen(positions: Array) -> Array:
-    """The pictures' positions, from the first movement to the last: half of the film by time, half by what moves."""
+def chosen(positions: Array, length: float) -> Array:
+    """The pictures' positions, from the first movement to the last: half of the film by time, half by what moves.
+
+    Args:
+        positions: shape (n, nq).
+        length: of the film [s].
+    """
     moved = np.abs(np.diff(positions, axis=0)).max(axis=1)
     first, last = np.flatnonzero(moved > 1e-4)[[0, -1]].tolist()
     moved = moved[first : last + 1]
     passed = np.cumsum(0.5 / len(moved) + 0.5 * moved / moved.sum())
-    steps = np.searchsorted(passed, np.linspace(0.0, passed[-1], round(LENGTH * RATE)))
+    steps = np.searchsorted(passed, np.linspace(0.0, passed[-1], round(length * RATE)))
     return np.asarray(positions[first + np.minimum(steps, len(moved))])
 
 
-def drawn(model: mujoco.MjModel, positions: Array) -> list[npt.NDArray[np.uint8]]:
-    """The pictures, each of shape (height, width, 3), from a camera that goes round the arm slowly."""
+def drawn(
+    model: mujoco.MjModel, positions: Array, view: View, size: tuple[int, int]
+) -> list[npt.NDArray[np.uint8]]:
+    """The pictures, each of shape (height, width, 3)."""
     data, camera, pictures = mujoco.MjData(model), mujoco.MjvCamera(), []
-    model.vis.global_.offwidth, model.vis.global_.offheight = 2 * SIZE[0], 2 * SIZE[1]
+    model.vis.global_.offwidth, model.vis.global_.offheight = 2 * size[0], 2 * size[1]
     model.vis.quality.shadowsize = 4096
-    with mujoco.Renderer(model, 2 * SIZE[1], 2 * SIZE[0]) as renderer:
+    with mujoco.Renderer(model, 2 * size[1], 2 * size[0]) as renderer:
         for index, one in enumerate(positions):
             data.qpos[:] = one
             mujoco.mj_forward(model, data)
-            turn = 12.0 * np.cos(2 * np.pi * index / len(positions))
-            camera.lookat, camera.distance = (0.36, 0.0, 0.38), 1.45
-            camera.azimuth, camera.elevation = 142.0 + turn, -17.0
+            camera.lookat, camera.distance = view.lookat, view.distance
+            camera.azimuth = view.azimuth + view.turn * np.cos(2 * np.pi * index / len(positions))
+            camera.elevation = view.elevation
             renderer.update_scene(data, camera)
             large = Image.fromarray(renderer.render())
-            pictures.append(np.asarray(large.resize(SIZE, Image.Resampling.LANCZOS)))
+            pictures.append(np.asarray(large.resize(size, Image.Resampling.LANCZOS)))
     return pictures
 
 
-def main() -> int:
-    """Record, draw, write."""
-    target = Path(sys.argv[1]) if len(sys.argv) > 1 else FILM
-    model = compiled("iiwa14", scene=Scene.of(SCENE), meshes=ArmMeshes())
-    pictures = [Image.fromarray(one) for one in drawn(model, chosen(recorded(model)))]
-    pictures[0].save(
+def written(pictures: list[npt.NDArray[np.uint8]], target: Path) -> None:
+    """Write a film."""
+    first, *others = [Image.fromarray(one) for one in pictures]
+    first.save(
         target,
         save_all=True,
-        append_images=pictures[1:],
+        append_images=others,
         duration=round(1e3 / RATE),
         loop=0,
         quality=QUALITY,
         method=6,
     )
     print(f"wrote {target}: {target.stat().st_size / 1e6:.2f} MB")
+
+
+def main() -> int:
+    """Record, draw, write."""
+    model = modelled(SCENE)
+    positions = chosen(recorded(model, SCENE, perform), LENGTH)
+    written(drawn(model, positions, View(), SIZE), Path(sys.argv[1]) if len(sys.argv) > 1 else FILM)
     return 0
 
 

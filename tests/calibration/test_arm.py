@@ -14,7 +14,7 @@ from heptarm import calibration
 from heptarm.calibration import ArmSamples, FittedArm, FittedNumbers
 from heptarm.calibration.load_estimate import load_regressor
 from heptarm.cli import calibrate
-from heptarm.cli.rl import recipe_of
+from heptarm.cli.rl.policies import recipe_of
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.model.dynamics import GRAVITY
 from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation

@@ -180,7 +180,7 @@ def test_the_guard_brings_commands_back() -> None:
 
 def test_deploying_needs_neither_torch_nor_mujoco() -> None:
     code = (
-        "import sys; import heptarm.cli.rl, heptarm.rl.deploy\n"
+        "import sys; import heptarm.cli.rl.policies, heptarm.rl.deploy\n"
         "from heptarm.rl.policy import shipped; shipped(feature=True)\n"
         "sys.exit(any(m in sys.modules for m in ('torch', 'mujoco')))"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,13 @@ def test_hdf5_has_the_layout_of_robomimic(tmp_path: Path, monkeypatch: pytest.Mo
         with pytest.raises(MissingExtra, match="h5py") as raised:
             ha.save_hdf5(episodes(), tmp_path / "set.hdf5")
         assert raised.value.hint == "pip install 'heptarm[hdf5]'" and not list(tmp_path.iterdir())
+    blind = replace(demonstration(2, 2, "success"), views={})
+    for save in (ha.save_hdf5, ha.save_lerobot):
+        with pytest.raises(
+            CommandRejected, match="00002.mcap and episode-00000.mcap differ in the camera wrist"
+        ):
+            save(Demonstrations(Path("set"), [*episodes(), blind]), tmp_path / "blind")
+    assert not list(tmp_path.iterdir())
     h5py = pytest.importorskip("h5py")
     file = ha.save_hdf5(episodes(), tmp_path / "set.hdf5")
     with pytest.raises(CommandRejected, match="exists"):
@@ -74,6 +82,9 @@ def test_hdf5_has_the_layout_of_robomimic(tmp_path: Path, monkeypatch: pytest.Mo
             assert group.attrs["num_samples"] == steps and group.attrs["label"] == episode.label
             np.testing.assert_array_equal(group["actions"], episode.action)
             np.testing.assert_array_equal(group["obs/joint_positions"], episode["q"])
+            after = np.minimum(np.arange(steps) + 1, steps - 1)
+            for signal in group["obs"]:
+                np.testing.assert_array_equal(group[f"next_obs/{signal}"], group["obs"][signal][()][after])
             assert group["obs/wrist_image"].shape == (steps, 16, 24, 3)
             assert abs(int(group["obs/wrist_image"][0].mean()) - 10 * episode.number) < 3
             assert group["dones"][()].tolist() == [0] * (steps - 1) + [1]

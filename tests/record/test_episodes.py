@@ -318,7 +318,7 @@ def test_lerobot_itself_loads_the_data_set(peer: Peer, tmp_path: Path) -> None:
     python = os.environ.get("LEROBOT_PYTHON", "")
     if not python:
         pytest.skip(
-            "LEROBOT_PYTHON names a Python 3.12 with lerobot[dataset]; see docs/guide/demonstrations.md"
+            "LEROBOT_PYTHON names a Python 3.12 with lerobot[dataset]; see docs/guide/learning/lerobot.md"
         )
     with peer.arm() as arm:
         record(arm, tmp_path / "insert", 3, Camera())

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed")
 
 import heptarm as ha
-from heptarm.cli.jobs import cases_of
+from heptarm.cli.rl.jobs import cases_of
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.jobs import RecordJob, Script

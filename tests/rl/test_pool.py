@@ -12,6 +12,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any
 
 import pytest
@@ -20,12 +21,13 @@ pytest.importorskip("torch", reason="torch is not installed")
 
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.evaluate import evaluate
-from heptarm.rl.jobs import EPISODES
+from heptarm.rl.jobs import EPISODES, TrainJob
 from heptarm.rl.policy import Policy
 from heptarm.rl.pool import ATTEMPTS, Job, run_jobs
 from heptarm.rl.task import ReachTask
+from heptarm.rl.train.ppo import PpoSettings
 from heptarm.rl.train.recipe import Recipe
-from heptarm.rl.train.train import train
+from heptarm.rl.train.train import CHECKPOINT, Training, train
 from tests.cli.running import HEPTARM
 from tests.interrupts import ctrl_c_interrupts
 
@@ -57,6 +59,44 @@ def test_a_lost_job_is_run_again_and_one_that_fails_carries_its_error(tmp_path: 
     assert [result.error for result in results] == ["", "ValueError: three is not squared", ""]
     assert "three is not squared" in results[1].trace and [o.job for o in results] == jobs
     assert sorted(seen) == ["square 2", "square 3", "square 4"]
+
+
+@dataclass(frozen=True, slots=True)
+class Interrupted(TrainJob):
+    """A training whose worker is killed as soon as there is a checkpoint; and the number of its updates after that."""
+
+    def run(self) -> Any:
+        folder = Path(gettempdir()) / f"heptarm-training-{self.key}"
+        was_killed, updates = folder.exists(), []
+        update, save = Training.update, Training.save
+
+        def counted(training: Training) -> Any:
+            updates.append(training.steps)
+            return update(training)
+
+        def killed(training: Training, path: Path) -> None:
+            save(training, path)
+            if not was_killed:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        # in a worker of its own
+        Training.update = counted  # type: ignore[method-assign, assignment]
+        Training.save = killed  # type: ignore[method-assign, assignment]
+        trained, _ = TrainJob.run(self)
+        assert not folder.exists()
+        return trained, len(updates)
+
+
+@pytest.mark.long  # starts and imports two workers
+def test_a_training_whose_worker_is_lost_goes_on_from_its_checkpoint() -> None:
+    settings = PpoSettings(envs=8, horizon=4)
+    recipe = Recipe(ReachTask(feature="kinematic"), steps=(CHECKPOINT + 5) * 32, seed=2, settings=settings)
+    (result,) = run_jobs([Interrupted("seed 2", recipe)], workers=1)
+    assert result.value is not None, result.trace
+    trained, updates = result.value
+    assert (result.attempts, updates, len(trained.history)) == (2, 5, CHECKPOINT + 5)
+    alone = train(recipe).policy
+    assert all((a == b).all() for (a, _), (b, _) in zip(alone.layers, trained.policy.layers, strict=True))
 
 
 def test_what_cannot_run_is_refused_before_anything_starts(tmp_path: Path) -> None:

@@ -14,11 +14,11 @@ from tests.conformance.stage import ROOT
 from tests.retry import retry
 from tests.ros1.peer import Client
 
-#: Without the one that touches a table: that is in front of the arm of the surface tests.
+#: Without those that need a scene: test_surface has the table, test_insert the peg and its hole.
 EXAMPLES = sorted(
     path
     for path in (ROOT / "examples" / "ros1").iterdir()
-    if path.suffix in (".py", ".sh") and path.name != "touch.py"
+    if path.suffix in (".py", ".sh") and path.name not in ("touch.py", "insert.py")
 )
 GUIDE = ROOT / "docs" / "guide" / "ros1.md"
 BLOCK = re.compile(r"^```(python no-run|sh)\n(.*?)^```", re.S | re.M)

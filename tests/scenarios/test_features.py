@@ -33,7 +33,7 @@ def test_the_page_is_up_to_date(features: ModuleType) -> None:
 def test_each_row_is_shown_or_left_out_with_a_reason(features: ModuleType) -> None:
     _, rows = features.load()
     every = testing.scenarios()
-    assert len(rows) == len({row.id for row in rows}) == 281
+    assert len(rows) == len({row.id for row in rows}) == 282
     for row in rows:
         shown = features.shown_by(row.id, every)
         assert shown or row.elsewhere or row.left_out, f"{row.id} {row.title}: known from {row.peers}"

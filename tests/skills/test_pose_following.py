@@ -18,6 +18,8 @@ from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.target import Target
 from heptarm.devices.pose_stream import PoseInput, PoseStream
 from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
+from heptarm.model.kinematics import forward
+from heptarm.values.robot import robot
 from tests.cli.running import HEPTARM, Command, refused
 from tests.conftest import RunningCabinet
 from tests.simulators import FASTER
@@ -212,6 +214,51 @@ def test_the_command_between_two_arms_records_joints_and_gripper_to_its_end(tmp_
     finally:
         leader.close()
         follower.close()
+
+
+TOOL = """<RoboticsAPIData version="3"><objectTemplates>
+  <toolTemplate class="" defaultMotionFrameRef="/Tip" name="Gripper">
+    <frames><frame name="Tip"><transformation x="0.0" y="0.0" z="120.0"/></frame></frames>
+    <loadData cogX="0.0" cogY="0.0" cogZ="60.0" mass="2.0"/>
+  </toolTemplate>
+</objectTemplates></RoboticsAPIData>"""
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_the_command_follows_a_phone_with_a_tool_within_the_workspace(tmp_path: Path) -> None:
+    project = tmp_path / "RoboticsAPI.data.xml"
+    project.write_text(TOOL)
+    cabinet = PrivateCabinet.start(Target(model="iiwa14", options=(("project", str(project)),)))
+    try:
+        target = f"sim://{cabinet.host}:{cabinet.port}"
+        with ha.connect(target, watchdog=5.0, timeout=30.0) as one:
+            one.move(ha.ptp(HOME), speed=0.5)
+            x, y, z = one.pose().xyz
+        box = f"{x - 0.5},{y - 0.5},{z - 0.5},{x + 0.5},{y + 0.05},{z + 0.5}"
+        options = ("--poses", "0", "--target", target, "--tool", "Gripper", "--workspace", box, "--for", "12")
+        command = [*HEPTARM, "teleop", *options, "--record", str(tmp_path / "set")]
+        with Command(command, stdin=DEVNULL, stdout=PIPE, stderr=STDOUT, text=True) as process:
+            assert process.stdout is not None
+            phone = Sender(int(process.stdout.readline().split("port ")[1].split(";")[0]))
+            for index in range(100):  # 5 s aside without the clutch, back, and 5 s aside with it
+                step = index % 50
+                phone.send([0.0, 0.004 * step, 0.0], *(["clutch"] if index > 50 else []))
+                time.sleep(0.1)
+            phone.close()
+            said = process.communicate(timeout=120)[0]
+        assert process.returncode == 0 and "1 episodes in" in said, said
+        (episode,) = ha.load_episodes(tmp_path / "set")
+        flange = np.array([forward(robot("iiwa14"), q)[:3, 3] for q in episode["q"]])
+        lengths = np.linalg.norm(episode["pose"][:, :3] - flange, axis=1)
+        assert np.abs(lengths - 0.12).max() < 5e-3, "the tip of the tool is what moves"
+        moved = episode["pose"][:, 1] - episode["pose"][0, 1]
+        assert np.abs(moved[: len(moved) // 3]).max() < 2e-3, "the clutch is not held"
+        assert 0.04 < moved.max() < 0.055, "up to the wall of the workspace"
+        with ha.connect(target, watchdog=5.0, timeout=30.0) as one:
+            assert one.pose().distance_to(one.pose("flange")) < 1e-6, "the tool is detached again"
+    finally:
+        cabinet.close()
 
 
 def test_the_command_refuses_what_does_not_fit() -> None:

@@ -61,7 +61,12 @@ CALIBRATIONS = {
     "board": "calibrate_eye:board",
 }
 BRIDGES = {"libiiwa": "bridge:libiiwa", "kst": "bridge:kst"}
-LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy", "record": "rl_record:record"}
+LEARNING = {
+    "train": "rl.policies:train",
+    "eval": "rl.policies:evaluate",
+    "deploy": "rl.policies:deploy",
+    "record": "rl.record:record",
+}
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}
 #: Groups that are commands themselves, and where they are.
 _APPS = {"sim": "sim:app"}

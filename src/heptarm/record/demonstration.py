@@ -29,6 +29,7 @@ from heptarm.record.episodes import (
     episode_files,
     label_filter,
 )
+from heptarm.record.pictures import decoded
 from heptarm.record.recording import Recording, load
 from heptarm.values.checks import Array, frozen, instance, within
 from heptarm.values.files import path_of
@@ -295,6 +296,41 @@ def in_steps(recording: Recording, *, rate: float | None = None) -> Demonstratio
         },
         {name: count for name, (_, count) in places.items()},
     )
+
+
+def of_one_kind(episodes: Iterable[Demonstration]) -> list[Demonstration]:
+    """The episodes that have steps, for a data set.
+
+    Raises:
+        CommandRejected: there are none, or they differ in signals, streams, cameras, actions or rate.
+    """
+    used = [episode for episode in episodes if len(episode)]
+    if not used:
+        raise CommandRejected(
+            "there must be episodes with steps, got none",
+            parameter="episodes",
+            hint="choose other labels, or record some with arm.episodes(...)",
+        )
+    first, kind = used[0], _kind(used[0])
+    for episode in used[1:]:
+        other = _kind(episode)
+        if other != kind:
+            names = sorted(set(other.items()) ^ set(kind.items()), key=str)
+            raise CommandRejected(
+                f"all episodes must have the same streams, cameras and rate; {episode.path.name} and "
+                f"{first.path.name} differ in {', '.join(dict.fromkeys(name for name, _ in names))}",
+                parameter="episodes",
+                value=str(episode.path),
+                hint="delete the episode, or convert a folder for each kind",
+            )
+    return used
+
+
+def _kind(episode: Demonstration) -> dict[str, object]:
+    """What the episodes of a data set have in common."""
+    kind: dict[str, object] = {name: values.shape[1] for name, values in episode.signals.items()}
+    kind |= {f"the camera {name}": decoded(files[0]).shape for name, files in episode.views.items()}
+    return kind | {"action": episode.action.shape[1], "rate": episode.rate}
 
 
 def _grid(times: Mapping[str, Array], rate: float) -> Array:

@@ -1,6 +1,7 @@
 """Episodes as one HDF5 file in the layout of robomimic (Mandlekar et al. 2021), which many imitation learners read.
 
-`data/demo_N` holds an episode: `actions`, `rewards`, `dones`, and in `obs` the observations, shape (steps, ...) each.
+`data/demo_N` holds an episode: `actions`, `rewards`, `dones`, in `obs` the observations, shape (steps, ...) each, in
+`next_obs` those of the step after, which learners from rewards ask for; they are views of `obs` and take no space.
 `mask/success` and its like name the episodes of a label.
 """
 
@@ -12,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.errors import CommandRejected, require
-from heptarm.record.demonstration import Demonstration, Demonstrations
+from heptarm.errors import require
+from heptarm.record.demonstration import Demonstration, Demonstrations, of_one_kind
 from heptarm.record.pictures import decoded
 from heptarm.values.checks import flag, instance
 from heptarm.values.files import path_of, refuse_existing, unwritable
@@ -37,18 +38,13 @@ def save_hdf5(episodes: Demonstrations, file: str | Path, *, overwrite: bool = F
         overwrite: replace a file that is there.
 
     Raises:
-        CommandRejected: no episodes with steps; or the file exists or cannot be written.
+        CommandRejected: no episodes with steps, or such that differ in streams, cameras or rate; or the file exists or
+            cannot be written.
         MissingExtra: h5py or Pillow is not installed.
     """
     instance(episodes, Demonstrations, "episodes")
     path = refuse_existing(path_of(file, "file"), overwrite=flag(overwrite, "overwrite"), name="file")
-    used = [episode for episode in episodes if len(episode)]
-    if not used:
-        raise CommandRejected(
-            "there must be episodes with steps, got none",
-            parameter="episodes",
-            hint="choose other labels, or record some with arm.episodes(...)",
-        )
+    used = of_one_kind(episodes)
     h5py = require("h5py", extra="hdf5")
     new = path.with_name(f".{path.name}.new")  # what is there stays until the new one is complete
     try:
@@ -83,6 +79,9 @@ def _write(h5py: Any, out: Any, episodes: list[Demonstration]) -> None:
             pictures = np.stack([decoded(picture) for picture in files])
             chunk = (1, *pictures.shape[1:])
             observations.create_dataset(f"{camera}_image", data=pictures, chunks=chunk, compression="gzip")
+        following = group.create_group("next_obs")
+        for signal, values in observations.items():
+            following.create_virtual_dataset(signal, _shifted(h5py, values))
         masks.setdefault(episode.label, []).append(name)
     first = episodes[0]
     about = {"control_freq": first.rate, "robot": first.robot}
@@ -92,3 +91,13 @@ def _write(h5py: Any, out: Any, episodes: list[Demonstration]) -> None:
     )
     for label, names in masks.items():
         out.create_dataset(f"mask/{label}", data=names, dtype=h5py.string_dtype("ascii"))
+
+
+def _shifted(h5py: Any, values: Any) -> Any:
+    """The layout of a view of a dataset from its second row on; the last row is there twice."""
+    count, source = len(values), h5py.VirtualSource(values)
+    layout = h5py.VirtualLayout(values.shape, values.dtype)
+    if count > 1:
+        layout[: count - 1] = source[1:count]
+    layout[count - 1 :] = source[count - 1 :]
+    return layout

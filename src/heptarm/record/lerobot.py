@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, require
-from heptarm.record.demonstration import Demonstration, Demonstrations
+from heptarm.record.demonstration import Demonstration, Demonstrations, of_one_kind
 from heptarm.record.pictures import decoded
 from heptarm.values.checks import Array, flag, instance
 from heptarm.values.files import path_of, unwritable
@@ -59,7 +59,7 @@ def save_lerobot(episodes: Demonstrations, folder: str | Path, *, overwrite: boo
     instance(episodes, Demonstrations, "episodes")
     where = path_of(folder, "folder")
     replaces = flag(overwrite, "overwrite")
-    used = [episode for episode in episodes if len(episode)]
+    used = of_one_kind(episodes)
     features = _features(used)
     if (
         where.exists()
@@ -164,14 +164,8 @@ def _features(episodes: Sequence[Demonstration]) -> dict[str, dict[str, Any]]:
     """The features of a data set, as info.json has them.
 
     Raises:
-        CommandRejected: there are none, or the episodes differ.
+        CommandRejected: a rate that LeRobot has not.
     """
-    if not episodes:
-        raise CommandRejected(
-            "there must be episodes with steps, got none",
-            parameter="episodes",
-            hint="choose other labels, or record some with arm.episodes(...)",
-        )
     first, shapes = episodes[0], _shapes(episodes[0])
     if abs(first.rate - round(first.rate)) > 1e-6 or first.rate < 1.0:
         raise CommandRejected(
@@ -180,18 +174,6 @@ def _features(episodes: Sequence[Demonstration]) -> dict[str, dict[str, Any]]:
             value=first.rate,
             hint="load_episodes(folder, rate=...) chooses another one",
         )
-    for episode in episodes[1:]:
-        other = _shapes(episode)
-        if other != shapes or episode.rate != first.rate:
-            names = sorted(set(other.items()) ^ set(shapes.items()), key=str)
-            differs = ", ".join(dict.fromkeys(str(name) for name, _ in names)) or "rate"
-            raise CommandRejected(
-                f"all episodes must have the same streams, cameras and rate; {episode.path.name} and "
-                f"{first.path.name} differ in {differs}",
-                parameter="episodes",
-                value=str(episode.path),
-                hint="delete the episode, or convert a folder for each kind",
-            )
     found: dict[str, dict[str, Any]] = {}
     for name, shape in shapes.items():
         if name.startswith("observation.images."):

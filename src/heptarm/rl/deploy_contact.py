@@ -19,9 +19,9 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, LimitError, ShapeError, StaleState, StreamError, Timeout, inside
 from heptarm.laws.ready import cartesian_impedance
 from heptarm.model.inverse_kinematics import solve
-from heptarm.rl.contact.task import ContactTask, Moment
+from heptarm.rl.contact.pilot import ContactPilot
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.deploy import marked
-from heptarm.rl.pilot import Decisions
 from heptarm.rl.policy import Policy
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.tasks import deployed_task
@@ -51,8 +51,6 @@ _CLEAR = 0.02
 _APPROACH, _RETREAT = 0.1, 0.05
 #: The zero of the wrench is the mean of so many seconds at rest: a single reading is as uncertain as what it measures.
 _ZEROING = 0.5
-#: An episode is over when nothing has been missing for so long [s].
-_SETTLED = 0.5
 #: Longest wait for these [s].
 _PATIENCE = 30.0
 #: A tick that is so late on the robot's clock is counted [ns].
@@ -92,6 +90,12 @@ class ContactSettings:
         within(self.speed, "speed", 0.0, 1.0, above=True, unit="m/s")
         within(self.latency, "latency", 0.0, 0.5, unit="s")
         within(self.stale, "stale", 0.02, 2.0, unit="s")
+
+
+def spring_of(task: ContactTask, settings: ContactSettings) -> CartesianImpedance:
+    """The impedance in which a task is done, with the largest force of a deployment."""
+    stiffness = np.repeat([task.stiffness, task.turn_stiffness], 3)
+    return CartesianImpedance(stiffness, damping=_RATIO, max_force={"xyz": settings.force})
 
 
 #: Poses of the free bodies of a task's scene by their names, in the base: of a camera, or of the virtual cabinet.
@@ -242,9 +246,8 @@ class _Run:
         self._arm, self._settings = arm, settings
         self._bodies, self._gripper = bodies, gripper
         self._task: ContactTask = policy.task
-        self._decisions = Decisions(policy, rate=self._task.rate)
-        self._stiffness = np.repeat([self._task.stiffness, self._task.turn_stiffness], 3)
-        self._spring = CartesianImpedance(self._stiffness, damping=_RATIO, max_force={"xyz": settings.force})
+        self._pilot = ContactPilot(policy)
+        self._spring = spring_of(self._task, settings)
         begins = self._task.starts(np.random.default_rng(0), 100)
         #: The middle of the starts, in the frame of the task.
         self._start = Pose.from_rotvec(begins[:, :3].mean(axis=0), begins[:, 3:].mean(axis=0))
@@ -270,7 +273,6 @@ class _Run:
         arm.wait_for_rest()
         tip = _Tip(arm, origin, frame)
         tip.zero(_ZEROING)
-        self._decisions.begin()
         through = self._by_torques if self._settings.through == "fri" else self._by_servo
         found = through(tip, origin, target)
         height = float(found.poses[-1][2]) - float(self._start.xyz[2])
@@ -303,31 +305,29 @@ class _Run:
         """Set-points of an impedance of torques over FRI."""
         law = cartesian_impedance(
             frame=self._tip,
-            stiffness=self._stiffness,
+            stiffness=self._spring.stiffness,
             damping=_RATIO,
             force_max=self._settings.force,
             speed=self._settings.speed,
         )
         with self._arm.fri("torque", period_ms=_PERIOD, law=law) as session:
-            drive = _ByTorques(session, self._arm.state, self._stiffness)
+            drive = _ByTorques(session, self._arm.state, self._spring.stiffness)
             return self._decide(drive, tip, origin, target)
 
     def _decide(self, drive: _Drive, tip: _Tip, origin: Pose, target: Array) -> _Episode:
         """Let the policy decide until the episode, or the stream of set-points, ends."""
-        task, settings = self._task, self._settings
+        task, settings, pilot = self._task, self._settings, self._pilot
         state = drive.start
         pose = tip.pose(state)
-        now = self._moment(origin, pose, task.begin(pose), np.zeros(6), target)
+        pilot.begin(pose, target, self._seen(origin))
         delay = round(settings.latency * task.rate * _FINE)
-        waiting = deque([now.command] * (delay + 1), maxlen=delay + 1)
-        frames = deque([task.frame(now)] * (max(task.history) + 1))
-        poses, joints, forces, missing, late = [pose], [state.q], [], [], 0
-        settled, ended, abrupt = 0, "", 0.0
-        for step in range(task.steps):
-            last = now.command
-            action = self._decisions.action(task.observe(np.array(frames)))
-            command = task.advance(last, pose, action)
-            self._decisions.check(action, last, command)
+        waiting = deque([pilot.now.command] * (delay + 1), maxlen=delay + 1)
+        poses, joints, late = [pose], [state.q], 0
+        forces: list[float] = []
+        missing: list[float] = []
+        ended, abrupt = "", 0.0
+        while not pilot.is_over:
+            last, command = pilot.decide()
             wrenches = []
             for part in range(1, _FINE + 1):
                 waiting.append(last + (command - last) * part / _FINE)
@@ -335,7 +335,7 @@ class _Run:
                 drive.set(origin @ Pose.from_rotvec(due[:3], due[3:6]))
                 if isinstance(drive, _ByTorques) and task.has_stiffness:
                     drive.soften(float(task.fraction(due)))
-                time = (step * _FINE + part) / (task.rate * _FINE)
+                time = (len(missing) * _FINE + part) / (task.rate * _FINE)
                 reached = tip.wait(drive, time, settings.stale)
                 if reached is None:
                     ended = "early"
@@ -351,20 +351,14 @@ class _Run:
                 break
             self._grip(last, command)
             pose, wrench = tip.pose(state), np.mean(wrenches, axis=0)
-            now = replace(self._moment(origin, pose, command, wrench, target), memory=now.memory)
-            now = replace(now, memory=task.remember(now), time=np.array((step + 1) / task.rate))
-            frames.appendleft(task.frame(now))
-            frames.pop()
+            pilot.measure(pose, wrench, self._seen(origin))
             poses.append(pose)
             joints.append(state.q)
             forces.append(float(np.linalg.norm(wrench[:3])))
-            missing.append(float(task.left(now)))
-            settled = settled + 1 if missing[-1] <= task.radius else 0
-            if settled >= _SETTLED * task.rate:
-                break
+            missing.append(pilot.missing)
         left = task.steps - len(missing)
         # one that ended early has failed
-        last_missing = float(task.left(now)) + (task.radius if ended else 0.0)
+        last_missing = pilot.missing + (task.radius if ended else 0.0)
         return _Episode(
             np.array(poses + [poses[-1]] * left),
             np.array(joints + [joints[-1]] * left),
@@ -374,12 +368,10 @@ class _Run:
             ended,
         )
 
-    def _moment(self, origin: Pose, pose: Array, command: Array, wrench: Array, target: Array) -> Moment:
+    def _seen(self, origin: Pose) -> dict[str, Array]:
+        """Where the free bodies are in the frame of the task."""
         seen = {} if self._bodies is None else self._bodies()
-        to_task = origin.inverse()
-        bodies = {name: _numbers(to_task @ place) for name, place in seen.items()}
-        memory = np.zeros(self._task.memory_size)
-        return Moment(pose, command, wrench, target, bodies=bodies, memory=memory)
+        return {name: _numbers(origin.inverse() @ place) for name, place in seen.items()}
 
     def _grip(self, last: Array, command: Array) -> None:
         """Close or open the gripper where the policy has changed its mind."""

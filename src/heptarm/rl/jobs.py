@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import runpy
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -43,16 +45,20 @@ _WATCHDOG = 5.0
 class TrainJob(Job["tuple[Trained, EpisodeReport]"]):
     """Train a policy, and evaluate it on `EPISODES` unseen targets; returns the training and the report. Needs torch.
 
+    A job whose worker is lost goes on from its last checkpoint, if it is run again on the same machine.
+
     Attributes:
         recipe: what to train.
         device: where the networks learn.
         engine: class of the simulation's engine.
+        key: names the folder of its checkpoints, in the worker's folder of temporary files.
     """
 
     recipe: Recipe
     _: KW_ONLY
     device: str = "cpu"
     engine: Any = Engine
+    key: str = field(default_factory=lambda: uuid4().hex, compare=False)
 
     @property
     def gpus(self) -> int:
@@ -61,8 +67,22 @@ class TrainJob(Job["tuple[Trained, EpisodeReport]"]):
 
     def run(self) -> tuple[Trained, EpisodeReport]:
         """Train and evaluate."""
-        work = require("heptarm.rl.train.train", extra="rl").train
-        trained = work(self.recipe, device=self.device, engine=self.engine, threads=1)
+        training = require("heptarm.rl.train.train", extra="rl")
+        folder = Path(gettempdir()) / f"heptarm-training-{self.key}"
+        out = folder / "policy.npz"
+        try:
+            folder.mkdir(mode=0o700, exist_ok=True)
+            trained = training.train(
+                self.recipe,
+                out=out,
+                resume=out if training.beside(out).exists() else None,
+                device=self.device,
+                engine=self.engine,
+                threads=1,
+                overwrite=True,
+            )
+        finally:  # a worker that is killed leaves it
+            shutil.rmtree(folder, ignore_errors=True)
         return trained, evaluate(trained.policy, EPISODES, threads=1)
 
 

@@ -165,6 +165,21 @@ def shipped_peg() -> Policy[PegInHole]:
     return Policy.load(SHIPPED / "peg-in-hole-iiwa14.npz")
 
 
+def policy_named(name: str | os.PathLike[str], *, feature: bool = False) -> Policy[Any]:
+    """The policy of a file, or the included one of a task by its name: "reach", "peg-in-hole".
+
+    Args:
+        name: the file or the task; "": "reach".
+        feature: of the included ones of reach, the one that also sees the way to the target.
+
+    Raises:
+        CommandRejected: the file does not exist, or is not a policy of this version.
+    """
+    if os.fspath(name) in ("", ReachTask.name):
+        return shipped(feature=feature)
+    return shipped_peg() if os.fspath(name) == PegInHole.name else Policy.load(name)
+
+
 def _weights(values: npt.ArrayLike) -> Weights:
     result = np.array(values, dtype=np.float32)
     result.flags.writeable = False

@@ -21,6 +21,17 @@ from heptarm.rl.pool import Job, JobResult, run_jobs
 from heptarm.rl.sweep import sweep
 
 JOBS = Group("Many at once")
+Seeds = Annotated[
+    str, Parameter(group=JOBS, help="Several seeds, each a job of its own: 0..4 or 0,3,7. Default: --seed.")
+]
+Sweeps = Annotated[
+    tuple[str, ...],
+    Parameter(
+        group=JOBS,
+        help="NAME=VALUE,VALUE: a job for each value of a setting of the task, such as clearance=1e-3,2e-4; of a "
+        "training also of its algorithm, such as gamma=0.95,0.97; or randomisation. Repeat it for all combinations.",
+    ),
+]
 #: Figures that are in files and JSON alone, since they would take the whole width of a table.
 _HIDDEN = ("file",)
 #: Width of a table that is not on a terminal [characters].

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.cli.jobs import HERE, JOBS, JobOptions, cases_of, name_of
 from heptarm.cli.options import (
     NO_TARGET,
     CommandTarget,
@@ -25,13 +24,14 @@ from heptarm.cli.options import (
     Yes,
 )
 from heptarm.cli.output import confirm, emit
+from heptarm.cli.rl.jobs import HERE, JobOptions, Seeds, Sweeps, cases_of, name_of
 from heptarm.errors import CommandRejected, HeptarmError, NotReady, require
 from heptarm.rl import deploy as deployment
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
-from heptarm.rl.policy import Policy, shipped, shipped_peg
+from heptarm.rl.policy import Policy, policy_named
 from heptarm.rl.pool import Job
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
@@ -64,9 +64,6 @@ Engine = Annotated[
 ]
 _POLICY = "File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."
 AnyPolicy = Annotated[Path | None, Parameter(help=_POLICY)]
-Seeds = Annotated[
-    str, Parameter(group=JOBS, help="Several seeds, each a job of its own: 0..4 or 0,3,7. Default: --seed.")
-]
 
 
 def train(
@@ -86,10 +83,7 @@ def train(
     ] = False,
     steps: Annotated[
         int,
-        Parameter(
-            help="Environment steps; 0: 2.2 million, 1.3 with the feature, 0.6 of an insertion, 1.2 of others "
-            "with contacts."
-        ),
+        Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 with contacts."),
     ] = 0,
     seed: Seed = 0,
     fitted: Annotated[
@@ -102,14 +96,7 @@ def train(
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
     engine: Engine = "mujoco",
     seeds: Seeds = "",
-    sweep: Annotated[
-        tuple[str, ...],
-        Parameter(
-            group=JOBS,
-            help="NAME=VALUE,VALUE: train with each value of a setting of algorithm or task, such as "
-            "learning_rate=3e-4,1e-3; may be repeated for all combinations.",
-        ),
-    ] = (),
+    sweep: Sweeps = (),
     jobs: JobOptions = HERE,
     overwrite: Overwrite = False,
     as_json: Json = False,
@@ -287,14 +274,7 @@ def evaluate(
         ),
     ] = None,
     seeds: Seeds = "",
-    sweep: Annotated[
-        tuple[str, ...],
-        Parameter(
-            group=JOBS,
-            help="NAME=VALUE,VALUE: evaluate with each value of a setting of the task, or of randomisation, such as "
-            "clearance=1e-3,2e-4; may be repeated for all combinations.",
-        ),
-    ] = (),
+    sweep: Sweeps = (),
     jobs: JobOptions = HERE,
     overwrite: Overwrite = False,
     as_json: Json = False,
@@ -320,7 +300,7 @@ def evaluate(
     from heptarm.rl.evaluate import evaluate as work
 
     _refuse_reports(out, overwrite=overwrite, film=False)
-    network = _load(policies[0] if policies else None)
+    network = policy_named(policies[0] if policies else ReachTask.name)
     known = _randomisation(network, randomisation)
     report = work(network, episodes, randomisation=known, seed=seed, engine=_engine(engine))
     return _report(report, out, film=False, overwrite=overwrite, as_json=as_json)
@@ -332,7 +312,7 @@ def _evaluation(
     """An evaluation as a job, and what distinguishes it."""
     from heptarm.rl.jobs import EvaluateJob
 
-    network = _load(Path(policy))
+    network = policy_named(policy)
     task = network.task
     for name, value in settings.items():
         if name not in ("seed", "randomisation"):
@@ -410,7 +390,7 @@ def deploy(
     scene peg-in-hole; or once at each --at. A recording is written in any case, and compared with the simulator, which
     takes as long as the deployment: --twin none does without.
     """
-    network = _load(policy)
+    network = policy_named(policy or ReachTask.name)
     if isinstance(network.task, ContactTask):
         if ask or follow or film or stiffness is not None:
             raise CommandRejected(
@@ -487,13 +467,6 @@ def _compared(
         "notes": list(found.notes),
     }
     return replace(report, facts={**report.facts, "recording": str(recording), "twin": facts})
-
-
-def _load(file: Path | None) -> Policy[Any]:
-    """The policy of a file, or the included one of a task by its name."""
-    if file is None or str(file) == ReachTask.name:
-        return shipped()
-    return shipped_peg() if str(file) == PegInHole.name else Policy.load(file)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from heptarm.cli.jobs import HERE, JobOptions
 from heptarm.cli.options import Json
+from heptarm.cli.rl.jobs import HERE, JobOptions
 from heptarm.record.episodes import next_number
 from heptarm.rl.jobs import RecordJob, Script
 from heptarm.rl.pool import Job

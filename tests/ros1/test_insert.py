@@ -1,0 +1,64 @@
+"""A policy with contacts over ROS 1: the example takes a peg out of its holder, and the node `reach` inserts it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tests.conformance import logs
+from tests.conformance.stage import ROOT, Stage
+from tests.ros1.peer import NODE, PATIENCE, Client, NodeProcess
+
+GRIPPER = {
+    "gripper__open": "OutputX3Pin1",
+    "gripper__close": "OutputX3Pin2",
+    "gripper__is_open": "InputX3Pin3",
+    "gripper__is_closed": "InputX3Pin4",
+}
+
+
+@pytest.fixture
+def place() -> Iterator[Stage]:
+    running = Stage("--scene", "peg-in-hole")
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def policy(ros: None) -> Iterator[Callable[[], str]]:
+    """The node of the policy; returns its log."""
+    log = logs.new()
+    with log.open("w") as file:
+        command = [sys.executable, str(NODE.with_name("reach")), "_policy:=peg-in-hole", "__ns:=/work"]
+        process = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT)
+    yield log.read_text
+    process.terminate()
+    process.wait(PATIENCE)
+
+
+@pytest.fixture
+def driver(ros: None, place: Stage) -> Iterator[NodeProcess]:
+    """The node of the arm."""
+    running = NodeProcess(place.target, ns="/work", **GRIPPER)
+    yield running
+    assert running.end() == 0, running.said
+
+
+@pytest.mark.long  # what decides is in tests/rl/test_contact_follower.py
+def test_the_example_inserts_a_peg(place: Stage, driver: NodeProcess, policy: Callable[[], str]) -> None:
+    Client(place, "/work/heptarm").ready()
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples" / "ros1" / "insert.py"), "__ns:=/work"],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = re.search(r"([\d.]+) mm are missing", done.stdout)
+    assert found and float(found[1]) < 1.5, done.stdout + policy()
+    assert "episode ended by success" in policy()
