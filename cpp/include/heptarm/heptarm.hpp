@@ -2997,7 +2997,7 @@ inline Meaning meaning_of(int code) {
         case 30: return {Kind::NotInControl, "this client does not control the robot", "take control first"};
         case 31: return {Kind::NotInControl, "another client controls the robot", "wait until it releases control, or observe"};
         case 40: return {Kind::CommandRejected, "this cabinet cannot do that", "see the capabilities of the cabinet, and install the option that is missing"};
-        case 41: return {Kind::ModeConflict, "something else is running", "wait for it, cancel it, or use when='replace' or when='queue'"};
+        case 41: return {Kind::ModeConflict, "something else is running", "wait for it, or cancel it"};
         case 42: return {Kind::CommandRejected, "no frame, tool, signal or process data of that name", "check the spelling of the name"};
         case 43: return {Kind::CommandRejected, "no motion of that id is running or queued", "it may have ended already; see its result"};
         case 44: return {Kind::ModeConflict, "the control mode and the command do not go together", "choose a combination that the guide lists"};

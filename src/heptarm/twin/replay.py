@@ -323,7 +323,7 @@ class _Run:
 
     @contextmanager
     def _repetition(self, section: Section) -> Iterator[_Seen]:
-        """Note what becomes of a motion that a client repeats here, or why it is refused."""
+        """Note the number of a motion that a client repeats here, or why it is refused."""
         seen, refusal = _Seen(), ""
         try:
             yield seen

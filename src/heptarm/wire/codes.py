@@ -75,7 +75,7 @@ MEANINGS: dict[int, Meaning] = {
     30: Meaning('NotInControl', 'this client does not control the robot', 'take control first'),
     31: Meaning('NotInControl', 'another client controls the robot', 'wait until it releases control, or observe'),
     40: Meaning('CommandRejected', 'this cabinet cannot do that', 'see the capabilities of the cabinet, and install the option that is missing'),
-    41: Meaning('ModeConflict', 'something else is running', 'wait for it, cancel it, or use when="replace" or when="queue"'),
+    41: Meaning('ModeConflict', 'something else is running', 'wait for it, or cancel it'),
     42: Meaning('CommandRejected', 'no frame, tool, signal or process data of that name', 'check the spelling of the name'),
     43: Meaning('CommandRejected', 'no motion of that id is running or queued', 'it may have ended already; see its result'),
     44: Meaning('ModeConflict', 'the control mode and the command do not go together', 'choose a combination that the guide lists'),

@@ -392,7 +392,7 @@ class Controller:
     def _advance_overlay(self, reading: Reading, now: int) -> None:
         """Activate a synchronised overlay, or end one."""
         if reading.safety is not m.Safety.NORMAL_OPERATION:
-            self._end("safety", f"the motion with the FRI overlay was ended by a {_STOPS[reading.safety]}")
+            self._end("safety", f"a {_STOPS[reading.safety]} ended the FRI overlay")
         elif self.state is m.SessionState.MONITORING_READY:
             if self._ready >= SETTLED:
                 self._go(m.SessionState.COMMANDING_WAIT)

@@ -43,7 +43,7 @@ public final class Code {
     public static final int CONTROL_TAKEN = 31;
     /** this cabinet cannot do that: see the capabilities of the cabinet, and install the option that is missing. */
     public static final int UNSUPPORTED = 40;
-    /** something else is running: wait for it, cancel it, or use when="replace" or when="queue". */
+    /** something else is running: wait for it, or cancel it. */
     public static final int BUSY = 41;
     /** no frame, tool, signal or process data of that name: check the spelling of the name. */
     public static final int UNKNOWN_NAME = 42;

@@ -111,7 +111,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
             boolean busy = running != null || !queue.isEmpty();
             if (run.when == When.REJECT && busy) {
                 throw new CommandRejected(Code.BUSY, "when", "reject", "", "motion " + (running != null ? running.id : queue.peek().id)
-                        + " is running; wait for it, or use when=\"queue\" or when=\"replace\"");
+                        + " is running; a program need not wait with when=\"queue\" or when=\"replace\"");
             }
             if (queue.size() >= MAX_QUEUED) {
                 throw new CommandRejected(Code.QUEUE_FULL, "at most " + MAX_QUEUED + " programs may wait; wait until one has started");
@@ -167,7 +167,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
         }
         if (running != null || !queue.isEmpty()) {
             throw new CommandRejected(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
-                    + " is running; wait for it or stop it before you open a servo motion or an FRI session");
+                    + " is running; a servo motion or an FRI session begins with the arm at rest");
         }
         Program program = queue(null, activity);
         activity.number(program.id);
@@ -183,7 +183,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
     public synchronized void whileIdle(Change change) throws CommandRejected {
         if (running != null || !queue.isEmpty()) {
             throw new CommandRejected(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
-                    + " is running; wait for it or stop it before you change the load");
+                    + " is running; the load changes while the arm is at rest");
         }
         change.make();
     }
