@@ -12,6 +12,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
 from heptarm.planning.seam import TICK_NS
+from heptarm.sim.controller.command import MotionCommand
 from heptarm.sim.fri.controller_side import Controller
 from heptarm.sim.fri.overlay import MotionOverlay, control_mode
 from heptarm.sim.fri.sessions import PlantArm
@@ -20,6 +21,8 @@ from heptarm.sim.plant.plant import Plant
 from heptarm.values.checks import Array
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
+from tests.sim import motions
+from tests.sim.driving import Ear
 from tests.sim_fri.rig import READY, Client, Law, State, mirror
 
 FLOATING = JointImpedance(0.0)
@@ -98,6 +101,56 @@ def test_a_position_overlay_is_tracked_within_a_milliradian(period: int, behind:
     # the state after a tick is a tick later than the message that the tick's command answers
     late = [world.q[first + k] - target((k + 1 - behind) * 1e-3, 0.3) for k in range(100, 3000)]
     assert float(np.abs(late).max()) < 1e-3 and start > 0
+
+
+def overlaid(goal: tuple[float, ...], law: Law = mirror) -> tuple[World, Ear]:
+    """A motion under a client's overlay, as it begins."""
+    world, ear = World(), Ear()
+    while world.controller.state is not State.MONITORING_READY:
+        world.run(1)
+    world.plant.submit(MotionCommand(1, motions.ptp(goal), is_overlaid=True, listener=ear))
+    world.run(50)
+    assert (world.q[-1] == world.q[0]).all(), "it waits for its client"
+    world.controller.start(MotionOverlay())
+    world.client.law = law
+    while world.controller.state is not State.COMMANDING_ACTIVE:
+        world.run(1)
+    return world, ear
+
+
+def test_a_client_superposes_a_sine_on_a_motion() -> None:
+    """It adds to the interpolator's positions, as programs do that weave along a path."""
+    goal, began, seen = tuple(np.add(READY, 0.4).tolist()), [], []
+
+    def law(message: m.Monitoring) -> m.Command:
+        assert message.ipo is not None and message.ipo.q is not None and message.monitor is not None
+        assert message.monitor.stamp is not None
+        time = message.monitor.stamp.seconds + message.monitor.stamp.nanoseconds * 1e-9
+        began.append(time)
+        seen.append(message.ipo.q)
+        weave = 0.05 * (1.0 - cos(8.0 * (time - began[0])))
+        return replace(mirror(message), q=(*message.ipo.q[:6], message.ipo.q[6] + weave))
+
+    world, ear = overlaid(goal, law)
+    while "done" not in ear.causes and len(world.q) < 6000:
+        world.run(1)
+    assert ear.causes == ["started", "done"] and world.ends == []
+    path, measured = np.array(seen), np.array(world.q[-len(seen) :])
+    assert path[0] == pytest.approx(READY) and path[-1] == pytest.approx(goal, abs=1e-3)
+    assert (np.diff(path, axis=0) >= -1e-12).all(), "the motion beneath goes on along its path"
+    assert measured[-1][:6] == pytest.approx(goal[:6], abs=2e-3)
+    assert 0.09 < float((measured - path)[:, 6].max()) < 0.11
+
+
+def test_a_client_that_falls_silent_amid_a_motion_stops_the_arm() -> None:
+    world, _ = overlaid(tuple(np.add(READY, 1.0).tolist()))
+    world.run(400)
+    moved = float(np.abs(world.q[-1] - READY).max())
+    world.client.answer = lambda datagram: None  # type: ignore[method-assign]
+    world.run(1500)
+    assert [end.cause for end in world.ends] == ["quality"]
+    assert moved > 0.02 and float(np.abs(world.plant.snapshot.dq).max()) < 1e-3
+    assert float(np.abs(world.q[-1] - READY).max()) < 0.9, "it does not go on by itself"
 
 
 def test_a_torque_law_balances_the_floating_arm() -> None:

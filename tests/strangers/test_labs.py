@@ -159,7 +159,7 @@ def cabinet_of(main: str, labs: application.Survey, folder: Path, speed: str, **
 
 
 def test_an_fri_sample_runs_to_its_end_with_its_client(tmp_path: Path, labs: application.Survey) -> None:
-    """The client turns A7 by 0.05 rad, then commands no wrench."""
+    """The client turns A7 by 0.05 rad, of a position and on a motion, then commands no wrench."""
     file = tmp_path / "report.txt"
     with Client(0) as client:
         data: dict[str, str | int] = {"lab_file": str(file), "lab_fri": client.port}
@@ -178,7 +178,7 @@ def test_an_fri_sample_runs_to_its_end_with_its_client(tmp_path: Path, labs: app
                         break
                     elif state.is_commanding:
                         turned = 0.05 * min(1.0, state.t - start.t)
-                        client.command(q=start.q_ipo + turned * np.eye(7)[6])
+                        client.command(q=state.q_ipo + turned * np.eye(7)[6])
             log = cabinet.communicate(timeout=PATIENCE)[0]
     said, where = file.read_text().splitlines()
     assert cabinet.returncode == 0 and said == "FriSine true true true", log

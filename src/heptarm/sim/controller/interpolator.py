@@ -14,8 +14,10 @@ after this tick. Everything else happens in the phase of that command, `RunningM
 
 timed      moves along the path of its plan. The path's own time passes at the speed override; where axes cannot
            follow a change of it, only a part of the change is made (`_step`).
-holding    has no path: a hold waits until its time is over, anything else without a path has nothing to do.
-overlaid   a hold whose set-points an FRI client gives. It has no way back: once the client is silent, the axes brake.
+holding    does not move: a hold waits until its time is over, a motion that an FRI client overlays for the client;
+           anything else without a path has nothing to do.
+overlaid   an FRI client gives the set-points. The motion beneath goes on, seen by the client alone, and ends the
+           overlay with it (`_carry`). It has no way back: once the client is silent, the axes brake.
 guided     a hand moves the arm while the enabling switch is held.
 servoing   follows targets with a `Follower`, on the time of the speed override as a timed motion does.
 stopped    a safety stop brakes each axis of a servo motion by itself, since its axes have no path in common. When the
@@ -104,7 +106,8 @@ class RunningMotion:
         cancelled: somebody has ended it, or a condition.
         broken: a condition has.
         failure: text of the error that has; "" none.
-        path: phases timed and braking; None: there is none, or a follower brakes.
+        path: phases timed and braking, and beneath an overlay; None: there is none, or a follower brakes.
+        carried: set-point of the motion beneath an overlay, shape (7,) [rad]; None: there was none.
         follower: phases servoing, stopped and braking.
         stop: phase stopped.
         guided: phase guided.
@@ -113,6 +116,7 @@ class RunningMotion:
     __slots__ = (
         "broken",
         "cancelled",
+        "carried",
         "command",
         "failure",
         "follower",
@@ -149,7 +153,9 @@ class RunningMotion:
         self.failure = ""
         self.part = 0
         self.time = 0.0
-        self.phase: Phase = "holding" if self.path is None or self.profile is None else "timed"
+        waits = self.path is None or self.profile is None or command.is_overlaid
+        self.phase: Phase = "holding" if waits else "timed"
+        self.carried: Array | None = None
         self.has_braked = False
         self.cancelled = False
         self.settling = 0
@@ -344,7 +350,8 @@ class Interpolator:
     @property
     def interpolated(self) -> Array:
         """Set-point of the next tick without an overlay, shape (7,) [rad]; of a hold: its start."""
-        return self.run.plan.end if self.is_overlaid and self.run is not None else self.command.after
+        run = self.run
+        return self.command.after if run is None or run.carried is None else run.carried
 
     @property
     def rests(self) -> bool:
@@ -653,26 +660,44 @@ class Interpolator:
     # ------------------------------------------------------------------------------------------------ without a path
 
     def _hold(self, run: RunningMotion) -> tuple[float, float]:
-        """Wait for the end of a hold, or take the set-points of an FRI overlay."""
+        """Wait for the end of a hold, or for the FRI client that overlays a motion, or take its set-points."""
         is_hold = isinstance(run.plan.motion, Hold)
         ends = run.cancelled or run.failure or run.time >= run.plan.duration
-        if self.action is not None and is_hold and not ends:
+        if self.action is not None and (is_hold or run.command.is_overlaid) and not ends:
             run.phase = "overlaid"
-            run.time += self.step
+            progress = self._carry(run)
             self._command.after = (
                 self._held(run) if self.action.is_missing else self._overlaid(run, self.action)
             )
-            return 0.0, nan
+            return progress
         if run.phase == "overlaid":
             if not self._control.is_stiff:  # the spring that torques have wound would throw the arm
                 self._take_over()
             self._halt(run)
             return self._follow(run)
+        if run.command.is_overlaid and not is_hold:
+            return 0.0, run.plan.duration
         run.time += self.step
         if run.cancelled or run.time >= run.plan.duration or not is_hold:
             run.settle()
             self._reach(run, 1.0)
         return min(1.0, run.time / run.plan.duration), run.plan.duration - run.time
+
+    def _carry(self, run: RunningMotion) -> tuple[float, float]:
+        """Let the motion beneath an overlay go on; returns its progress and remaining time."""
+        run.time += self.step
+        path, profile = run.path, run.profile
+        if path is None or profile is None:
+            run.carried = run.plan.end
+            return 0.0, nan
+        s = _clipped(profile.at(run.time)[0])
+        self._reach(run, s)
+        try:
+            here = self._command.after if run.carried is None else run.carried
+            run.carried = run.plan.end if s == 1.0 else path.at(s, here)
+        except Unreachable as error:
+            run.failure = f"the path is not reachable: {error.text}"
+        return run.plan.progress(s, run.part), run.plan.duration - run.time
 
     def _overlaid(self, run: RunningMotion, action: Superposition) -> Array:
         """The set-point of an overlay, under the control mode of its hold."""

@@ -403,7 +403,7 @@ class Plant:
         return np.concatenate([self.data.xpos[index], np.roll(self.data.xquat[index], -1)])
 
     def overlay(self, action: Superposition | None) -> None:
-        """Overlay the running hold in the next tick; None after an overlay: brake, and end the hold."""
+        """Overlay the running motion in the next tick; None after an overlay: brake, and end the motion."""
         self.interpolator.action = action
 
     def step(self, ticks: int = 1) -> None:

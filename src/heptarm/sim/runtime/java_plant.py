@@ -178,16 +178,10 @@ class JavaPlant:
             made = command_of(given, listener)
             overlay = given.fri_overlay
             if overlay is not None:
-                if not isinstance(given.motion, seam.Hold):
-                    log.warning(
-                        "the virtual cabinet superposes an FRI client's commands on positionHold only: this %s moves "
-                        "as it is",
-                        type(given.motion).__name__,
-                    )
                 overlaid = self._sessions.overlaid(
                     overlay.session, overlay.command, made.id, made.mode, JavaListener(listener)
                 )
-                made = replace(made, listener=overlaid)
+                made = replace(made, is_overlaid=True, listener=overlaid)
             self._plant.submit(made)
         except (PlanError, CommandRejected) as error:
             return str(error)

@@ -20,7 +20,7 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
-/** Waits for its client, holds a position that the client overlays, then a compliant one with the client's wrench. */
+/** Waits for its client, which overlays a position that it holds, a motion, and a compliant position with a wrench. */
 public class FriSine extends RoboticsAPIApplication {
     @Inject
     private LBR lbr;
@@ -57,6 +57,9 @@ public class FriSine extends RoboticsAPIApplication {
         FRIJointOverlay position = new FRIJointOverlay(session);
         lbr.move(positionHold(new PositionControlMode(), 3, TimeUnit.SECONDS).addMotionOverlay(position));
         boolean hasMoved = Math.abs(lbr.getCurrentJointPosition().get(6)) > 0.02;
+        lbr.move(ptp(0.3, 0.5, 0, -1.2, 0, 0.9, 0).setJointVelocityRel(0.2).addMotionOverlay(position));
+        boolean hasArrived = Math.abs(lbr.getCurrentJointPosition().get(0) - 0.3) < 0.01;
+        hasMoved &= hasArrived && Math.abs(lbr.getCurrentJointPosition().get(6)) > 0.02;
         FRIJointOverlay wrench = new FRIJointOverlay(session, ClientCommandMode.WRENCH);
         lbr.move(positionHold(new CartesianImpedanceControlMode(), 1, TimeUnit.SECONDS).addMotionOverlay(wrench));
         FRIChannelInformation channel = session.getFRIChannelInformation();
