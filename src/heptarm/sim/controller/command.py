@@ -55,10 +55,10 @@ class MotionCommand:
         tcp: flange to motion frame, x y z [m], quaternion x y z w.
         mode: control mode; None: position.
         axes: of the mode's frame as a quaternion in the base; None: as in the mode, "tool" or "base".
-        is_overlaid: an FRI client gives the set-points; the motion beneath waits for it.
         listener: receives start and end.
         part_listener: receives the parts of a batch or a spline.
         watches: break conditions and triggers, of the parts as well.
+        is_overlaid: an FRI client gives the set-points; the motion beneath waits for it.
     """
 
     id: int
@@ -66,7 +66,7 @@ class MotionCommand:
     tcp: tuple[float, ...] = ON_FLANGE
     mode: Mode | None = None
     axes: tuple[float, ...] | None = None
-    is_overlaid: bool = False
     listener: MotionListener | None = field(default=None, compare=False)
     part_listener: PartListener | None = field(default=None, compare=False)
     watches: tuple[ConditionWatch, ...] = field(default=(), compare=False)
+    is_overlaid: bool = False
