@@ -144,8 +144,7 @@ final class Reception {
 
     private void add(Newcomer newcomer) throws IOException {
         if (!settings.allows(newcomer.address)) {
-            newcomer.refuse(Code.NOT_ALLOWED,
-                    newcomer.address + " is not on the allow-list; add it to the process data heptarm.allow");
+            newcomer.refuse(Code.NOT_ALLOWED, newcomer.address + " is not on the allow-list");
         }
         synchronized (waiting) {
             makeRoom(newcomer.address);
