@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import warnings
-from dataclasses import fields
+from dataclasses import fields, replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -29,7 +30,7 @@ from heptarm.rl.sim.contact_batch import BatchContact
 from heptarm.rl.sim.episodes import BatchSettings
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import ReachTask
-from heptarm.rl.tasks import TASKS, environment, task_named
+from heptarm.rl.tasks import TASKS, environment, task_from_dict, task_named
 from heptarm.values.camera import Camera
 from heptarm.values.pose import Pose
 
@@ -104,6 +105,26 @@ def test_what_was_polished_is_remembered_where_the_force_was_right() -> None:
     moved = Moment(np.array([0, 0.03, 0, 0, 0, 0]), rest, weak.wrench, target, memory=weak.memory)
     assert task.remember(moved).sum() == 1.0
     assert task.missing(moved) == pytest.approx(task.length * 23 / 24)
+
+
+def test_an_observation_shows_what_is_asked_for() -> None:
+    task = Push(observation=("wrench", "joints", "pose"), history=(0,))
+    assert task.observation == ("joints", "pose", "wrench")
+    arms = simulate(task, TWO)
+    seen = arms.reset(seed=1)
+    assert seen.shape == (2, task.observation_size)
+    model = task.model
+    there = (seen[:, :7] + 1.0) / 2.0 * (model.q_max - model.q_min) + model.q_min
+    assert there == pytest.approx(arms.q)
+    full = Push(history=(0,), softest=0.5)
+    assert (
+        full.observation_size
+        == replace(full, observation=("pose", "wrench")).observation_size + len(Push.axes) + 1
+    )
+    assert task_from_dict(json.loads(json.dumps(task.as_dict()))) == task
+    for wrong in ("pose", ("torque",), (), ("pose", "pose"), (3,)):
+        with pytest.raises((CommandRejected, ShapeError), match="observation must"):
+            Push(observation=wrong)
 
 
 def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:

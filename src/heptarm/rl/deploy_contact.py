@@ -319,7 +319,7 @@ class _Run:
         task, settings, pilot = self._task, self._settings, self._pilot
         state = drive.start
         pose = tip.pose(state)
-        pilot.begin(pose, target, self._seen(origin))
+        pilot.begin(pose, target, self._seen(origin), q=state.q)
         delay = round(settings.latency * task.rate * _FINE)
         waiting = deque([pilot.now.command] * (delay + 1), maxlen=delay + 1)
         poses, joints, late = [pose], [state.q], 0
@@ -351,7 +351,7 @@ class _Run:
                 break
             self._grip(last, command)
             pose, wrench = tip.pose(state), np.mean(wrenches, axis=0)
-            pilot.measure(pose, wrench, self._seen(origin))
+            pilot.measure(pose, wrench, self._seen(origin), q=state.q)
             poses.append(pose)
             joints.append(state.q)
             forces.append(float(np.linalg.norm(wrench[:3])))

@@ -23,6 +23,8 @@ _FINE = 5
 _ZEROING, _AT_REST = 500_000_000, 1e-3
 #: An episode does not go on after so long without a state [s].
 _LOST = 2.0
+#: Joint positions, which no policy looks at here.
+_UNSEEN = np.zeros(7)
 
 
 class ContactFollower:
@@ -31,7 +33,7 @@ class ContactFollower:
     The wrench is zeroed for half a second first, with the arm at rest and in touch with nothing. Not thread-safe.
 
     Args:
-        policy: of a task with contacts that needs neither a gripper nor a camera.
+        policy: of a task with contacts that needs neither gripper, camera nor joint positions.
         settings: `force` and `peak` are those of a deployment; without a state for `stale` nothing is sent, and after
             two seconds the episode is over.
 
@@ -42,16 +44,17 @@ class ContactFollower:
         ended: how the last episode ended: "success", "time", "force", "stale", "failure", or "": it has not.
 
     Raises:
-        CommandRejected: the policy is of another task, or its task looks at bodies, uses a gripper or chooses the
-            stiffness.
+        CommandRejected: the policy is of another task, or its task looks at bodies or joint positions, uses a gripper
+            or chooses the stiffness.
     """
 
     def __init__(self, policy: Policy[Any], *, settings: ContactSettings | None = None) -> None:
         given = instance(policy, Policy, "policy").task
         task = self.task = deployed_task(given, ContactTask, given.model)  # type: ignore[type-abstract]
-        if task.look_size or task.has_gripper or task.has_stiffness:
+        if task.look_size or task.has_gripper or task.has_stiffness or task.shows("joints"):
             raise CommandRejected(
-                f"the policy must need neither gripper, camera nor a stiffness of its own, got one of {task.name}",
+                "the policy must need neither gripper, camera, joint positions nor a stiffness of its own, "
+                f"got one of {task.name}",
                 parameter="policy",
                 value=task.name,
                 hint="heptarm.rl.deploy_contact.deploy_contact deploys it",
@@ -161,7 +164,7 @@ class ContactFollower:
                 return None
             self._zero, self._started, self._decided = np.mean(self._loads, axis=0), self._stamp, 0
             self._is_under_way = True
-            self._pilot.begin(_in(origin, tip), self._goal, {})
+            self._pilot.begin(_in(origin, tip), self._goal, {}, q=_UNSEEN)
             self._decide()
         # by the robot's clock; a machine that is late decides less often
         passed = (self._stamp - self._started) * 1e-9 * self.task.rate - self._decided
@@ -170,7 +173,8 @@ class ContactFollower:
             passed -= int(passed)
             load = np.mean(self._loads, axis=0) - self._zero
             axes = origin.rotation
-            self._pilot.measure(_in(origin, tip), np.concatenate([load[:3] @ axes, load[3:] @ axes]), {})
+            felt = np.concatenate([load[:3] @ axes, load[3:] @ axes])
+            self._pilot.measure(_in(origin, tip), felt, {}, q=_UNSEEN)
             if self._pilot.is_over:
                 self._end("success" if self._pilot.missing <= self.task.radius else "time")
                 return None

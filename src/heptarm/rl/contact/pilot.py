@@ -46,17 +46,18 @@ class ContactPilot:
         """Whether nothing has been missing for half a second, or the episode has had all of its decisions."""
         return self._settled >= _SETTLED * self.task.rate or self._step >= self.task.steps
 
-    def begin(self, pose: Array, target: Array, bodies: Mapping[str, Array]) -> None:
+    def begin(self, pose: Array, target: Array, bodies: Mapping[str, Array], *, q: Array) -> None:
         """Start an episode with the arm at rest.
 
         Args:
             pose: of the tip, shape (6,) [m, rad].
             target: what the episode is about, shape (k,).
             bodies: poses of the free bodies that the task looks at, shape (6,) each.
+            q: joint positions, shape (7,) [rad].
         """
         self._decisions.begin()
         task, memory = self.task, np.zeros(self.task.memory_size)
-        self.now = Moment(pose, task.begin(pose), np.zeros(6), target, bodies=bodies, memory=memory)
+        self.now = Moment(pose, task.begin(pose), np.zeros(6), target, bodies=bodies, memory=memory, q=q)
         self._frames = deque([task.frame(self.now)] * (max(task.history) + 1))
         self._step = self._settled = 0
 
@@ -76,16 +77,17 @@ class ContactPilot:
         self.now = replace(self.now, command=command)
         return last, command
 
-    def measure(self, pose: Array, wrench: Array, bodies: Mapping[str, Array]) -> None:
+    def measure(self, pose: Array, wrench: Array, bodies: Mapping[str, Array], *, q: Array) -> None:
         """Take what has become of a decision.
 
         Args:
             pose: of the tip, shape (6,) [m, rad].
             wrench: on the tip, its mean since the decision less that before the episode, shape (6,) [N, Nm].
             bodies: see `begin`.
+            q: joint positions, shape (7,) [rad].
         """
         task = self.task
-        now = replace(self.now, pose=pose, wrench=wrench, bodies=bodies)
+        now = replace(self.now, pose=pose, wrench=wrench, bodies=bodies, q=q)
         self._step += 1
         self.now = replace(now, memory=task.remember(now), time=np.array(self._step / task.rate))
         self._frames.appendleft(task.frame(self.now))

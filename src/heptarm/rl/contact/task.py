@@ -2,7 +2,8 @@
 
 A policy moves the set-point of the impedance in steps. The set-point stays within a leash of the measured pose, so that
 the spring presses no harder than leash times stiffness, and within a box. An observation shows, of some of the last
-decisions each: pose of the tip, its set-point, the wrench on it, and what else a task looks at.
+decisions each: pose of the tip, its set-point, the wrench on it, joint positions if asked for, and what else a task
+looks at.
 
 Everything is given in the frame of the task, whose origin is where the work is, with z along the tool. A task is a
 subclass, a frozen dataclass: see `heptarm.rl.contact.push` for one of average size.
@@ -11,14 +12,14 @@ subclass, a frozen dataclass: see `heptarm.rl.contact.push` for one of average s
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, asdict, dataclass, field, fields
 from typing import Any, ClassVar
 
 import numpy as np
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.checks import Array, integer, numbers, shown, within
+from heptarm.values.checks import Array, integer, numbers, shown, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, robot
 
@@ -30,6 +31,24 @@ _WRENCH = np.array([10.0, 10.0, 10.0, 0.2, 0.2, 0.2])
 _MOST = 5.0
 #: x, y, z of a pose, and its rotation vector.
 _NUMBERS = 6
+_JOINTS = 7
+#: What an observation can show, in this order.
+_SHOWN = ("joints", "pose", "command", "wrench")
+
+
+def _observation(given: object) -> tuple[str, ...]:
+    """What an observation shows, in the order in which it does."""
+    if isinstance(given, str) or not isinstance(given, Sequence) or not given:
+        raise CommandRejected(
+            f"observation must be some of {', '.join(_SHOWN)}, got {shown(given)}", parameter="observation"
+        )
+    for what in given:
+        word(what, "observation", _SHOWN)
+    if len(set(given)) < len(given):
+        raise CommandRejected(
+            f"observation must name each thing once, got {', '.join(given)}", parameter="observation"
+        )
+    return tuple(what for what in _SHOWN if what in given)
 
 
 def quantity(value: float, unit: str) -> Any:
@@ -54,6 +73,7 @@ class Moment:
         memory: what `ContactTask.remember` returned last; zeros when an episode begins, shape (n, m).
         time: since the episode began, shape (n,) [s].
         friction: of everything that touches, shape (n,).
+        q: joint positions of the arm, shape (n, 7) [rad].
     """
 
     pose: Array
@@ -65,6 +85,7 @@ class Moment:
     memory: Array = field(default_factory=lambda: np.zeros(0))
     time: Array = field(default_factory=lambda: np.zeros(()))
     friction: Array = field(default_factory=lambda: np.zeros(()))
+    q: Array = field(default_factory=lambda: np.zeros(_JOINTS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +105,10 @@ class ContactTask(ABC):
         stiffness: of the impedance [N/m].
         turn_stiffness: likewise [Nm/rad].
         softest: lowest fraction of both that a policy may choose, by one more number of its actions; 1: they are fixed.
+        observation: what an observation shows: "joints", "pose", "command" (the set-point) and "wrench".
 
     Raises:
-        CommandRejected: unknown robot.
+        CommandRejected: unknown robot, or an observation of something else, twice the same, or nothing.
         ShapeError: something that is no number.
         LimitError: a number outside its range.
     """
@@ -127,6 +149,7 @@ class ContactTask(ABC):
     stiffness: float = quantity(1500.0, "N/m")
     turn_stiffness: float = quantity(60.0, "Nm/rad")
     softest: float = 1.0
+    observation: tuple[str, ...] = ("pose", "command", "wrench")
 
     def __post_init__(self) -> None:
         self.model  # noqa: B018  raises for an unknown robot
@@ -143,6 +166,7 @@ class ContactTask(ABC):
             )
         ages = [int(age) if isinstance(age, float) and age.is_integer() else age for age in ages]
         object.__setattr__(self, "history", tuple(integer(age, "history", 0, _OLDEST) for age in ages))
+        object.__setattr__(self, "observation", _observation(self.observation))
 
     # ------------------------------------------------------------------------------ what a task defines
 
@@ -220,6 +244,10 @@ class ContactTask(ABC):
         """The robot's dimensions and limits."""
         return robot(self.robot)
 
+    def shows(self, what: str) -> bool:
+        """Whether an observation shows "joints", "pose", "command" or "wrench"."""
+        return what in self.observation
+
     @property
     def has_stiffness(self) -> bool:
         """Whether a policy chooses the stiffness."""
@@ -228,7 +256,9 @@ class ContactTask(ABC):
     @property
     def frame_size(self) -> int:
         """Size of what a decision shows."""
-        return 3 * len(self.axes) + self.has_gripper + self.has_stiffness + self.look_size
+        joints, command = self.shows("joints"), self.shows("command")
+        size = _JOINTS * joints + len(self.axes) * (len(self.observation) - joints)
+        return size + (self.command_size - _NUMBERS) * command + self.look_size
 
     @property
     def observation_size(self) -> int:
@@ -256,16 +286,16 @@ class ContactTask(ABC):
 
     def frame(self, now: Moment) -> Array:
         """What a decision shows, one frame of an observation, shape (n, frame_size)."""
-        axes, scales = np.array(self.axes), np.array(self.scales)
+        axes, scales, model = np.array(self.axes), np.array(self.scales), self.model
         away = now.command[..., :_NUMBERS] - now.pose
-        felt = np.clip((now.wrench / _WRENCH)[..., axes], -_MOST, _MOST)
-        parts = [
-            (now.pose / scales)[..., axes],
-            (away / scales)[..., axes],
-            felt,
-            now.command[..., _NUMBERS:],
-        ]
-        return np.concatenate([*parts, self.look(now)], axis=-1)
+        shown = {
+            "joints": (now.q - model.q_min) * (2.0 / (model.q_max - model.q_min)) - 1.0,
+            "pose": (now.pose / scales)[..., axes],
+            "command": (away / scales)[..., axes],
+            "wrench": np.clip((now.wrench / _WRENCH)[..., axes], -_MOST, _MOST),
+        }
+        more = now.command[..., _NUMBERS:] if self.shows("command") else now.command[..., :0]
+        return np.concatenate([*(shown[what] for what in self.observation), more, self.look(now)], axis=-1)
 
     def observe(self, frames: Array) -> Array:
         """The observation: some of the last frames.

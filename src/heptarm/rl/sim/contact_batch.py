@@ -218,6 +218,7 @@ class BatchContact(TaskBatch):
             memory=self._memory[which],
             time=self.age[which] / self.task.rate,
             friction=np.asarray(self._friction)[which, self._steels[0], 0],
+            q=rows[:, :7],
         )
 
     def _place(self, which: Index, starts: Array) -> None:

@@ -15,7 +15,7 @@ from heptarm.rl.train import ppo
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
 #: Likewise of a task with contacts.
-_CONTACT_STEPS = 1_200_000
+_CONTACT_STEPS = 1_500_000
 #: Names of settings in checkpoints that were made before the settings had the names of the literature.
 _OLDER = {
     "rate": "learning_rate",
