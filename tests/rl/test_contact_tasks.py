@@ -9,6 +9,7 @@ import sys
 import warnings
 from dataclasses import fields, replace
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
@@ -122,6 +123,7 @@ def test_an_observation_shows_what_is_asked_for() -> None:
         == replace(full, observation=("pose", "wrench")).observation_size + len(Push.axes) + 1
     )
     assert task_from_dict(json.loads(json.dumps(task.as_dict()))) == task
+    wrong: Any
     for wrong in ("pose", ("torque",), (), ("pose", "pose"), (3,)):
         with pytest.raises((CommandRejected, ShapeError), match="observation must"):
             Push(observation=wrong)
