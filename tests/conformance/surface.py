@@ -30,6 +30,7 @@ PROJECT = f"""<persistence><processDataContainer>
 PARAMETERS: dict[str, Any] = {
     "publish_signals": True,
     "publish_tf": True,
+    "tf_frames": True,
     "speed": 0.6,
     "moveit": True,
     "gripper__open": "Hand.Open",
@@ -369,6 +370,31 @@ def case_the_flange_is_on_tf(probe: Probe, stage: Stage) -> None:
     np.testing.assert_allclose(
         [place.x, place.y, place.z], forward(robot("iiwa14"), states[-1].position)[:3, 3], atol=2e-3
     )
+
+
+def case_a_pose_in_a_frame_of_tf_is_reached(probe: Probe, stage: Stage) -> None:
+    def frame(parent: str, name: str, height: float) -> Any:
+        made = probe.make("geometry_msgs/TransformStamped", child_frame_id=name)
+        made.header.frame_id, made.transform.rotation.w = parent, 1.0
+        made.transform.translation.z = height
+        return made
+
+    def target(name: str) -> Any:
+        made = probe.make("geometry_msgs/PoseStamped")
+        made.header.frame_id, made.pose.position.z, made.pose.orientation.w = name, 0.07, 1.0
+        return made
+
+    home(probe)
+    before = done(probe.call("get_pose", "GetPose", frame="flange")).pose.position
+    mounted = [frame("flange", "camera", -0.1), frame("camera", "lens", 0.08), frame("shelf", "box", 0.1)]
+    probe.tell("/tf_static", "tf2_msgs/TFMessage", transforms=mounted)()
+    # the frame of the flange moves: it is of /tf, those of the camera are of /tf_static
+    goal = {"path": 1, "pose": target("lens"), "speed_mps": 0.1}
+    until(lambda: act(probe, "move_pose", "MovePose", **goal).success, "the frame stays unknown")
+    after = done(probe.call("get_pose", "GetPose", frame="flange")).pose.position
+    assert abs(before.z - after.z - 0.05) < 2e-3 and abs(before.x - after.x) < 2e-3, (before, after)
+    goal["pose"] = target("box")
+    refused(act(probe, "move_pose", "MovePose", **goal), "'box' is not connected with 'link_0'", "shelf")
 
 
 def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stage) -> None:

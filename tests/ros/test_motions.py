@@ -39,6 +39,7 @@ class FakeDriver:
     """A driver of an arm at rest."""
 
     configuration = NodeConfiguration.of({})
+    transforms = None
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE), frames={"/Table/Corner": CORNER})
 
 

@@ -25,6 +25,7 @@ class FakeDriver:
 
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE, pose_cmd=POSE))
     configuration = NodeConfiguration.of({})
+    transforms = None
 
 
 DRIVER: Any = FakeDriver()

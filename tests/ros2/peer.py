@@ -202,8 +202,11 @@ class Ros:
         (answer,) = self.send_goals(client, [goal], feedback)
         return self.wait(answer, "the goal is neither accepted nor rejected")
 
-    def publisher(self, kind: type, name: str) -> Any:
-        """A publisher whose messages arrive: its subscriber has discovered it, too."""
+    def publisher(self, kind: type, name: str, *, latched: bool = False) -> Any:
+        """A publisher whose messages arrive: its subscriber has discovered it, too, or gets them then."""
+        if latched:
+            profile = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            return self.do(self.node.create_publisher, kind, name, profile)
         made = self.do(self.node.create_publisher, kind, name, 1)
         until(made.get_subscription_count, f"nobody listens to {name}")
         self.meet(name)

@@ -60,7 +60,9 @@ class Client:
     def tell(self, name: str, kind: str, /, **message: Any) -> Callable[[], None]:
         made = found(kind, "msg")(**message)
         if name not in self._publishers:
-            self._publishers[name] = self._ros.publisher(type(made), self._full(name))
+            self._publishers[name] = self._ros.publisher(
+                type(made), self._full(name), latched=name == "/tf_static"
+            )
         return lambda: self._publishers[name].publish(made)
 
     def make(self, kind: str, /, **fields: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from heptarm.errors import HeptarmError
@@ -21,6 +21,7 @@ from heptarm_ros2.topic_thread import LeftAlone, TopicThread
 
 #: By whether sensors publish a topic: a subscription that accepts best effort receives reliable publishers, too.
 _RELIABILITY = {True: ReliabilityPolicy.BEST_EFFORT, False: ReliabilityPolicy.RELIABLE}
+_DURABILITY = {True: DurabilityPolicy.TRANSIENT_LOCAL, False: DurabilityPolicy.VOLATILE}
 
 
 class Commands:
@@ -35,26 +36,29 @@ class Commands:
                 f"{package} is not installed: topics and services with its types are left out"
             )
         at_once, one_service = ReentrantCallbackGroup(), MutuallyExclusiveCallbackGroup()
-        one_topic, one_scene = LeftAlone(), MutuallyExclusiveCallbackGroup()
+        one_topic, aside = LeftAlone(), LeftAlone()
         self._subscriptions = [
             node.create_subscription(
                 class_of(row.type, "msg"),
                 row.name,
                 self._on_message(row),
-                QoSProfile(depth=row.depth, reliability=_RELIABILITY[row.is_sensor]),
-                callback_group=at_once if row.at_once else one_scene if row.aside else one_topic,
+                QoSProfile(
+                    depth=row.depth,
+                    reliability=_RELIABILITY[row.is_sensor],
+                    durability=_DURABILITY[row.is_latched],
+                ),
+                callback_group=at_once if row.at_once else aside if row.aside else one_topic,
                 qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             )
             for row in table.topics
         ]
-        self._thread = TopicThread(
-            node,
-            [
-                subscription
-                for subscription in self._subscriptions
-                if subscription.callback_group is one_topic
-            ],
-        )
+        self._threads = [
+            TopicThread(
+                node,
+                [one for one in self._subscriptions if one.callback_group is group],
+            )
+            for group in (one_topic, aside)
+        ]
         self._services = [
             node.create_service(
                 class_of(row.type, "srv"),
@@ -67,7 +71,8 @@ class Commands:
 
     def end(self) -> None:
         """Handle no more messages; returns when the last one is handled."""
-        self._thread.end()
+        for thread in self._threads:
+            thread.end()
 
     def destroy(self) -> None:
         """Destroy subscriptions and services."""

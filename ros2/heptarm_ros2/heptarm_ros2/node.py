@@ -161,7 +161,7 @@ class HeptarmNode(LifecycleNode):
             self._states = StatePublisher(*shared)
             self._presets = PresetPublisher(*shared, fri=self._fri_state)
             self._events = EventPublisher(*shared)
-            self.driver = Driver(self.configuration, self)
+            self.driver = Driver(self.configuration, self, clock=lambda: 1e-9 * self.ros.now())
         except HeptarmError as error:
             waits = f"; wait, the next attempt is in {_RETRY:g} s" if self._starts else ""
             log.error(f"not configured: {error}{waits}")

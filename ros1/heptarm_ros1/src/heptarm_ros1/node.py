@@ -102,7 +102,7 @@ class HeptarmNode:
             self._presets = PresetPublisher(self.configuration, fri=self._fri_state)
             self._events = EventPublisher(self.configuration)
             try:
-                self.driver = Driver(self.configuration, self)
+                self.driver = Driver(self.configuration, self, clock=rospy.get_time)
             except HeptarmError:
                 self._destroy()
                 raise

@@ -12,7 +12,7 @@ from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.events import with_triggers
 from heptarm.ros.node.driver import Driver
 from heptarm.values.checks import Array, finite_entries
-from heptarm.values.frames import TOOL
+from heptarm.values.frames import FLANGE, TOOL
 from heptarm.values.motion.circle import circ
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.motion.line import LinRel, lin, lin_rel
@@ -132,10 +132,11 @@ def stamped_pose(message: Any, driver: Driver) -> Pose:
     """Convert a geometry_msgs/PoseStamped to a pose in the base.
 
     Args:
-        message: the message; in the base, or in a taught frame of the project.
+        message: the message; in the base, in a taught frame of the project, or in one of /tf.
         driver: of the arm.
 
     Raises:
+        NotReady: its frame is not known on /tf at its time.
         ShapeError: it is in another frame, or its quaternion is not a rotation.
     """
     place, turn = message.pose.position, message.pose.orientation
@@ -150,10 +151,11 @@ def target_of(message: Any, driver: Driver) -> Pose | PartialPose:
     A NaN keeps a coordinate of the position where the motion begins, four NaN keep the orientation.
 
     Args:
-        message: the message; in the base, or in a taught frame of the project.
+        message: the message; in the base, in a taught frame of the project, or in one of /tf.
         driver: of the arm.
 
     Raises:
+        NotReady: its frame is not known on /tf at its time.
         ShapeError: it is in another frame, or its quaternion is not a rotation.
     """
     place, turn = message.pose.position, message.pose.orientation
@@ -170,19 +172,24 @@ def frame_in_base(header: Any, driver: Driver) -> Pose | None:
     """Pose in the base of the frame that a header names; None: it is the base itself.
 
     Raises:
-        ShapeError: neither the base nor a taught frame.
+        NotReady: not known on /tf at the time of the header.
+        ShapeError: neither the base nor a taught frame, and /tf is not listened to.
     """
     name = header.frame_id.lstrip("/")
     base = driver.configuration.frame("base")
     if name in ("", base):
         return None
     taught = {name.lstrip("/"): pose for name, pose in driver.arm.frames.items()}
+    if name not in taught and driver.transforms is not None:
+        flange, tool = (one.lstrip("/") for one in driver.configuration.links)
+        own = {flange: driver.arm.pose(FLANGE), tool: driver.arm.state.pose}
+        return driver.transforms.find(name, base=base.lstrip("/"), stamp=header.stamp, own=own)
     if name not in taught:
         raise ShapeError(
             f"frame of the pose must be one of {', '.join((base, *driver.arm.frames))}, got {name!r}",
             parameter="frame_id",
             value=name,
-            hint="transform it with tf",
+            hint="set the parameter tf_frames to look it up on /tf",
         )
     return taught[name]
 

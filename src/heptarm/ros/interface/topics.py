@@ -50,6 +50,7 @@ class Topic:
         depth: most messages that wait; further ones replace the oldest.
         aside: its messages are handled in order, but neither wait for those of another topic nor let these wait.
         is_sensor: sensors publish it, in ROS 2 mostly without a guarantee that each message arrives.
+        is_latched: the last messages of its publishers from before the subscription arrive, too.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Topic:
     depth: int = 1
     aside: bool = False
     is_sensor: bool = False
+    is_latched: bool = False
 
 
 class TopicDispatcher:
@@ -180,6 +182,18 @@ def servo_jog(context: NodeContext, message: Any) -> None:
     context.driver.follow_velocity(velocities(context.driver, message.joint_names, message.velocities))
 
 
+def tf(context: NodeContext, message: Any) -> None:
+    """Take the frames of a tf2_msgs/TFMessage."""
+    if context.driver.transforms is not None:
+        context.driver.transforms.add(message)
+
+
+def tf_static(context: NodeContext, message: Any) -> None:
+    """Take the frames of a tf2_msgs/TFMessage that do not move."""
+    if context.driver.transforms is not None:
+        context.driver.transforms.add(message, is_static=True)
+
+
 # --------------------------------------------------------------------- controllers of ros2_control
 
 
@@ -259,6 +273,11 @@ _FORWARD_POSITION, _FORWARD_VELOCITY = (
     "forward_velocity_controller/commands",
 )
 
+#: Of the frames of others, with the parameter `tf_frames`.
+_TF = (
+    Topic("/tf", "tf2_msgs/TFMessage", tf, depth=100, aside=True),
+    Topic("/tf_static", "tf2_msgs/TFMessage", tf_static, depth=100, aside=True, is_latched=True),
+)
 #: All topics with heptarm's own names.
 TOPICS = (
     Topic("~/stop", "std_msgs/Empty", stop, at_once=True),
@@ -310,14 +329,14 @@ def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
     """List the topics that a node subscribes to.
 
     Args:
-        values: of the node's parameters: `names` adds some, `forward_controllers` leaves some out. Without the package
-            moveit_msgs those of the world are left out, too.
+        values: of the node's parameters: `names` and `tf_frames` add some, `forward_controllers` leaves some out.
+            Without the package moveit_msgs those of the world are left out, too.
     """
     forward = values["forward_controllers"]
     left_out: tuple[str, ...] = () if forward else (_FORWARD_POSITION, _FORWARD_VELOCITY)
     if not is_installed(_SCENE):
         left_out += ("planning_scene", "collision_object", "attached_collision_object")
-    ours = tuple(row for row in TOPICS if row.name not in left_out)
+    ours = tuple(row for row in TOPICS if row.name not in left_out) + (_TF if values["tf_frames"] else ())
     return ours + tuple(
         Topic(
             entry.name,

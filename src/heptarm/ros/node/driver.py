@@ -8,6 +8,7 @@ import os
 import socket
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal, Protocol
@@ -29,6 +30,7 @@ from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.node.state_feed import ReconnectingStates
 from heptarm.ros.node.target_stream import StreamLimits, TargetStream
 from heptarm.ros.node.task import ArmTask
+from heptarm.ros.node.transforms import Transforms
 from heptarm.ros.trajectory.check import check_form
 from heptarm.ros.trajectory.execution import Execution, GoalListener
 from heptarm.ros.trajectory.fri_execution import FriExecution
@@ -99,18 +101,26 @@ class Driver:
     Args:
         configuration: the node's parameters.
         listener: receives all events.
+        clock: the time of ROS [s].
 
     Attributes:
         configuration: current parameters of the node.
         fri: the FRI session that services open.
         collisions: the collision guard.
+        transforms: frames of /tf; None: the parameter `tf_frames` is off.
 
     Raises:
         ConnectFailed: the cabinet does not answer.
         NotInControl: another client controls the robot.
     """
 
-    def __init__(self, configuration: NodeConfiguration, listener: DriverListener) -> None:
+    def __init__(
+        self,
+        configuration: NodeConfiguration,
+        listener: DriverListener,
+        *,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
         values = configuration.values
         self.configuration = configuration
         self._listener = listener
@@ -133,6 +143,7 @@ class Driver:
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = NodeFriSession(self._arm)
+        self.transforms = Transforms(clock) if values["tf_frames"] else None
         self.collisions = CollisionReaction(self._arm, notify=self._on_collision, start=self.start)
         self._last_feedback = (0, 0.0)  # number of its goal, and its time
         self._execution = self._make_execution()

@@ -137,6 +137,7 @@ PARAMETERS = (
     Parameter("state_rate", 100.0, "rate of published states [Hz]", 1.0, 500.0),
     Parameter("publish_signals", False, "publish the signals of the cabinet"),
     Parameter("publish_tf", False, "publish flange and tool on /tf; not needed with robot_state_publisher"),
+    Parameter("tf_frames", False, "accept poses in every frame that /tf connects with the base"),
     Parameter("tool_frame", "tool", "name of the motion frame (the TCP of the tool) on /tf, without prefix"),
     Parameter("diagnostics_rate", 1.0, "rate of diagnostics [Hz]", 0.1, 10.0),
     Parameter("action_monitor_rate", 20.0, "rate of trajectory feedback [Hz]", 1.0, 500.0),
