@@ -68,7 +68,7 @@ def context() -> Any:
     state = message(q=HOME, q_cmd=HOME, pose=FLANGE @ TCP, groups=message(mode=None))
     fixture = Pose.at(0.5, 0.1, 0.2)
     arm = message(robot=robot("iiwa14"), state=state, frames={"/Fixture": fixture}, tools={})
-    driver = message(configuration=configuration, arm=arm)
+    driver = message(configuration=configuration, arm=arm, transforms=None)
     world = NodeWorld(cast(Any, driver))
     ros = message(pose=pose)
     return cast(

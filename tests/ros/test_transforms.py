@@ -94,7 +94,7 @@ def test_what_is_wrong_is_reported_and_the_rest_is_taken() -> None:
         x_of(frames, "a", 0.0)
 
 
-def test_a_clock_that_is_set_back_begins_anew() -> None:
+def test_a_clock_that_is_set_back_begins_again() -> None:
     frames = Transforms(lambda: 3.2)
     frames.add(message(moved("base", "part", 100.0, x=1.0)))
     frames.add(message(moved("base", "part", 99.0, x=2.0)))  # late, of no use
