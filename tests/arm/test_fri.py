@@ -336,6 +336,7 @@ def test_a_law_that_fails_brakes_the_arm_and_is_reported(arm: ha.Arm) -> None:
     assert rt.result is not None and rt.result.cause is ha.Cause.CANCELLED
 
 
+@pytest.mark.long
 @patient
 def test_without_a_free_file_descriptor_neither_a_session_nor_a_recording_is_half_open(
     arm: ha.Arm, tmp_path: Path

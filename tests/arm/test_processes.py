@@ -116,8 +116,8 @@ MULTIPROCESSING = """
 
 @pytest.mark.parametrize(
     "program",
-    few([FORK, MULTIPROCESSING, FORK_IN_BLOCKS], 2),
-    ids=few(["fork", "multiprocessing", "fork in blocks"], 2),
+    few([FORK, MULTIPROCESSING, FORK_IN_BLOCKS]),
+    ids=few(["fork", "multiprocessing", "fork in blocks"]),
 )
 def test_a_child_process_leaves_the_arm_of_its_parent_alone(tmp_path: Path, program: str) -> None:
     file = tmp_path / "program.py"

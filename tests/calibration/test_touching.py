@@ -116,6 +116,7 @@ def over(surface: KnownSurface) -> Array:
     return model.solve(robot("iiwa14"), above @ GUESS.inverse(), near=ha.deg(0, 30, 0, -90, 0, 60, 0))
 
 
+@pytest.mark.long
 def test_the_arm_measures_its_tip_by_touch(tmp_path: Path) -> None:
     start = over(TABLE)
     target = f"sim://iiwa14?speed={FASTER:g}&sensors=noisy:5&scene={scene(tmp_path)}"

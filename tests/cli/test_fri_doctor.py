@@ -43,6 +43,7 @@ def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: Runnin
     assert "FRI session" not in found  # which would contain an error
 
 
+@pytest.mark.long
 def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
     port, picture = free_port(), tmp_path / "fri.png"
     with controller(port, "--fri-period", "10", version="2.5"):

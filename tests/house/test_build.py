@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT / "cabinet"))
 import classfile  # noqa: E402
 import toolchain  # noqa: E402
 from heptarm.cli.install_cabinet import install_cabinet  # noqa: E402
+from tests.long import few  # noqa: E402
 
 REFUSALS = classfile.Refusals.load(ROOT / "cabinet" / "java7.txt", ("com/kuka/",))
 JARS = ROOT / "src" / "heptarm" / "sim" / "jars"
@@ -125,7 +126,7 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("without", [[], [*OPTIONS]], ids=["everything", "no option"])
+@pytest.mark.parametrize("without", few([[*OPTIONS], []]), ids=few(["no option", "everything"]))
 def test_sources_compile_in_a_workbench_without_options(
     jdk: toolchain.Jdk, tmp_path: Path, without: list[str]
 ) -> None:

@@ -145,6 +145,7 @@ def test_every_step_without_fri_agrees_on_the_virtual_cabinet(arm: ha.Arm) -> No
     assert arm.speed == 1.0
 
 
+@pytest.mark.long
 def test_every_step_of_fri_agrees_on_the_virtual_cabinet() -> None:
     def attempt() -> commissioning.CommissioningReport:
         with ha.connect(testing.stage(speed=0.5), timeout=30.0, watchdog=5.0) as slow:
