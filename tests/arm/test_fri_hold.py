@@ -49,6 +49,7 @@ def test_a_sine_is_followed(arm: ha.Arm) -> None:
     assert found.delayed < 2e-3
 
 
+@pytest.mark.long
 @patient
 def test_torques_alone_balance_the_arm(arm: ha.Arm) -> None:
     found = measured(

@@ -283,8 +283,8 @@ def scene(folder: Path, camera: ha.Camera, board: Board, frame: Frame) -> str:
     return str(board.save_scene(folder / "board.xml", at=at, on_flange=frame == "base"))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("frame", ["flange", pytest.param("base", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("frame", ["flange", "base"])
 def test_the_arm_measures_its_camera(frame: Frame, tmp_path: Path) -> None:
     if why := cannot_draw():
         pytest.skip(why)

@@ -194,6 +194,7 @@ def test_every_control_does_what_it_is_labelled(browser: Any, observer: Callable
         arm.wait_for_rest(timeout=PATIENCE)
 
 
+@pytest.mark.long
 def test_a_panel_that_only_shows_has_a_stop_and_nothing_else(
     browser: Any, observer: Callable[[str], ha.Arm]
 ) -> None:

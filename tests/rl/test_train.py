@@ -94,6 +94,7 @@ def test_the_activation_and_its_slope_are_those_of_torch() -> None:
 # ---------------------------------------------------------------------------------- a training
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_policy_with_any_threads() -> None:
     one, other, third = train(recipe(2)), train(recipe(2), threads=1), train(recipe(2, seed=4))
     assert curve(one) == curve(other)

@@ -27,7 +27,6 @@ from heptarm.values.mode.mode import Mode
 from heptarm.when import path
 from heptarm.wire import messages as wire
 from tests.conftest import RunningCabinet, start_cabinet
-from tests.long import few, longer
 from tests.retry import retry
 
 #: Motions are dated by the states that show them, which a busy machine misses.
@@ -149,7 +148,8 @@ def slow() -> Iterator[RunningCabinet]:
     yield from start_cabinet(0.25)
 
 
-@pytest.mark.parametrize(("kind", "mode", "law", "sent"), few(SUPERPOSED))
+@pytest.mark.long
+@pytest.mark.parametrize(("kind", "mode", "law", "sent"), SUPERPOSED)
 def test_what_an_fri_client_superposes_is_superposed_again(
     slow: RunningCabinet,
     tmp_path: Path,
@@ -166,7 +166,7 @@ def test_what_an_fri_client_superposes_is_superposed_again(
             arm.move(ha.ptp(HOME))
             recorder = arm.record(file, overwrite=True)
             with recorder, arm.fri(kind, period_ms=5, mode=mode, law=law) as session:
-                while session.active and session.state.t < longer(0.6, 2.0):
+                while session.active and session.state.t < 2.0:
                     session.wait(0.05)
             arm.wait_for_rest()
         return ha.replay_in_sim(file, target=slow.target, bands={"q": 2e-3, "q_cmd": 2e-3})
