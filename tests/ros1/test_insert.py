@@ -33,7 +33,7 @@ def policy(ros: None) -> Iterator[Callable[[], str]]:
     """The node of the policy; returns its log."""
     log = logs.new()
     with log.open("w") as file:
-        command = [sys.executable, str(NODE.with_name("reach")), "_policy:=peg-in-hole", "__ns:=/work"]
+        command = [sys.executable, str(NODE.with_name("reach")), "_policy:=peg-in-hole", "__ns:=/bench"]
         process = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT)
     yield log.read_text
     process.terminate()
@@ -43,16 +43,16 @@ def policy(ros: None) -> Iterator[Callable[[], str]]:
 @pytest.fixture
 def driver(ros: None, place: Stage) -> Iterator[NodeProcess]:
     """The node of the arm."""
-    running = NodeProcess(place.target, ns="/work", **GRIPPER)
+    running = NodeProcess(place.target, ns="/bench", **GRIPPER)
     yield running
     assert running.end() == 0, running.said
 
 
 @pytest.mark.long  # what decides is in tests/rl/test_contact_follower.py
 def test_the_example_inserts_a_peg(place: Stage, driver: NodeProcess, policy: Callable[[], str]) -> None:
-    Client(place, "/work/heptarm").ready()
+    Client(place, "/bench/heptarm").ready()
     done = subprocess.run(
-        [sys.executable, str(ROOT / "examples" / "ros1" / "insert.py"), "__ns:=/work"],
+        [sys.executable, str(ROOT / "examples" / "ros1" / "insert.py"), "__ns:=/bench"],
         capture_output=True,
         text=True,
         timeout=100,

@@ -33,7 +33,7 @@ def policy() -> Iterator[Callable[[], str]]:
     """The node of the policy; returns its log."""
     log = logs.new()
     command = [sys.executable, "-m", "heptarm_ros2.reach"]
-    command += ["--ros-args", "-p", "policy:=peg-in-hole", "-r", "__ns:=/work"]
+    command += ["--ros-args", "-p", "policy:=peg-in-hole", "-r", "__ns:=/bench"]
     with log.open("w") as file:
         process = subprocess.Popen(command, stdout=file, stderr=subprocess.STDOUT)
     yield log.read_text
@@ -45,10 +45,10 @@ def policy() -> Iterator[Callable[[], str]]:
 def test_the_example_inserts_a_peg(
     place: Stage, ros: Ros, nodes: Callable[..., NodeProcess], policy: Callable[[], str]
 ) -> None:
-    nodes(place.target, space="/work", **GRIPPER)
-    Client(ros, place, "/work/heptarm").ready()
+    nodes(place.target, space="/bench", **GRIPPER)
+    Client(ros, place, "/bench/heptarm").ready()
     done = subprocess.run(
-        [sys.executable, str(ROOT / "examples" / "ros2" / "insert.py"), "--ros-args", "-r", "__ns:=/work"],
+        [sys.executable, str(ROOT / "examples" / "ros2" / "insert.py"), "--ros-args", "-r", "__ns:=/bench"],
         capture_output=True,
         text=True,
         timeout=100,
