@@ -9,7 +9,9 @@ import pytest
 
 from heptarm.errors import CommandRejected, LimitError, NotReady
 from heptarm.rl.contact.follower import ContactFollower
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.rl.contact.pilot import ContactPilot
 from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.policy import Policy, shipped, shipped_peg
 from heptarm.values.pose import Pose
@@ -112,3 +114,16 @@ def constant(task: ContactTask, action: float) -> Policy[Any]:
     ins, outs = task.observation_size, task.action_size
     layers: Any = [(np.zeros((ins, outs)), np.full(outs, action))]
     return Policy(task, layers=layers, mean=np.zeros(ins), std=np.ones(ins))
+
+
+def test_on_an_arm_a_policy_sees_its_joint_positions() -> None:
+    task = PegInHole(observation=("joints", "pose"), history=(0, 1))
+    pilot = ContactPilot(constant(task, 0.0))
+    model, first, second = task.model, np.full(7, 0.1), np.full(7, 0.2)
+    pilot.begin(np.zeros(6), np.zeros(6), {}, q=first)
+    pilot.measure(np.zeros(6), np.zeros(6), {}, q=second)
+    seen = task.observe(np.array(pilot._frames)).reshape(2, task.frame_size)[:, :7]
+    scaled = [(q - model.q_min) / (model.q_max - model.q_min) * 2.0 - 1.0 for q in (second, first)]
+    assert seen == pytest.approx(np.array(scaled))
+    with pytest.raises(CommandRejected, match="joint positions"):
+        ContactFollower(constant(task, 0.0))
