@@ -33,15 +33,23 @@ POINT = (0.55, 0.1, 0.4)
 LATE_TICKS = 5
 
 
-def tried(arm: ha.Arm, *arguments: Any, **named: Any) -> EpisodeReport:
-    """A deployment that is repeated if the guard, the cabinet or the loop found this machine too busy."""
+def tried(arm: ha.Arm, *arguments: Any, within: float = np.inf, **named: Any) -> EpisodeReport:
+    """A deployment that is repeated if the guard, the cabinet or the loop found this machine too busy.
+
+    Args:
+        arm: the virtual arm.
+        *arguments: of the deployment.
+        within: mean distance at which a repetition is no longer of use, even if ticks came late [m].
+        **named: of the deployment.
+    """
 
     def busy(outcome: EpisodeReport | Exception) -> str:
         if isinstance(outcome, ha.StaleState | ha.Starved):
             arm.wait_for_rest()
             return "the loop of a policy was held up"
-        failed = isinstance(outcome, EpisodeReport) and outcome.success_rate < 1.0
-        return "ticks of a policy came late" if failed and outcome.facts["late_ticks"] > LATE_TICKS else ""
+        late = isinstance(outcome, EpisodeReport) and outcome.facts["late_ticks"] > LATE_TICKS
+        missed = late and (outcome.success_rate < 1.0 or outcome.mean > within)
+        return "ticks of a policy came late" if missed else ""
 
     return retry(lambda: deploy(arm, *arguments, **named), busy)
 
@@ -51,7 +59,7 @@ def reached() -> EpisodeReport:
     with ha.connect(FAST, watchdog=5.0) as arm:
         # beside other tests a machine may be held up for longer than is allowed on an arm
         settings = DeploySettings(guard=PolicyGuard(stale=2.0), homing=0.6)
-        return tried(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=settings)
+        return tried(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], within=0.02, settings=settings)
 
 
 def test_the_shipped_policy_reaches_its_targets(reached: EpisodeReport) -> None:
@@ -63,7 +71,7 @@ def test_the_shipped_policy_reaches_its_targets(reached: EpisodeReport) -> None:
 def test_the_one_with_the_feature_does_so_gently_and_late() -> None:
     with ha.connect(FAST, watchdog=5.0) as arm:
         settings = DeploySettings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
-        report = tried(arm, shipped(feature=True), [POINT], settings=settings)
+        report = tried(arm, shipped(feature=True), [POINT], within=0.012, settings=settings)
     assert report.success_rate == 1.0 and report.mean < 0.012
 
 
