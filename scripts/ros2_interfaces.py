@@ -59,6 +59,8 @@ COMMON = (
     '"rosidl_typesupport_fastrtps_c/wstring_conversion.hpp"',
     '"rosidl_typesupport_fastrtps_cpp/message_type_support.h"',
 )
+#: Generated files that are compiled at once.
+TOGETHER = 20
 # to optimise doubles the time of a set-up for tests
 FLAGS = ("-O0", "-fPIC", "-w")
 STANDARDS = {".c": ("gcc", "-std=gnu11"), ".cpp": ("g++", "-std=c++17")}
@@ -115,14 +117,13 @@ class Package:
 
         folders = [str(self.prefix / "share" / name) for name in self.dependencies]
         folder = self.work / self.name
-        with contextlib.redirect_stdout(io.StringIO()):
-            translate(
-                package_name=self.name,
-                interface_files=[f"{self.source}:{path}" for path in self.files],
-                include_paths=folders,
-                output_format="idl",
-                output_path=folder,
-            )
+        translate(
+            package_name=self.name,
+            interface_files=[f"{self.source}:{path}" for path in self.files],
+            include_paths=folders,
+            output_format="idl",
+            output_path=folder,
+        )
         idl = [f"{folder}:{path.relative_to(folder)}" for path in sorted(folder.rglob("*.idl"))]
         HashTypeDescription("hash").generate_type_hashes(self.name, idl, folders, output_path=folder)
         described = [str(path) for path in sorted(folder.rglob("*.json"))]
@@ -208,7 +209,25 @@ class Package:
 
     def _objects(self, sources: Iterable[Path], flags: Sequence[str] = ()) -> list[str]:
         found = sorted(path for path in sources if path.suffix in (".c", ".cpp"))
-        return list(self._pool.map(lambda path: self._object(path, flags), found))
+        return list(self._pool.map(lambda path: self._object(path, flags), self._together(found)))
+
+    def _together(self, sources: Sequence[Path]) -> list[Path]:
+        """Files that include many: what all of them include themselves takes most of a compiler's time.
+
+        Descriptions stay alone, since they have static variables of the same names.
+        """
+        alone = [path for path in sources if path.name.endswith("__description.c")]
+        groups: dict[tuple[Path, str], list[Path]] = {}
+        for path in sources:
+            if path not in alone:
+                groups.setdefault((path.parent, path.suffix), []).append(path)
+        for (folder, suffix), several in groups.items():
+            for number in range(0, len(several), TOGETHER):
+                file = folder / f"together_{several[number].name.removesuffix(suffix)}{suffix}"
+                lines = (f'#include "{path}"\n' for path in several[number : number + TOGETHER])
+                file.write_text("".join(lines))
+                alone.append(file)
+        return alone
 
     def _object(self, source: Path, flags: Sequence[str]) -> str:
         target = self.work / "o" / (str(source.relative_to(self.generated)).replace("/", "__") + ".o")
@@ -294,13 +313,18 @@ def main() -> int:
     logging.disable(logging.WARNING)
     sources = _in_order(parser.parse_args().packages)
     _parse_once()
-    with tempfile.TemporaryDirectory(prefix="rosidl_") as shared:
+    shown = sys.stdout
+    with (
+        tempfile.TemporaryDirectory(prefix="rosidl_") as shared,
+        # one for all: empy puts itself before the standard output that it finds first, and wants to find itself there
+        contextlib.redirect_stdout(io.StringIO()),
+    ):
         common = compiled_headers(prefix, Path(shared))
         for source in sources:
             with tempfile.TemporaryDirectory(prefix="rosidl_") as work:
                 package = Package(source.resolve(), prefix, Path(work), common)
                 package.install()
-                print(f"{package.name}: {len(package.files)} interfaces")
+                print(f"{package.name}: {len(package.files)} interfaces", file=shown, flush=True)
     return 0
 
 

@@ -67,8 +67,11 @@ def test_observers_of_several_rates_get_their_states_at_rest(resting: Arm, cabin
         streams = [arm.states(duration=1.0, size=5000) for arm in arms]
         for stream, rate in zip(streams, rates, strict=True):
             stamps = np.array([one.stamp for one in stream])[1:]
-            assert len(stamps) > 0.2 * rate and (stamps % round(1e9 / rate) == 0).all()
-            assert (np.diff(stamps) > 0).all()
+            period = round(1e9 / rate)
+            steps = np.diff(stamps)
+            held_up = steps > 1.5 * period  # the state that was due then comes as soon as this machine has time
+            assert len(stamps) > 0.2 * rate and (steps > 0).all()
+            assert ((stamps[1:] % period == 0) | held_up).all()
         rest(cabinet)
 
 
