@@ -17,6 +17,7 @@ from heptarm.fri.loop.settings import LoopSettings
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
 from heptarm.values.condition.collision import CollisionGuard
+from tests.long import few
 from tests.oracles.fri import codec
 
 from .controller import IPO, Controller
@@ -66,7 +67,7 @@ def with_torque(axis: int, torque: float) -> tuple[float, ...]:
     return tuple(rest + (torque if i == axis else 0.0) for i, rest in enumerate(BASELINE))
 
 
-@pytest.mark.parametrize("wire", Version)
+@pytest.mark.parametrize("wire", few(Version, 2))
 @pytest.mark.parametrize("mode", [CommandMode.POSITION, CommandMode.TORQUE])
 def test_at_a_collision_both_loops_brake_and_name_the_joint(wire: Version, mode: CommandMode) -> None:
     guard = CollisionGuard.of(10.0, baseline=BASELINE)
