@@ -1,4 +1,4 @@
-/* Forward kinematics and Jacobians of many postures, for heptarm.model. */
+/* Forward kinematics and Jacobians of many postures, for heptarm.model and C++. */
 #include "redundancy.h"
 
 static void put_pose(const double *turn, const double *place, double *pose) {

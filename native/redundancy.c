@@ -585,7 +585,7 @@ int find_joints(const struct arm *arm, const double *turn, const double *place, 
     return take(&s, s.least <= PREFERENCE * s.beyond_distance + SAME ? s.q[choose(&s)] : s.beyond, q);
 }
 
-/* ---------------------------------------------------------------------------------------------------------- for Python */
+/* ---------------------------------------------------------------------------------------------------------- for Python and C++ */
 
 static void split(const double *pose, double *turn, double *place) {
     for (int i = 0; i < 3; i++) {

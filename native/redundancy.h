@@ -23,6 +23,10 @@ enum { FOUND = 1, TOO_FAR = 0, NO_POSTURE = -1 };
 
 int hi_status(const struct arm *arm, const double *q);
 double hi_arm_angle(const struct arm *arm, const double *q);
+void hk_forward(const struct arm *arm, long count, const double *q, double *poses);
+void hk_jacobian(const struct arm *arm, long count, const double *q, const double *point, double *jacobians);
+void hi_solve(const struct arm *arm, long count, const double *poses, const double *a3, const int *status, const double *near, int is_fixed,
+              double *q, int *outcome);
 int find_joints(const struct arm *arm, const double *turn, const double *place, const struct request *request, double *q);
 
 #endif

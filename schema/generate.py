@@ -44,7 +44,7 @@ def outputs() -> dict[Path, str]:
         ROOT / "src" / "heptarm" / "fri" / "loop" / "include" / "heptarm_law.h": native.law_header(),
         ROOT / "native" / "frame_layout.h": native.frame_header(spec),
         ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),
-        ROOT / "cpp" / "include" / "heptarm" / "fri_models.hpp": native.models_header(),
+        ROOT / "cpp" / "include" / "heptarm" / "models.hpp": native.models_header(),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",
     }

@@ -316,7 +316,7 @@ def main() -> int:
     shown = sys.stdout
     with (
         tempfile.TemporaryDirectory(prefix="rosidl_") as shared,
-        # one for all: empy puts itself before the standard output that it finds first, and wants to find itself there
+        # one for all: empy puts itself before the first standard output, and fails where it finds another one later
         contextlib.redirect_stdout(io.StringIO()),
     ):
         common = compiled_headers(prefix, Path(shared))

@@ -1,7 +1,7 @@
 // FRI sessions of an arm: a monitor, then a sine on joint 7 by positions, then torques on an arm that is compliant.
 //
 //     cmake -S cpp -B build/cpp && cmake --build build/cpp
-//     g++ -std=c++17 -O2 -pthread -I cpp/include -I native -I src/heptarm/fri/loop/include -o fri cpp/examples/fri.cpp build/cpp/libheptarm_fri.a
+//     g++ -std=c++17 -O2 -pthread -I cpp/include -I native -I src/heptarm/fri/loop/include -o fri cpp/examples/fri.cpp build/cpp/libheptarm_native.a
 //     ./fri localhost:30001 127.0.0.1        # this computer's address as the cabinet reaches it
 #include <cmath>
 #include <cstdio>

@@ -303,7 +303,7 @@ def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     whole = [block for block in blocks if "int main" in block]
     parts = [block for block in blocks if "int main" not in block]
     assert len(whole) == 1 and len(parts) > 5
-    head = "#include <cstdlib>\n#include <iostream>\n#include <heptarm/fri.hpp>\n"
+    head = "#include <cstdlib>\n#include <iostream>\n#include <heptarm/fri.hpp>\n#include <heptarm/kinematics.hpp>\n"
     body = "void page() {\n    using namespace heptarm;\n" + "".join(parts) + "}\n"
     source = tmp_path / "page.cpp"
     source.write_text(whole[0] + head + body)  # the program first, with no headers but its own

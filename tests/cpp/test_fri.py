@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import signal
 import subprocess
 from pathlib import Path
@@ -11,37 +10,17 @@ from pathlib import Path
 import pytest
 
 from tests.cli.running import HEPTARM, sim
+from tests.cpp.native import PATIENCE, ROOT, compiled, objects
 from tests.interrupts import ctrl_c_interrupts
 from tests.retry import retry
 
-ROOT = Path(__file__).resolve().parents[2]
-INCLUDES = [f"-I{ROOT / one}" for one in ("cpp/include", "native", "src/heptarm/fri/loop/include")]
-FLAGS = ("-std=c++17", "-O0", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-pthread")
-PATIENCE = 240.0
 #: Messages that a client answers with a command.
 CYCLES = 300
 
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """The native loop, compiled as cpp/CMakeLists.txt does."""
-    compiler = shutil.which("gcc")
-    if compiler is None or shutil.which("g++") is None:
-        pytest.skip("no gcc and g++ here: FRI in C++ is not tested")
-    listed = (ROOT / "cpp/CMakeLists.txt").read_text(encoding="utf-8")
-    parts = re.findall(r"foreach\(part (.*)\)", listed)[0].split()
-    sources = [ROOT / "native" / f"fri_{part}.c" for part in parts] + [ROOT / "native/kinematics.c"]
-    folder = tmp_path_factory.mktemp("fri")
-    command = [compiler, "-std=c11", "-O1", "-D_GNU_SOURCE", *INCLUDES, "-c", *map(str, sources)]
-    subprocess.run(command, cwd=folder, check=True, timeout=PATIENCE)
-    return [str(one) for one in folder.glob("*.o")]
-
-
-def compiled(source: Path, loop: list[str], folder: Path) -> Path:
-    program = folder / source.stem
-    command = ["g++", *FLAGS, *INCLUDES, "-o", str(program), str(source), *loop, "-lm"]
-    subprocess.run(command, check=True, timeout=800)
-    return program
+    return objects(tmp_path_factory.mktemp("fri"))
 
 
 def driven(program: Path, version: str, command: str, *more: str) -> str:

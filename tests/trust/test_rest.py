@@ -69,7 +69,9 @@ def test_observers_of_several_rates_get_their_states_at_rest(resting: Arm, cabin
             stamps = np.array([one.stamp for one in stream])[1:]
             period = round(1e9 / rate)
             steps = np.diff(stamps)
-            held_up = steps > 1.5 * period  # the state that was due then comes as soon as this machine has time
+            held_up = (
+                steps > 1.5 * period
+            )  # the state that was due then comes as soon as this machine has time
             assert len(stamps) > 0.2 * rate and (steps > 0).all()
             assert ((stamps[1:] % period == 0) | held_up).all()
         rest(cabinet)

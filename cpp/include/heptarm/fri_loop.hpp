@@ -26,8 +26,8 @@
 #include <utility>
 #include <vector>
 
-#include "fri_models.hpp"
 #include "heptarm_law.h"
+#include "models.hpp"
 
 namespace heptarm {
 namespace native {
@@ -106,16 +106,13 @@ public:
     using Law = std::function<void(const FriState&, FriCommand&)>;
 
     explicit FriLoop(const FriLoopOptions& options, Law law = nullptr) : law_(std::move(law)) {
-        const FriModel* model = nullptr;
-        for (const FriModel& one : FRI_MODELS)
-            if (options.model == one.name) model = &one;
-        if (model == nullptr) throw std::invalid_argument("no robot has the name " + options.model);
+        const RobotModel& model = robot_model(options.model);
         const FriGuard& guard = options.guard;
         if (!(guard.fraction > 0 && guard.fraction <= 1))
             throw std::invalid_argument("fraction must be in (0, 1], got " + std::to_string(guard.fraction));
         open(options);
         lay_out();
-        limit(*model, guard);
+        limit(model, guard);
         seam_.has_law = law_ != nullptr;
         if (!options.remote.empty()) seam_.remote = address(options.remote);
         loop_ = native::fri_new(&seam_);
@@ -359,7 +356,7 @@ private:
         seam_.over = 0.1;
     }
 
-    void limit(const FriModel& model, const FriGuard& guard) {
+    void limit(const RobotModel& model, const FriGuard& guard) {
         native::joint_limits& limits = seam_.joint_limits;
         for (int i = 0; i < 7; ++i) {
             limits.q_min[i] = model.q_min[i] + guard.margin;
