@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import pytest
 pytest.importorskip("torch", reason="torch is not installed")
 
 import heptarm as ha
+from heptarm.cli.rl import policies
 from heptarm.cli.rl.jobs import cases_of
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.contact.peg_in_hole import PegInHole
@@ -65,6 +68,12 @@ def test_settings_are_those_of_recipe_algorithm_and_task() -> None:
         with_settings(recipe, {"gamma": "much"})
     with pytest.raises(LimitError, match="gamma must be 0 to 1"):
         with_settings(recipe, {"gamma": "2"})
+
+
+def test_the_help_has_the_numbers_of_steps_of_the_recipes() -> None:
+    shown = get_type_hints(policies.train, include_extras=True)["steps"].__metadata__[0].help
+    known = [Recipe(ReachTask()).steps, Recipe(ReachTask(feature="kinematic")).steps, Recipe(PegInHole()).steps]
+    assert [float(one) for one in re.findall(r"\d\.\d", shown)] == [steps / 1e6 for steps in known]
 
 
 def test_a_script_is_a_file_with_a_function(tmp_path: Path) -> None:

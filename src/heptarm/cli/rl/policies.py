@@ -83,7 +83,7 @@ def train(
     ] = False,
     steps: Annotated[
         int,
-        Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.2 with contacts."),
+        Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature, 1.5 with contacts."),
     ] = 0,
     seed: Seed = 0,
     fitted: Annotated[
