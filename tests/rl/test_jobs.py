@@ -72,7 +72,11 @@ def test_settings_are_those_of_recipe_algorithm_and_task() -> None:
 
 def test_the_help_has_the_numbers_of_steps_of_the_recipes() -> None:
     shown = get_type_hints(policies.train, include_extras=True)["steps"].__metadata__[0].help
-    known = [Recipe(ReachTask()).steps, Recipe(ReachTask(feature="kinematic")).steps, Recipe(PegInHole()).steps]
+    known = [
+        Recipe(ReachTask()).steps,
+        Recipe(ReachTask(feature="kinematic")).steps,
+        Recipe(PegInHole()).steps,
+    ]
     assert [float(one) for one in re.findall(r"\d\.\d", shown)] == [steps / 1e6 for steps in known]
 
 
