@@ -9,8 +9,9 @@ import sys
 import numpy as np
 
 import heptarm as ha
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.deploy_contact import deploy_contact
-from heptarm.rl.policy import Policy, shipped_peg
+from heptarm.rl.policy import Policy, shipped_contact
 
 PEG_IN_HOLE = "sim://iiwa14?scene=peg-in-hole"
 GRIPPER = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=ha.Pose.at(0, 0, 0.16))
@@ -18,7 +19,7 @@ PEG = ha.Workpiece("peg", mass=0.19, com=(0, 0, 0.025), frames={"tip": ha.Pose.a
 HOLDER, HOLE = (0.6, -0.1, 0.265), (0.6, 0.1, 0.24)  # the peg's head in its holder, the middle of the rim [m]
 NUMBER = int(sys.argv[1]) if len(sys.argv) > 1 else 3
 SEED = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-policy = Policy.load(sys.argv[3]) if len(sys.argv) > 3 else shipped_peg()
+policy = Policy.load(sys.argv[3]) if len(sys.argv) > 3 else shipped_contact(PegInHole)
 
 target = os.environ.get("HEPTARM_TARGET_WITH_PEG_IN_HOLE", PEG_IN_HOLE)
 with ha.connect(target, watchdog=2.0) as arm, arm.tool(GRIPPER):

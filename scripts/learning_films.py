@@ -19,8 +19,9 @@ sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
 
 import heptarm as ha  # noqa: E402
 from examples.learning import pick_place  # noqa: E402
+from heptarm.rl.contact.peg_in_hole import PegInHole  # noqa: E402
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact  # noqa: E402
-from heptarm.rl.policy import shipped_peg  # noqa: E402
+from heptarm.rl.policy import shipped_contact  # noqa: E402
 from heptarm.rl.station import held_peg  # noqa: E402
 from scripts.film import View, chosen, drawn, modelled, recorded, written  # noqa: E402
 
@@ -32,7 +33,7 @@ NUMBER, SEED = 3, 5
 
 def insertion(arm: ha.Arm) -> None:
     """Insert a peg three times, each time with the hole elsewhere than presumed."""
-    policy = shipped_peg()
+    policy = shipped_contact(PegInHole)
     with held_peg(arm) as hole:
         errors = policy.task.targets(np.random.default_rng(SEED), NUMBER)
         origins = [policy.task.presumed(hole, error) for error in errors]

@@ -12,8 +12,10 @@ import numpy as np
 from bench.measure.figure import Figure, benchmark
 from bench.rl.training import SEEDS
 from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.plug_insert import PlugInsert
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.evaluate import evaluate
-from heptarm.rl.policy import Policy, shipped_peg
+from heptarm.rl.policy import Policy, shipped_contact
 from heptarm.rl.train.recipe import LATE
 from heptarm.values.pose import Pose
 
@@ -21,6 +23,9 @@ from heptarm.values.pose import Pose
 HOLES, TIGHT = 200, 0.2e-3
 #: What is promised: processor time of a training [s], fractions of the holes, and the force [N].
 PROCESSOR, SUCCESS, TIGHT_SUCCESS, FORCE = 1200.0, 0.95, 0.8, 30.0
+
+#: Tasks beside peg-in-hole whose policies are part of heptarm.
+OTHERS: tuple[type[ContactTask], ...] = (PlugInsert,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +82,18 @@ def rl_peg() -> Iterator[Figure]:
 @benchmark("rl_peg_included")
 def rl_peg_included() -> Iterator[Figure]:
     """The included policy on 200 unseen holes."""
-    yield from figures("rl_peg_included", [judged(shipped_peg())])
+    yield from figures("rl_peg_included", [judged(shipped_contact(PegInHole))])
+
+
+@benchmark("rl_other_tasks")
+def rl_other_tasks() -> Iterator[Figure]:
+    """The included policies of other tasks with contacts, on 200 unseen targets each."""
+    for kind in OTHERS:
+        report = evaluate(shipped_contact(kind), HOLES, randomisation=LATE, seed=9)
+        name = f"rl_{kind.name.replace('-', '_')}"
+        yield Figure(f"{name}_success", report.success_rate, "fraction", limit=SUCCESS, at_least=True)
+        yield Figure(f"{name}_time", float(np.median(report.time_to_reach)), "s")
+        yield Figure(f"{name}_force", float(report.peak_force.max()), "N")
 
 
 def figures(name: str, rows: list[dict[str, Any]]) -> Iterator[Figure]:

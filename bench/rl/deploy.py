@@ -11,10 +11,11 @@ import heptarm as ha
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.rl.oracle import Oracle
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.deploy import DeploySettings, deploy
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.evaluate import held_back
-from heptarm.rl.policy import shipped, shipped_peg
+from heptarm.rl.policy import shipped, shipped_contact
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
 from heptarm.values.mode.impedance import JointImpedance
@@ -82,7 +83,7 @@ def rl_insert_fri() -> Iterator[Figure]:
 
 
 def _inserted(name: str, settings: ContactSettings) -> Iterator[Figure]:
-    policy = shipped_peg()
+    policy = shipped_contact(PegInHole)
     errors = held_back(policy.task, INSERTIONS, seed=101)
     with (
         Cabinet("--scene", "peg-in-hole", "--sensors", "noisy:1") as cabinet,

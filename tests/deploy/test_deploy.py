@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.deploy import DeploySettings, circle, deploy
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
 from heptarm.rl.film import film
 from heptarm.rl.pilot import Pilot, PolicyGuard, Watch
-from heptarm.rl.policy import shipped, shipped_peg
+from heptarm.rl.policy import shipped, shipped_contact
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
 from heptarm.rl.task import ReachTask
@@ -97,17 +98,17 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
         with pytest.raises(ha.CommandRejected, match="of a task with contacts, got one of reach"):
             deploy_contact(arm, cast("Any", shipped()), arm.pose())
         with pytest.raises(ha.CommandRejected, match="of the task reach, got one of peg-in-hole"):
-            deploy(arm, cast("Any", shipped_peg()), [POINT])
+            deploy(arm, cast("Any", shipped_contact(PegInHole)), [POINT])
         with pytest.raises(ha.ShapeError, match="targets"):
-            deploy_contact(arm, shipped_peg(), arm.pose(), [[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])
+            deploy_contact(arm, shipped_contact(PegInHole), arm.pose(), [[0.0, 0.0, np.nan, 0.0, 0.0, 0.0]])
         with pytest.raises(ha.CommandRejected, match="tip"):
-            deploy_contact(arm, shipped_peg(), arm.pose())
+            deploy_contact(arm, shipped_contact(PegInHole), arm.pose())
         with pytest.raises(ha.LimitError, match="speed must be at least"):
-            deploy_contact(arm, shipped_peg(), arm.pose(), settings=ContactSettings(speed=0.01))
+            deploy_contact(arm, shipped_contact(PegInHole), arm.pose(), settings=ContactSettings(speed=0.01))
         places = [arm.pose(), ha.Pose.at(1.5, 0.0, 0.3)]
         flange = ContactSettings(frame="flange")
         with pytest.raises(ha.Unreachable, match=r"origins\[1\]"):
-            deploy_contact(arm, shipped_peg(), places, np.zeros((2, 6)), settings=flange)
+            deploy_contact(arm, shipped_contact(PegInHole), places, np.zeros((2, 6)), settings=flange)
         assert np.abs(arm.state.q - before).max() < 1e-4
     with pytest.raises(ha.LimitError, match="latency"):
         DeploySettings(latency=3.0)
@@ -244,7 +245,7 @@ def test_the_command_line_inserts_a_peg_and_records_it(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.timeout(600)
 def test_the_law_of_torques_inserts_a_peg_and_is_guarded() -> None:
-    policy, target = shipped_peg(), "sim://iiwa14?scene=peg-in-hole&sensors=noisy:1&speed=0.5"
+    policy, target = shipped_contact(PegInHole), "sim://iiwa14?scene=peg-in-hole&sensors=noisy:1&speed=0.5"
     error = np.array([0.002, -0.001, 0.0005, 0.01, 0.02, 0.0])
     with ha.connect(target, watchdog=5.0) as arm, held_peg(arm) as hole:
         origin = policy.task.presumed(hole, error)
@@ -261,13 +262,13 @@ def test_the_law_of_torques_inserts_a_peg_and_is_guarded() -> None:
 @pytest.mark.timeout(600)
 def test_a_force_above_the_guard_ends_the_episode_at_rest() -> None:
     with ha.connect("sim://iiwa14?scene=peg-in-hole&speed=0.5", watchdog=5.0) as arm, held_peg(arm) as hole:
-        policy = shipped_peg()
+        policy = shipped_contact(PegInHole)
         error = np.array([0.0, 0.0, -0.001, 0.0, 0.0, 0.0])
         gentle = ContactSettings(peak=2.0, stale=2.0)
         beside = hole.shifted(y=0.02, frame="tool")
         report = deploy_contact(arm, policy, policy.task.presumed(beside, error), [error], settings=gentle)
         assert report.facts["guard"] == {"force": 1} and not report.success.any()
-        broken = shipped_peg()
+        broken = shipped_contact(PegInHole)
         broken.layers[-1] = (broken.layers[-1][0], np.full(5, np.nan, dtype=np.float32))
         with pytest.raises(ha.CommandRejected, match="an action of the policy must be finite"):
             deploy_contact(

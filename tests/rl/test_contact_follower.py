@@ -13,7 +13,7 @@ from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.pilot import ContactPilot
 from heptarm.rl.contact.task import ContactTask
-from heptarm.rl.policy import Policy, shipped, shipped_peg
+from heptarm.rl.policy import Policy, shipped, shipped_contact
 from heptarm.values.pose import Pose
 
 HOLE = Pose.of((0.6, 0.1, 0.24), (0.0, 1.0, 0.0, 0.0))
@@ -46,7 +46,7 @@ class Bench:
 
 @pytest.fixture
 def bench() -> Bench:
-    return Bench(ContactFollower(shipped_peg()))
+    return Bench(ContactFollower(shipped_contact(PegInHole)))
 
 
 def test_it_waits_for_the_zero_and_goes_to_the_depth_where_nothing_is_met(bench: Bench) -> None:
@@ -93,7 +93,7 @@ def test_what_cannot_begin_is_refused(bench: Bench) -> None:
     with pytest.raises(LimitError, match="the tip must be in the box"):
         bench.follower.on_target(HOLE.shifted(z=0.1))
     with pytest.raises(NotReady, match="no robot state"):
-        ContactFollower(shipped_peg()).check(HOLE)
+        ContactFollower(shipped_contact(PegInHole)).check(HOLE)
     with pytest.raises(CommandRejected, match="of a task with contacts, got one of reach"):
         ContactFollower(shipped())
     with pytest.raises(CommandRejected, match="must need neither gripper"):
@@ -101,7 +101,7 @@ def test_what_cannot_begin_is_refused(bench: Bench) -> None:
 
 
 def test_a_policy_that_diverges_ends_its_episode() -> None:
-    bench = Bench(ContactFollower(constant(shipped_peg().task, np.nan)))
+    bench = Bench(ContactFollower(constant(shipped_contact(PegInHole).task, np.nan)))
     bench.follower.on_target(HOLE)
     with pytest.raises(CommandRejected, match="finite"):
         for _ in range(60):

@@ -15,10 +15,12 @@ import gymnasium
 import heptarm.rl
 from heptarm.errors import CommandRejected, NotReady, ShapeError
 from heptarm.rl.contact.peg_in_hole import PegInHole
-from heptarm.rl.contact.task import Moment
+from heptarm.rl.contact.plug_insert import PlugInsert
+from heptarm.rl.contact.polish import Polish
+from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.film import film
-from heptarm.rl.policy import SHIPPED, shipped_peg
+from heptarm.rl.policy import SHIPPED, policy_named, shipped_contact
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.sim.contact_batch import BatchContact
 from heptarm.rl.sim.episodes import BatchSettings
@@ -138,7 +140,7 @@ def test_many_arms_at_once_are_the_same_arms() -> None:
 
 
 def test_the_included_policy_inserts_where_it_has_never_been(tmp_path: Path) -> None:
-    policy = shipped_peg()
+    policy = shipped_contact(PegInHole)
     assert (SHIPPED / "peg-in-hole-iiwa14.npz").stat().st_size <= 200_000
     report = evaluate(policy, 8, randomisation=Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0)))
     assert report.success_rate >= 0.75
@@ -153,6 +155,21 @@ def test_the_included_policy_inserts_where_it_has_never_been(tmp_path: Path) -> 
         evaluate(policy, 1, engine=PlantEngine)
     with pytest.raises(CommandRejected, match="film is drawn of the reach task"):
         film(report, tmp_path / "peg.gif")
+
+
+@pytest.mark.parametrize("kind", [PlugInsert])
+def test_the_included_policies_of_other_tasks_succeed(kind: type[ContactTask]) -> None:
+    policy = policy_named(kind.name)
+    assert policy.task == kind() and (SHIPPED / f"{kind.name}-iiwa14.npz").stat().st_size <= 200_000
+    report = evaluate(policy, 8, randomisation=Randomisation(latency=(0, 1), bandwidth=(15.0, 40.0)))
+    assert report.success_rate >= 0.75
+
+
+def test_a_task_whose_policy_is_not_included_names_those_that_are() -> None:
+    with pytest.raises(
+        CommandRejected, match=r"peg-in-hole, .*plug-insert, got polish \(heptarm rl train polish"
+    ):
+        shipped_contact(Polish)
 
 
 def test_one_who_does_nothing_inserts_nothing() -> None:

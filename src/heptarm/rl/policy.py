@@ -5,19 +5,20 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.task import ReachTask
-from heptarm.rl.tasks import OfTask, task_from_dict
+from heptarm.rl.tasks import TASKS, OfTask, task_from_dict
 from heptarm.values.checks import flag
 from heptarm.values.files import read_arrays, refuse_existing, unreadable
 
 Weights = npt.NDArray[np.float32]
+OfContact = TypeVar("OfContact", bound=ContactTask)
 
 #: Scaled observations are clipped to this.
 CLIP = 5.0
@@ -160,13 +161,26 @@ def shipped(*, feature: bool = False) -> Policy[ReachTask]:
     return Policy.load(SHIPPED / f"reach-iiwa14{'-feature' if flag(feature, 'feature') else ''}.npz")
 
 
-def shipped_peg() -> Policy[PegInHole]:
-    """Likewise for the peg-in-hole task, trained by `heptarm rl train peg-in-hole`."""
-    return Policy.load(SHIPPED / "peg-in-hole-iiwa14.npz")
+def shipped_contact(kind: type[OfContact]) -> Policy[OfContact]:
+    """Likewise of a task with contacts, such as `PegInHole`, trained by `heptarm rl train`.
+
+    Raises:
+        CommandRejected: none of this task is part of heptarm.
+    """
+    file = _included(kind.name)
+    if not file.exists():
+        known = ", ".join(name for name in TASKS if name != ReachTask.name and _included(name).exists())
+        raise CommandRejected(
+            f"kind must be a task whose policy is part of heptarm, {known}, got {kind.name}",
+            parameter="kind",
+            value=kind.name,
+            hint=f"heptarm rl train {kind.name} trains one",
+        )
+    return Policy.load(file)
 
 
 def policy_named(name: str | os.PathLike[str], *, feature: bool = False) -> Policy[Any]:
-    """The policy of a file, or the included one of a task by its name: "reach", "peg-in-hole".
+    """The policy of a file, or the included one of a task by its name, such as "reach" or "peg-in-hole".
 
     Args:
         name: the file or the task; "": "reach".
@@ -177,7 +191,12 @@ def policy_named(name: str | os.PathLike[str], *, feature: bool = False) -> Poli
     """
     if os.fspath(name) in ("", ReachTask.name):
         return shipped(feature=feature)
-    return shipped_peg() if os.fspath(name) == PegInHole.name else Policy.load(name)
+    kind = TASKS.get(os.fspath(name))
+    return shipped_contact(kind) if kind is not None and issubclass(kind, ContactTask) else Policy.load(name)
+
+
+def _included(name: str) -> Path:
+    return SHIPPED / f"{name}-iiwa14.npz"
 
 
 def _weights(values: npt.ArrayLike) -> Weights:

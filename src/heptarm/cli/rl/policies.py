@@ -62,7 +62,7 @@ Engine = Annotated[
         help="Simulation: MuJoCo on the CPU, MuJoCo Warp on a GPU, or the virtual cabinet's own plant."
     ),
 ]
-_POLICY = "File of the policy, .npz, or reach or peg-in-hole: the one that comes with heptarm."
+_POLICY = "File of the policy, .npz, or a task whose policy comes with heptarm, such as reach or peg-in-hole."
 AnyPolicy = Annotated[Path | None, Parameter(help=_POLICY)]
 
 
