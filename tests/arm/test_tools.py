@@ -80,6 +80,20 @@ def test_the_state_names_the_tool_and_its_pose_is_the_tips(bare: Arm) -> None:
     assert state.pose.distance_to(flange) < 1e-4
 
 
+def test_while_tools_are_changed_every_pose_is_of_the_flange_or_of_the_tip(bare: Arm) -> None:
+    flange = fresh(bare).pose
+    bare.subscribe(rate=500)
+    seen = bare.states(size=50_000)
+    for _ in range(20):
+        with bare.tool(GRIPPER):
+            fresh(bare)
+    end = bare.state.stamp
+    for state in seen:
+        assert min(state.pose.distance_to(flange), state.pose.distance_to(flange @ TIP)) < 1e-3
+        if state.stamp >= end:
+            break
+
+
 def test_the_motors_carry_it_and_nothing_is_felt(bare: Arm) -> None:
     before = fresh(bare)
     with bare.tool(GRIPPER), bare.attached(PART):

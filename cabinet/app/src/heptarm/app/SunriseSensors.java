@@ -56,10 +56,14 @@ final class SunriseSensors implements Sensors {
     }
 
     public PoseState readPose(long stamp) {
-        // relative to the robot's own base: the axes of the world differ for a robot on a wall
-        ObjectFrame frame = tools.motionFrame();
-        Frame measured = lbr.getCurrentCartesianPosition(frame, lbr.getRootFrame());
-        Frame commanded = lbr.getCommandedCartesianPosition(frame, lbr.getRootFrame());
+        Frame measured;
+        Frame commanded;
+        synchronized (tools) { // while a tool is changed, the frame of motions is attached to nothing
+            // relative to the robot's own base: the axes of the world differ for a robot on a wall
+            ObjectFrame frame = tools.motionFrame();
+            measured = lbr.getCurrentCartesianPosition(frame, lbr.getRootFrame());
+            commanded = lbr.getCommandedCartesianPosition(frame, lbr.getRootFrame());
+        }
         IRedundancyCollection collection = measured.getRedundancyInformationForDevice(lbr);
         Redundancy redundancy = new Redundancy(Double.NaN, -1, -1);
         if (collection instanceof LBRE1Redundancy) {
@@ -73,19 +77,22 @@ final class SunriseSensors implements Sensors {
     }
 
     public WrenchState readWrench(long stamp) {
-        ForceSensorData data = lbr.getExternalForceTorque(tools.motionFrame(), lbr.getRootFrame());
-        return wrench(data, stamp);
+        synchronized (tools) {
+            return wrench(lbr.getExternalForceTorque(tools.motionFrame(), lbr.getRootFrame()), stamp);
+        }
     }
 
     public WrenchState readWrench(String frame, Pose axes, long stamp) {
-        AbstractFrame reference;
-        try {
-            reference = tools.reference(frame, axes);
-        } catch (CommandRejected e) {
-            throw new IllegalArgumentException(e.getMessage());
+        synchronized (tools) {
+            AbstractFrame reference;
+            try {
+                reference = tools.reference(frame, axes);
+            } catch (CommandRejected e) {
+                throw new IllegalArgumentException(e.getMessage());
+            }
+            ForceSensorData data = lbr.getExternalForceTorque(tools.motionFrame(), reference == null ? tools.motionFrame() : reference);
+            return wrench(data, stamp);
         }
-        ForceSensorData data = lbr.getExternalForceTorque(tools.motionFrame(), reference == null ? tools.motionFrame() : reference);
-        return wrench(data, stamp);
     }
 
     public void readProgress(double[] progressAndRemaining) {
