@@ -24,7 +24,7 @@ from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.polish import Polish
 from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask, Moment
-from heptarm.rl.deploy_contact import ContactSettings, _check
+from heptarm.rl.deploy_contact import ContactSettings, check_contact
 from heptarm.rl.env import ContactEnv
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.contact_batch import BatchContact
@@ -185,7 +185,7 @@ def test_a_policy_may_choose_the_stiffness() -> None:
     with pytest.raises(LimitError, match="softest"):
         PegInHole(softest=0.0)
     with pytest.raises(CommandRejected, match='through must be "fri"'):
-        _check(task, ContactSettings(), None, None)
+        check_contact(task, ContactSettings(), 1.0)
 
 
 PICTURES = """
