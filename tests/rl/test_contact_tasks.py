@@ -19,6 +19,7 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 import gymnasium
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, Unreachable
+from heptarm.rl import register
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.polish import Polish
@@ -159,6 +160,62 @@ def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
         simulate(Handless(), TWO)
     with pytest.raises(CommandRejected, match="no teacher"):
         ContactTask.teach(Push(), Moment(*(np.zeros(6),) * 4))
+
+
+def test_what_cannot_be_registered_is_refused_before_it_is() -> None:
+    class OfAnother(Push):
+        name = "peg-in-hole"
+
+    class OfParent(Push):
+        pass
+
+    class Loud(Push):
+        name = "Loud Task"
+
+    class PegInHole(Push):
+        name = "another-peg"
+
+    before, known = dict(TASKS), set(gymnasium.registry)
+    for wrong, why in (
+        (OfAnother, "name and class of a task must be its own: peg-in-hole"),
+        (OfParent, "OfParent must have a name of its own in lower case"),
+        (Loud, "must have a name of its own in lower case, such as press-plate, got 'Loud Task'"),
+        (PegInHole, "name and class of a task must be its own: another-peg with heptarm/PegInHole-v0"),
+        (Push(), r"kind must be a subclass of ContactTask.*heptarm.rl.register\(Push\)"),
+        ("x", "kind must be a subclass of ContactTask, got 'x'"),
+    ):
+        with pytest.raises((CommandRejected, ShapeError), match=why):
+            register(wrong)  # type: ignore[arg-type]
+    assert before == TASKS and known == set(gymnasium.registry)
+
+
+def test_a_class_of_a_reloaded_module_is_registered_in_place_of_the_one_before() -> None:
+    def made() -> type[ContactTask]:
+        class Juggle(Push):
+            name = "juggle-twice"
+
+        return Juggle
+
+    try:
+        for kind in (made(), made()):
+            register(kind)
+            assert TASKS["juggle-twice"] is kind
+    finally:
+        TASKS.pop("juggle-twice", None)
+        gymnasium.registry.pop("heptarm/Juggle-v0", None)
+
+
+def test_an_environment_has_no_other_task_than_that_of_its_name() -> None:
+    for made, name in (
+        (gymnasium.make, "PegInHole"),
+        (gymnasium.make_vec, "PegInHole"),
+        (gymnasium.make_vec, "Reach"),
+    ):
+        with pytest.raises(
+            CommandRejected, match=r"task must be .* in the environment .*, got push .*Push-v0"
+        ):
+            made(f"heptarm/{name}-v0", task=Push())
+    assert gymnasium.make("heptarm/Push-v0", task=Push(steps=3)).unwrapped.task.steps == 3
 
 
 @pytest.mark.parametrize("kind", [kind for kind in TASKS.values() if kind is not ReachTask])
