@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import heptarm as ha
+from heptarm.cli.options import CommandTarget
+from heptarm.cli.rl.policies import deploy as deploy_command
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.deploy import DeploySettings, circle, deploy
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
@@ -221,6 +225,49 @@ def test_the_command_line_refuses_what_a_policy_with_contacts_has_not() -> None:
     for words in (("--tip", "0.2"), ("--through", "fri")):
         done = refused("rl", "deploy", *words)
         assert done.returncode != 0 and "are of policies with contacts" in done.stderr
+
+
+def test_the_command_line_refuses_before_anything_connects(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    peg, scene = (
+        ("peg-in-hole", "--target", "sim://iiwa14?scene=peg-in-hole"),
+        "sim://iiwa14?scene=peg-in-hole",
+    )
+    held = ("--at", "0.6", "0.1", "0.24")
+    reach = ("reach", "--target", "sim://iiwa14")
+    for words, why in (
+        ((*peg, "--speed", "0"), "--speed must be in (0, 1], got 0"),
+        ((*reach, "--speed", "1.5"), "--speed must be in (0, 1], got 1.5"),
+        ((*peg, "--speed", "0.01"), "set-point's speed must be at least 0.02 m/s for the task peg-in-hole"),
+        ((*peg, "--seed", "-1"), "--seed must be in [0, "),
+        ((*reach, "--seed", "-1"), "--seed must be in [0, "),
+        ((*peg, *held, "--tip", "-0.2"), "--tip must be in (0, 2] m, got -0.2 m"),
+        ((*peg, *held, "--tip", "5"), "--tip must be in (0, 2] m, got 5 m"),
+        ((*peg, "--twin", "nonsense"), "--twin must be none or a simulator"),
+        ((*reach, "--twin", "sim://nothing"), "target must be an address or a simulator"),
+        ((*reach, "--follow", "--ask"), "--ask and --follow must not be given together"),
+        ((*reach, "--at", "3", "0", "0.4"), "is outside the guard's box"),
+        ((*reach, "--random", "0"), "--random must be at least 1"),
+        (("peg-in-hole", "--target", "sim://iiwa14?speed=2"), f"--target '{scene}&speed=2'"),
+    ):
+        done = refused("rl", "deploy", *words)
+        assert done.returncode == 1 and why in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_speed_of_the_command_is_the_ceiling_of_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = Mock(robot=robot("iiwa14"), speed=1.0, is_virtual=True)
+    arm.record.side_effect = ha.NotReady("as far as here")
+    monkeypatch.setattr(CommandTarget, "connect", lambda _: nullcontext(arm))
+    for before, after in ((1.0, 0.2), (0.1, 0.1)):  # that of a saved target may be lower
+        arm.speed = before
+        with pytest.raises(ha.NotReady, match="as far as here"):
+            deploy_command(
+                Path("peg-in-hole"), speed=0.2, target=CommandTarget(text=f"{FAST}&scene=peg-in-hole")
+            )
+        assert arm.speed == after
 
 
 @pytest.mark.slow

@@ -19,12 +19,13 @@ pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 import gymnasium
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError, Unreachable
+from heptarm.rl import register
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.polish import Polish
 from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask, Moment
-from heptarm.rl.deploy_contact import ContactSettings, _check
+from heptarm.rl.deploy_contact import ContactSettings, check_contact
 from heptarm.rl.env import ContactEnv
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.sim.contact_batch import BatchContact
@@ -147,6 +148,15 @@ def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
         def scene(self) -> str:
             return "<mujoco><worldbody/></mujoco>"
 
+    class Loose(Push):
+        name = "loose"
+
+        def scene(self) -> str:
+            return (
+                "<mujoco><worldbody><body name='tool'><geom size='0.01'/></body>"
+                "<body name='rod'><site name='tip'/></body></worldbody></mujoco>"
+            )
+
     class Far(Push):
         name = "far"
         origin = Pose.of((1.4, 0.0, 0.2), (0.0, 1.0, 0.0, 0.0))
@@ -157,8 +167,109 @@ def test_a_task_of_ones_own_is_known_by_its_name_or_refused() -> None:
         simulate(Broken(), TWO)
     with pytest.raises(CommandRejected, match="a body `tool` with a site `tip`"):
         simulate(Handless(), TWO)
+    with pytest.raises(CommandRejected, match="a body `tool` with a site `tip`"):
+        simulate(Loose(), TWO)
     with pytest.raises(CommandRejected, match="no teacher"):
         ContactTask.teach(Push(), Moment(*(np.zeros(6),) * 4))
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "why"),
+    [
+        ("targets", lambda *_: np.zeros(2), r"targets\(\) .* shape \(2, k\) for 2 arms, got shape \(2,\)"),
+        ("targets", lambda *_: np.zeros((1, 4)), r"targets\(\) .*, got shape \(1, 4\)"),
+        (
+            "starts",
+            lambda *_: np.zeros((2, 3)),
+            r"starts\(\) .* shape \(2, 6\) for 2 arms, got shape \(2, 3\)",
+        ),
+        (
+            "bodies",
+            lambda *_: {"duck": np.zeros((2, 6))},
+            r"needs bodies of the scene .*\(puck\): got 'duck'",
+        ),
+        ("bodies", lambda *_: {"puck": np.zeros(6)}, r"bodies\(\)\['puck'\] .*, got shape \(6,\)"),
+        ("bodies", lambda *_: None, r"must return a dictionary of poses, got None"),
+        ("look", lambda *_: np.zeros((2, 5)), r"look\(\) .* \(2, 6\) .* \(2, 5\) .*look_size"),
+        ("hidden", lambda *_: np.zeros((2, 1)), r"hidden\(\) .* \(2, 0\) .* \(2, 1\) .*hidden_size"),
+        ("remember", lambda *_: np.zeros((2, 1)), r"remember\(\) .* \(2, 0\) .* \(2, 1\) .*memory_size"),
+        ("reward", lambda *_: np.zeros((2, 1)), r"reward\(\) .* shape \(2,\) for 2 arms, got shape \(2, 1\)"),
+        ("reward", lambda *_: np.full(2, np.nan), r"reward\(\) .* must be finite .*, got nan at \[0\]"),
+        ("missing", lambda *_: 0.0, r"missing\(\) .*, got shape \(\)"),
+        ("missing", lambda _, now: now.pose @ np.eye(3), r"missing\(\) of the task wrong fails for 2 arms"),
+        ("teach", lambda *_: np.zeros((2, 6)), r"teach\(\) .* \(2, 2\) .* got shape \(2, 6\)"),
+        ("teach", ContactTask.teach, "has_teacher of the task wrong needs a function `teach`"),
+        ("box", property(lambda _: np.zeros(6)), "box .* must be two arrays of shape"),
+        ("box", property(lambda _: (np.zeros(6), np.zeros(3))), r"box\[1\] .* \(6,\), got shape \(3,\)"),
+        ("box", property(lambda _: (np.ones(6), np.zeros(6))), "got 1 above 0 m of axis 0"),
+        ("axes", (0, 0), r"axes .* each once, got \(0, 0\)"),
+        ("axes", (0, 6), r"axes .* some of 0 to 5"),
+        ("axes", (), r"axes .* got \(\)"),
+        ("has_gripper", True, "has_gripper of the task wrong needs an actuator `gripper`"),
+        ("frequency", 4.0, "rate of the task wrong must divide the 4 Hz of its simulation"),
+        ("frequency", 24.0, r"must divide the 24 Hz .*got 10 Hz \(12 Hz does"),
+    ],
+)
+def test_what_a_function_of_a_task_does_wrongly_is_named(name: str, wrong: Any, why: str) -> None:
+    kind = type("Wrong", (Push,), {"name": "wrong", name: wrong})
+    with pytest.raises((CommandRejected, LimitError, ShapeError), match=why):
+        simulate(kind(), TWO)
+
+
+def test_what_cannot_be_registered_is_refused_before_it_is() -> None:
+    class OfAnother(Push):
+        name = "peg-in-hole"
+
+    class OfParent(Push):
+        pass
+
+    class Loud(Push):
+        name = "Loud Task"
+
+    class PegInHole(Push):
+        name = "another-peg"
+
+    before, known = dict(TASKS), set(gymnasium.registry)
+    for wrong, why in (
+        (OfAnother, "name and class of a task must be its own: peg-in-hole"),
+        (OfParent, "OfParent must have a name of its own in lower case"),
+        (Loud, "must have a name of its own in lower case, such as press-plate, got 'Loud Task'"),
+        (PegInHole, "name and class of a task must be its own: another-peg with heptarm/PegInHole-v0"),
+        (Push(), r"kind must be a subclass of ContactTask.*heptarm.rl.register\(Push\)"),
+        ("x", "kind must be a subclass of ContactTask, got 'x'"),
+    ):
+        with pytest.raises((CommandRejected, ShapeError), match=why):
+            register(wrong)  # type: ignore[arg-type]
+    assert before == TASKS and known == set(gymnasium.registry)
+
+
+def test_a_class_of_a_reloaded_module_is_registered_in_place_of_the_one_before() -> None:
+    def made() -> type[ContactTask]:
+        class Juggle(Push):
+            name = "juggle-twice"
+
+        return Juggle
+
+    try:
+        for kind in (made(), made()):
+            register(kind)
+            assert TASKS["juggle-twice"] is kind
+    finally:
+        TASKS.pop("juggle-twice", None)
+        gymnasium.registry.pop("heptarm/Juggle-v0", None)
+
+
+def test_an_environment_has_no_other_task_than_that_of_its_name() -> None:
+    for made, name in (
+        (gymnasium.make, "PegInHole"),
+        (gymnasium.make_vec, "PegInHole"),
+        (gymnasium.make_vec, "Reach"),
+    ):
+        with pytest.raises(
+            CommandRejected, match=r"task must be .* in the environment .*, got push .*Push-v0"
+        ):
+            made(f"heptarm/{name}-v0", task=Push())
+    assert gymnasium.make("heptarm/Push-v0", task=Push(steps=3)).unwrapped.task.steps == 3
 
 
 @pytest.mark.parametrize("kind", [kind for kind in TASKS.values() if kind is not ReachTask])
@@ -185,7 +296,7 @@ def test_a_policy_may_choose_the_stiffness() -> None:
     with pytest.raises(LimitError, match="softest"):
         PegInHole(softest=0.0)
     with pytest.raises(CommandRejected, match='through must be "fri"'):
-        _check(task, ContactSettings(), None, None)
+        check_contact(task, ContactSettings(), 1.0)
 
 
 PICTURES = """

@@ -106,6 +106,17 @@ def test_the_command_refuses_what_contradicts_itself(tmp_path: Path) -> None:
     ):
         done = refused("rl", "train", "--out", str(out), *words)
         assert done.returncode == 1 and why in done.stderr
+    for words, why in (
+        (["--episodes", "0"], "--episodes must be in [1, "),
+        (["--seed", "-1"], "--seed must be in [0, "),
+        (
+            ["peginhole"],
+            "policy must be a file, or a task whose policy is part of heptarm, reach, peg-in-hole",
+        ),
+        (["push"], "heptarm rl train push"),
+    ):
+        done = refused("rl", "eval", *words)
+        assert done.returncode == 1 and why in done.stderr and "Traceback" not in done.stderr
     out.with_name("reach-seed1.npz").touch()
     done = refused("rl", "train", "--out", str(out), "--seeds", "0..1")
     assert done.returncode == 1 and "reach-seed1.npz" in done.stderr

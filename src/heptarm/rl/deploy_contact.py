@@ -68,7 +68,7 @@ class ContactSettings:
         force: largest that the control exerts in each direction [N]; the arm is held compliant at it.
         peak: a larger force on the tip ends the episode: the arm stops [N]. Over a servo motion the cabinet watches it
             as well.
-        speed: largest of the set-point [m/s].
+        speed: largest of the set-point [m/s]; `arm.speed` scales it.
         latency: added between seeing and commanding [s].
         stale: without a newer state for so long the deployment ends, and without a target the arm stops [s].
     """
@@ -154,7 +154,7 @@ def deploy_contact(
     """
     chosen = settings or ContactSettings()
     task = deployed_task(instance(policy, Policy, "policy").task, ContactTask, arm.robot)  # type: ignore[type-abstract]
-    _check(task, chosen, bodies, gripper)
+    check_contact(task, chosen, arm.speed, bodies=bodies, gripper=gripper)
     goals = _goals(task, targets)
     frames = [origins] * len(goals) if isinstance(origins, Pose) else list(origins)
     for frame in frames:
@@ -196,10 +196,27 @@ def deploy_contact(
     )
 
 
-def _check(
-    task: ContactTask, settings: ContactSettings, bodies: Bodies | None, gripper: Gripper | None
+def check_contact(
+    task: ContactTask,
+    settings: ContactSettings,
+    speed: float,
+    *,
+    bodies: Bodies | None = None,
+    gripper: Gripper | None = None,
 ) -> None:
-    """Refuse, before anything moves, what cannot be deployed."""
+    """Refuse, before anything moves, what cannot be deployed.
+
+    Args:
+        task: of the policy.
+        settings: of the deployment.
+        speed: ceiling of the arm's speed, see `Arm.speed`.
+        bodies: where the free bodies are.
+        gripper: of the arm.
+
+    Raises:
+        CommandRejected: bodies or a gripper are missing, or the stiffness cannot be chosen through a servo motion.
+        LimitError: the set-point could be faster than it is allowed to be.
+    """
     if task.has_gripper and gripper is None:
         raise CommandRejected(f"gripper must be given: the task {task.name} uses it", parameter="gripper")
     if task.look_size and bodies is None:
@@ -212,13 +229,15 @@ def _check(
             value=settings.through,
             hint="the stiffness of a servo motion does not change while it runs",
         )
-    fastest = task.step * task.rate * np.sqrt(3.0)
-    if fastest > settings.speed:
+    # a servo motion limits the speed along each axis, the law of torques that of all together
+    fastest = task.step * task.rate * (np.sqrt(3.0) if settings.through == "fri" else 1.0)
+    if fastest > settings.speed * speed:
         raise LimitError(
-            f"speed must be at least {fastest:.3g} m/s for the task {task.name}, got {settings.speed:g} m/s",
+            f"the set-point's speed must be at least {fastest:.3g} m/s for the task {task.name}, got "
+            f"{settings.speed * speed:.3g} m/s: {settings.speed:g} m/s times the arm's speed of {speed:g}",
             parameter="speed",
-            value=settings.speed,
-            hint="a set-point of this task can be so fast; allow it, or train with a smaller step",
+            value=settings.speed * speed,
+            hint=f"an arm's speed of {fastest / settings.speed:.2g} allows it, or train with a smaller step",
         )
 
 
@@ -295,6 +314,7 @@ class _Run:
             watchdog=settings.stale,
             mode=self._spring,
             moving=settings.frame,
+            speed_mps=settings.speed,
             until=ForceAbove(settings.peak, frame=settings.frame),
         ) as servo:
             found = self._decide(servo, tip, origin, target)
@@ -308,7 +328,7 @@ class _Run:
             stiffness=self._spring.stiffness,
             damping=_RATIO,
             force_max=self._settings.force,
-            speed=self._settings.speed,
+            speed=self._settings.speed * self._arm.speed,
         )
         with self._arm.fri("torque", period_ms=_PERIOD, law=law) as session:
             drive = _ByTorques(session, self._arm.state, self._spring.stiffness)

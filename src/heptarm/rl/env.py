@@ -17,7 +17,7 @@ from heptarm.rl.sim.plant_engine import PlantEngine
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.sim.simulate import simulate
 from heptarm.rl.task import COARSE, ReachTask
-from heptarm.rl.tasks import Task, task_named
+from heptarm.rl.tasks import Task, environment, task_named
 from heptarm.values.camera import Camera
 from heptarm.values.checks import array, instance, word
 
@@ -145,7 +145,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is no
             action: shape (n,), clipped to +-1.
 
         Raises:
-            ShapeError: another shape, or not finite.
+            ShapeError: another shape.
+            LimitError: not finite.
             NotReady: the episode has ended, or has not started.
         """
         if not self._open:
@@ -213,14 +214,15 @@ class ContactEnv(TaskEnv):
 
     Args:
         task: the task, or the name of one with its defaults.
+        name: of the task that the environment is for; "": of any.
         randomisation: latency and bandwidth that differ from episode to episode.
         pictures: cameras by their names: an observation is a dictionary then, with the numbers as "state" and the
             pictures under these names. Set MUJOCO_GL to egl or osmesa where there is no display. None: numbers alone.
         render_mode: "rgb_array": `render` draws the arm; None: it does not.
 
     Raises:
-        CommandRejected: no such task, a render mode, a randomisation that the task has not, a picture that is named
-            "state", or a machine that cannot draw.
+        CommandRejected: no such task, one of another name, a render mode, a randomisation that the task has not, a
+            picture that is named "state", or a machine that cannot draw.
         MissingExtra: Gymnasium is not installed.
     """
 
@@ -228,11 +230,12 @@ class ContactEnv(TaskEnv):
         self,
         task: ContactTask | str = "peg-in-hole",
         *,
+        name: str = "",
         randomisation: Randomisation = NONE,
         pictures: Mapping[str, Camera] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self.task = _task(task)
+        self.task = _task(task, name)
         instance(self.task, ContactTask, "task")
         instance(randomisation, Randomisation, "randomisation")
         # one decision more than an episode, so that its last picture is not of the next one
@@ -265,11 +268,12 @@ class TaskVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked
     Args:
         num_envs: number of arms.
         task: the task, or the name of one with its defaults.
+        name: of the task that the environment is for; "": of any.
         randomisation: what differs from episode to episode; of tasks with contacts: latency and bandwidth.
         threads: of the simulation.
 
     Raises:
-        CommandRejected: no such task, or a randomisation that the task has not.
+        CommandRejected: no such task, one of another name, or a randomisation that the task has not.
         LimitError: no arms, or no threads.
     """
 
@@ -280,10 +284,11 @@ class TaskVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked
         num_envs: int = 1,
         *,
         task: Task | str = ReachTask.name,
+        name: str = "",
         randomisation: Randomisation = NONE,
         threads: int = 2,
     ) -> None:
-        self.task, self.render_mode = _task(task), None
+        self.task, self.render_mode = _task(task, name), None
         self._arms = _arms(self.task, randomisation, envs=num_envs, threads=threads)
         self.num_envs = num_envs
         self.single_observation_space = observation_space(self.task)
@@ -308,7 +313,8 @@ class TaskVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked
         """One decision of every arm; `actions` of shape (num_envs, n), clipped to +-1.
 
         Raises:
-            ShapeError: another shape, or not finite.
+            ShapeError: another shape.
+            LimitError: not finite.
         """
         step, space = self._arms.step(actions), self.single_observation_space
         success = step.distance <= self.task.radius
@@ -322,5 +328,21 @@ class TaskVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium is not looked
         return _seen(step.observation, space), step.reward, goes_on, step.done, info
 
 
-def _task(task: Task | str) -> Any:
-    return task_named(task) if isinstance(task, str) else instance(task, (ReachTask, ContactTask), "task")
+class ReachVectorEnv(TaskVectorEnv):
+    """Many simulated robots in the reach task; arguments of `TaskVectorEnv`."""
+
+    def __init__(self, num_envs: int = 1, **settings: Any) -> None:
+        super().__init__(num_envs, name=ReachTask.name, **settings)
+
+
+def _task(task: Task | str, name: str) -> Any:
+    """A task for an environment of this name; "": for any."""
+    found = task_named(task) if isinstance(task, str) else instance(task, (ReachTask, ContactTask), "task")
+    if instance(name, str, "name") not in ("", found.name):
+        raise CommandRejected(
+            f"task must be {name} in the environment of this task, got {found.name}",
+            parameter="task",
+            value=found.name,
+            hint=f'gymnasium.make("{environment(type(found))}", task=...)',
+        )
+    return found

@@ -169,9 +169,8 @@ def shipped_contact(kind: type[OfContact]) -> Policy[OfContact]:
     """
     file = _included(kind.name)
     if not file.exists():
-        known = ", ".join(name for name in TASKS if name != ReachTask.name and _included(name).exists())
         raise CommandRejected(
-            f"kind must be a task whose policy is part of heptarm, {known}, got {kind.name}",
+            f"kind must be a task whose policy is part of heptarm, {_known()}, got {kind.name}",
             parameter="kind",
             value=kind.name,
             hint=f"heptarm rl train {kind.name} trains one",
@@ -191,8 +190,23 @@ def policy_named(name: str | os.PathLike[str], *, feature: bool = False) -> Poli
     """
     if os.fspath(name) in ("", ReachTask.name):
         return shipped(feature=feature)
-    kind = TASKS.get(os.fspath(name))
-    return shipped_contact(kind) if kind is not None and issubclass(kind, ContactTask) else Policy.load(name)
+    kind, file = TASKS.get(os.fspath(name)), Path(name)
+    if kind is not None and issubclass(kind, ContactTask):
+        return shipped_contact(kind)
+    if not file.suffix and not file.exists():
+        raise CommandRejected(
+            f"policy must be a file, or a task whose policy is part of heptarm, {ReachTask.name}, {_known()}, got "
+            f"{os.fspath(name)!r}",
+            parameter="policy",
+            value=os.fspath(name),
+            hint=f"heptarm rl train NAME trains one of a task, {', '.join(TASKS)}; a file ends in .npz",
+        )
+    return Policy.load(file)
+
+
+def _known() -> str:
+    """The tasks with contacts whose policies are part of heptarm."""
+    return ", ".join(name for name in TASKS if name != ReachTask.name and _included(name).exists())
 
 
 def _included(name: str) -> Path:

@@ -30,19 +30,20 @@ from heptarm.rl import deploy as deployment
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.deploy import DeploySettings, circle
-from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
+from heptarm.rl.deploy_contact import ContactSettings, check_contact, deploy_contact
 from heptarm.rl.policy import Policy, policy_named
 from heptarm.rl.pool import Job
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
 from heptarm.rl.sweep import with_setting, with_settings
 from heptarm.rl.task import ReachTask
-from heptarm.rl.tasks import task_named
+from heptarm.rl.tasks import deployed_task, task_named
+from heptarm.values.checks import array, integer, within
 from heptarm.values.files import refuse_existing
 from heptarm.values.fitted_arm import load_fitted
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.pose import Pose
-from heptarm.values.tool import Tool
+from heptarm.values.tool import HEAVIEST, Tool
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
@@ -63,6 +64,10 @@ Engine = Annotated[
     ),
 ]
 _POLICY = "File of the policy, .npz, or a task whose policy comes with heptarm, such as reach or peg-in-hole."
+#: Largest seed, most episodes, longest of what the flange holds [m].
+_SEEDS, _EPISODES, _LONGEST = 2**63 - 1, 1_000_000, 2.0
+#: The scene in which the peg is fetched.
+_SCENE = "peg-in-hole"
 AnyPolicy = Annotated[Path | None, Parameter(help=_POLICY)]
 
 
@@ -285,6 +290,8 @@ def evaluate(
 
         heptarm rl eval peg-in-hole mine.npz --seeds 0..9 --episodes 200 --sweep clearance=5e-4,2e-4
     """
+    integer(episodes, "--episodes", 1, _EPISODES)
+    integer(seed, "--seed", 0, _SEEDS)
     if len(policies) > 1 or seeds or sweep or jobs != HERE:
         table = (
             None if out is None else refuse_existing(out.with_suffix(".csv"), overwrite=overwrite, name="out")
@@ -390,6 +397,9 @@ def deploy(
     scene peg-in-hole; or once at each --at. A recording is written in any case, and compared with the simulator, which
     takes as long as the deployment: --twin none does without.
     """
+    within(speed, "--speed", 0.0, 1.0, above=True)
+    integer(seed, "--seed", 0, _SEEDS)
+    _check_twin(twin)
     network = policy_named(policy or ReachTask.name)
     if isinstance(network.task, ContactTask):
         if ask or follow or film or stiffness is not None:
@@ -399,7 +409,8 @@ def deploy(
                 value=network.task.name,
                 hint="leave them out",
             )
-        place = _Place(at, random, seed, tip, mass, latency, through)
+        place = _Place(at, random, seed, tip, mass, latency, through, speed)
+        place.check(network.task, target)
         return _insert(
             network, place, out=out, overwrite=overwrite, yes=yes, twin=twin, target=target, as_json=as_json
         )
@@ -409,18 +420,26 @@ def deploy(
             parameter="tip",
             hint="leave them out",
         )
+    if ask and follow:
+        raise CommandRejected(
+            "--ask and --follow must not be given together", parameter="ask", hint="leave out one of them"
+        )
     _refuse_reports(out, overwrite=overwrite, film=film)
     recording = _recording(network, out, overwrite=overwrite)
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
+    targets = [] if ask else _targets(network, at, random, follow, seed)
+    if at and not (ask or follow):
+        for point in targets:
+            settings.guard.check(point)
     with target.connect() as arm:
+        deployed_task(network.task, ReachTask, arm.robot)
         if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         if ask:
             with arm.record(recording, overwrite=overwrite):
                 return _ask(arm, network, settings)
-        targets = _targets(network, at, random, follow, seed)
 
         def show(number: int, distance: float) -> None:
             if not as_json:
@@ -436,6 +455,27 @@ def _recording(network: Policy[Any], out: Path | None, *, overwrite: bool) -> Pa
     """The file of a deployment's recording, under the name of its report or of its time."""
     name = out or Path(f"{network.task.name}-{datetime.now():%Y%m%d-%H%M%S}")
     return refuse_existing(name.with_suffix(".mcap"), overwrite=overwrite, name="out")
+
+
+def _check_twin(twin: str) -> None:
+    """Refuse a simulator for the comparison that is none.
+
+    Raises:
+        CommandRejected: neither empty, nor "none", nor a simulator.
+        ConnectFailed: a simulator that is none.
+    """
+    from heptarm.arm.link.target import parse_target
+
+    if twin in ("", "none"):
+        return
+    if not twin.startswith("sim://"):
+        raise CommandRejected(
+            f"--twin must be none or a simulator, sim://..., got {twin!r}",
+            parameter="twin",
+            value=twin,
+            hint="for example sim://iiwa14",
+        )
+    parse_target(twin)
 
 
 def _compared(
@@ -480,8 +520,14 @@ class _Place:
     mass: float
     latency: float
     through: str
+    speed: float
 
     def __post_init__(self) -> None:
+        if self.tip is not None:
+            within(self.tip, "--tip", 0.0, _LONGEST, above=True, unit="m")
+        for point in self.at:
+            array(point, 3, "--at")
+        within(self.mass, "--mass", 0.0, HEAVIEST, unit="kg")
         if (self.tip is None) == bool(self.at):
             raise CommandRejected(
                 "--at and --tip must be given together, or neither", parameter="tip", value=self.tip
@@ -489,28 +535,56 @@ class _Place:
         if self.random < 1:
             raise CommandRejected(f"--random must be at least 1, got {self.random}", parameter="random")
 
+    @property
+    def settings(self) -> ContactSettings:
+        """Those of the deployment on a real arm."""
+        frame = "tip" if self.tip is None else "tool"
+        return ContactSettings(frame=frame, through=self.through, latency=self.latency)
+
+    def check(self, task: ContactTask, target: CommandTarget) -> None:
+        """Refuse, before anything connects, what cannot be deployed.
+
+        Raises:
+            CommandRejected: the task needs what is not there, or the peg is to be fetched where none is.
+            LimitError: the task needs a higher speed.
+            ConnectFailed: the target is none.
+        """
+        from heptarm.arm.link.target import parse_target, target_from_env
+
+        if self.tip is None and not isinstance(task, PegInHole):
+            raise CommandRejected(
+                f"--at and --tip must be given for the task {task.name}: no scene of it is shipped",
+                parameter="at",
+            )
+        check_contact(task, self.settings, self.speed)
+        given = parse_target(target.text or target_from_env())
+        if (
+            self.tip is None
+            and given.is_private
+            and Path(dict(given.options).get("scene", "")).stem != _SCENE
+        ):
+            options = "&".join(f"{name}={value}" for name, value in given.options if name != "scene")
+            fitting = f"sim://{given.model}?scene={_SCENE}{'&' if options else ''}{options}"
+            raise CommandRejected(
+                f"the virtual arm must have the scene {_SCENE}, in which the peg is fetched, got {given}",
+                parameter="target",
+                value=str(given),
+                hint=f"--target '{fitting}', or --at and --tip where something is held already",
+            )
+
     @contextmanager
-    def prepared(self, arm: Arm, task: ContactTask) -> Iterator[tuple[str, list[Pose], Any]]:
-        """Frame of the tip, origins and targets of the episodes, while the part is held."""
+    def prepared(self, arm: Arm, task: ContactTask) -> Iterator[tuple[list[Pose], Any]]:
+        """Origins and targets of the episodes, while the part is held."""
         if self.tip is not None:
             held = Tool("held", mass=self.mass, com=(0, 0, 0.5 * self.tip), tcp=Pose.at(0, 0, self.tip))
             with arm.tool(held):
                 quat = arm.pose().quat
                 origins = [Pose.of(place, quat) for place in self.at]
-                yield (
-                    "tool",
-                    origins,
-                    np.zeros((len(origins), len(task.targets(np.random.default_rng(0), 1)[0]))),
-                )
+                yield origins, np.zeros((len(origins), len(task.targets(np.random.default_rng(0), 1)[0])))
             return
-        if not isinstance(task, PegInHole):
-            raise CommandRejected(
-                f"--at and --tip must be given for the task {task.name}: no scene of it is shipped",
-                parameter="at",
-            )
         with held_peg(arm) as hole:
             errors = task.targets(np.random.default_rng(self.seed), self.random)
-            yield "tip", [task.presumed(hole, error) for error in errors], errors
+            yield [PegInHole.presumed(hole, error) for error in errors], errors
 
 
 def _insert(
@@ -529,6 +603,9 @@ def _insert(
     out = out or recording.with_suffix("")
     _refuse_reports(out, overwrite=overwrite, film=False)
     with target.connect() as arm:
+        deployed_task(network.task, ContactTask, arm.robot)  # type: ignore[type-abstract]
+        arm.speed = min(arm.speed, place.speed)
+        check_contact(network.task, place.settings, arm.speed)
         if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
 
@@ -538,19 +615,14 @@ def _insert(
 
         with (
             arm.record(recording, overwrite=overwrite),
-            place.prepared(arm, network.task) as (frame, origins, targets),
+            place.prepared(arm, network.task) as (origins, targets),
         ):
             report = deploy_contact(
                 arm,
                 network,
                 origins,
                 targets,
-                settings=ContactSettings(
-                    frame=frame,
-                    through=place.through,
-                    latency=place.latency,
-                    stale=2.0 if arm.is_virtual else 0.25,
-                ),
+                settings=replace(place.settings, stale=2.0) if arm.is_virtual else place.settings,
                 progress=show,
             )
     report = _compared(report, recording, twin, target, as_json=as_json)

@@ -15,11 +15,12 @@ from mujoco import batch
 
 from heptarm.errors import CommandRejected, Unreachable
 from heptarm.model.batch import forward_batch, jacobian_batch, solve_batch
+from heptarm.rl.contact.check import Contents, check_task
 from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.sim.episodes import ALL, BatchSettings, Index, TaskBatch
 from heptarm.sim.plant.appearance import ArmMeshes
 from heptarm.sim.plant.gripper import driven_joints, has_gripper
-from heptarm.sim.plant.scene import GRIPPER, PREFIX, attach_text
+from heptarm.sim.plant.scene import GRIPPER, PREFIX, TOOL, attach_text
 from heptarm.sim.plant.sensor_errors import FRICTION, GAIN, STICTION_SPEED, TORQUE_NOISE
 from heptarm.sim.plant.world import add_camera, specification
 from heptarm.values.camera import Camera
@@ -57,7 +58,7 @@ def build(task: ContactTask, camera: Camera | None = None) -> Any:
         geom.contype = geom.conaffinity = 0
     attach_text(spec, task.scene(), what=f"the scene of {task.name}")
     tip = spec.site(PREFIX + task.site)
-    if tip is None:
+    if tip is None or tip.parent.name != PREFIX + TOOL:
         raise CommandRejected(f"the scene of {task.name} must have a body `tool` with a site `{task.site}`")
     arm = spec.body("link_0")
     for body in (arm, *arm.find_all(mujoco.mjtObj.mjOBJ_BODY)):
@@ -107,6 +108,23 @@ def _joints(task: ContactTask, poses: Array, reach: float) -> Array:
     return found
 
 
+def _contents(model: Any) -> tuple[dict[str, int], dict[str, int], dict[str, int]]:
+    """What a scene has by names: numbers of mocap bodies, places in qpos of free bodies, and of other joints."""
+    mocaps = {
+        model.body(body).name.removeprefix(PREFIX): int(model.body_mocapid[body])
+        for body in np.flatnonzero(model.body_mocapid >= 0)
+    }
+    free: dict[str, int] = {}
+    others: dict[str, int] = {}
+    for joint in range(7, model.njnt):
+        place, body = int(model.jnt_qposadr[joint]), model.body(int(model.jnt_bodyid[joint]))
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
+            free[body.name.removeprefix(PREFIX)] = place
+        else:
+            others[model.joint(joint).name.removeprefix(PREFIX)] = place
+    return mocaps, free, others
+
+
 class BatchContact(TaskBatch):
     """A task with contacts on many simulated arms.
 
@@ -123,6 +141,7 @@ class BatchContact(TaskBatch):
 
     Raises:
         CommandRejected: a randomisation that these tasks have not, or a scene that cannot be read.
+        HeptarmError: functions of the task that do not fit each other or the scene, see `check_task`.
     """
 
     task: ContactTask
@@ -136,9 +155,11 @@ class BatchContact(TaskBatch):
             raise CommandRejected(
                 f"only latency and bandwidth differ in the task {task.name}", parameter="randomisation"
             )
+        model = build(task)
+        mocaps, free, others = _contents(model)
+        check_task(task, Contents(free, mocaps, others, has_gripper(model)))
         size = task.targets(np.random.default_rng(0), 1).shape[1]
         super().__init__(task, chosen, sizes=(size, task.command_size))
-        model = build(task)
         self._batch = batch.Batch(model, nsim=envs, nthread=chosen.threads)
         bind, expand = self._batch.bind, self._batch.expand
         names = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "mocap_pos", "mocap_quat")
@@ -153,18 +174,7 @@ class BatchContact(TaskBatch):
         self._steels = np.flatnonzero(model.geom_priority == 0)
         self._reach = float(model.site(PREFIX + task.site).pos[2])
         self._first = model.qpos0.copy()
-        self._mocaps = {
-            model.body(body).name.removeprefix(PREFIX): int(model.body_mocapid[body])
-            for body in np.flatnonzero(model.body_mocapid >= 0)
-        }
-        self._free: dict[str, int] = {}
-        self._others: dict[str, int] = {}
-        for joint in range(7, model.njnt):
-            place, body = int(model.jnt_qposadr[joint]), model.body(int(model.jnt_bodyid[joint]))
-            if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE:
-                self._free[body.name.removeprefix(PREFIX)] = place
-            else:
-                self._others[model.joint(joint).name.removeprefix(PREFIX)] = place
+        self._mocaps, self._free, self._others = mocaps, free, others
         self._gripper: Array | None = None
         if has_gripper(model):
             self._grip = int(model.actuator(PREFIX + GRIPPER).id)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.tasks import Task
-from heptarm.values.checks import Array, instance, integer, word
+from heptarm.values.checks import Array, finite_entries, instance, integer, numbers, word
 
 #: Numbers of arms.
 Index: TypeAlias = npt.NDArray[np.integer[Any]]
@@ -174,7 +174,8 @@ class TaskBatch(ABC):
             The observations, shape (envs, n).
 
         Raises:
-            ShapeError: targets of another shape, or not finite.
+            ShapeError: targets of another shape.
+            LimitError: one of them is not finite.
         """
         given = None if targets is None else self._checked(targets, "targets", self.target.shape)
         if seed is not None:
@@ -200,7 +201,8 @@ class TaskBatch(ABC):
             action: shape (envs, actions), clipped to +-1.
 
         Raises:
-            ShapeError: another shape, or not finite.
+            ShapeError: another shape.
+            LimitError: not finite.
         """
         given = self._checked(action, "action", (self.envs, self.task.action_size))
         self.command = self._advance(given)
@@ -221,11 +223,13 @@ class TaskBatch(ABC):
 
     @staticmethod
     def _checked(value: npt.ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
-        given = np.asarray(value, dtype=np.float64)
-        if given.shape != shape or not np.isfinite(given).all():
-            raise ShapeError(
-                f"{name} must have shape {shape} and be finite, got shape {given.shape}", parameter=name
-            )
+        given = numbers(value, name)
+        # of one arm: without the axis of the arms, as its environment has it
+        is_one = shape[0] == 1 and given.ndim == len(shape)
+        if given.shape != shape:
+            wanted, got = (shape[1:], given.shape[1:]) if is_one else (shape, given.shape)
+            raise ShapeError(f"{name} must have shape {wanted}, got {got}", parameter=name)
+        finite_entries(given[0] if is_one else given, name)
         return given
 
     # ------------------------------------------------------------------------------ interrupted training
