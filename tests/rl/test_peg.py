@@ -17,6 +17,7 @@ from heptarm.errors import CommandRejected, NotReady, ShapeError
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.plug_insert import PlugInsert
 from heptarm.rl.contact.polish import Polish
+from heptarm.rl.contact.push import Push
 from heptarm.rl.contact.task import ContactTask, Moment
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.film import film
@@ -157,7 +158,7 @@ def test_the_included_policy_inserts_where_it_has_never_been(tmp_path: Path) -> 
         film(report, tmp_path / "peg.gif")
 
 
-@pytest.mark.parametrize("kind", [PlugInsert])
+@pytest.mark.parametrize("kind", [PlugInsert, Push])
 def test_the_included_policies_of_other_tasks_succeed(kind: type[ContactTask]) -> None:
     policy = policy_named(kind.name)
     assert policy.task == kind() and (SHIPPED / f"{kind.name}-iiwa14.npz").stat().st_size <= 200_000
