@@ -265,8 +265,8 @@ def load_episodes(
             value=str(where),
             hint="record them again, or choose another folder",
         ) from first
-    for path, error in failures.items():
-        _log.warning("%s cannot be read and is left out: %s", path.name, error)
+    for path, failure in failures.items():
+        _log.warning("%s cannot be read and is left out: %s", path.name, failure)
     chosen_ones = (episode for episode in found if episode.label in chosen)
     return Demonstrations(where, chosen_ones, unreadable=failures)
 
