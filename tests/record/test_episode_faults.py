@@ -74,7 +74,7 @@ def test_a_file_that_cannot_be_read_does_not_block_the_others(
             with episodes.episode() as episode:
                 episodes.push("pushed", [1.0, 2.0])
                 if not number:  # as an older heptarm wrote it
-                    episodes._feeds["pushed"].add(arm._connection.nanos(), [1.0])
+                    episodes._feeds["pushed"].add(episodes._source.nanos(), [1.0])
                 passes(arm, 0.2)
                 episode.succeed()
     with caplog.at_level(logging.WARNING, "heptarm.record"):
