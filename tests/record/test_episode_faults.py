@@ -81,14 +81,14 @@ def test_a_file_that_cannot_be_read_does_not_block_the_others(
         found = ha.load_episodes(folder)
     assert [episode.number for episode in found] == [1]
     assert found.unreadable == (folder / "episode-00000.mcap",) == found[:1].unreadable
-    assert str(found).startswith("1 episode in ") and "unreadable  episode-00000.mcap" in str(found)
+    assert str(found).startswith("1 episode in ") and "unreadable  1 file: episode-00000.mcap" in str(found)
     assert "episode-00000.mcap cannot be read and is left out" in caplog.text
     assert "the stream pushed must have as many numbers each time, got 2 and 1" in caplog.text
     assert command.episodes(folder) == 0
     assert "unreadable" in capsys.readouterr().out
     assert command.convert(folder, tmp_path / "data", to="lerobot") == 0
     printed = capsys.readouterr().out
-    assert printed.startswith("1 episode, ") and "could not be read: episode-00000.mcap" in printed
+    assert printed.startswith("1 episode, ") and "left out, as not readable: 1 file" in printed
     (folder / "episode-00001.mcap").write_bytes(b"no MCAP")
     with pytest.raises(CommandRejected, match="must have episodes that can be read, got none among 2 files"):
         ha.load_episodes(folder)

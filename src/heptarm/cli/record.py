@@ -289,7 +289,9 @@ def _made(found: Demonstrations, where: Path, *, as_json: bool) -> int:
     else:
         print(f"{counted(len(found), 'episode')}, {counted(steps, 'step')} in {where}")
         if found.unreadable:
-            print(f"left out, as it could not be read: {', '.join(path.name for path in found.unreadable)}")
+            print(
+                f"left out, as not readable: {counted(len(found.unreadable), 'file')}; the warnings name them"
+            )
     return 0
 
 

@@ -41,6 +41,8 @@ _log = logging.getLogger("heptarm.record")
 
 #: Signals of the states that steps have, with their numbers.
 SIGNALS = {"q": 7, "dq": 7, "tau_ext": 7, "pose": 7, "wrench": 6}
+#: Files that are named where they could not be read; the warnings name all.
+_NAMED = 5
 #: A sample at the end of a step still belongs to it [s].
 _ROUNDING = 1e-6
 
@@ -173,6 +175,13 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
         counts = Counter(episode.label for episode in self._episodes)
         return {label: counts[label] for label in LABELS if counts[label]}
 
+    @property
+    def _left_out(self) -> str:
+        """How many files could not be read, and the first of them; "": none."""
+        names = [path.name for path in self.unreadable]
+        more = ", ..." if len(names) > _NAMED else ""
+        return f"{counted(len(names), 'file')}: {', '.join(names[:_NAMED])}{more}" if names else ""
+
     def statistics(self) -> dict[str, SignalStatistics]:
         """Least, largest, mean and standard deviation of each signal, stream and the action, by name.
 
@@ -210,7 +219,7 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
             "steps": str(steps),
             "dropped": ", ".join(f"{name} {count}" for name, count in dropped.items() if count),
             "corrected": str(sum(int(episode.corrected.sum()) for episode in self._episodes) or ""),
-            "unreadable": ", ".join(path.name for path in self.unreadable),
+            "unreadable": self._left_out,
             "tasks": "; ".join(dict.fromkeys(episode.task for episode in self._episodes if episode.task)),
         }
         return lines(f"{counted(len(self), 'episode')} in {self.folder}", rows)
