@@ -237,8 +237,17 @@ def test_a_stream_that_gives_nothing_makes_a_failure(peer: Peer, tmp_path: Path)
         ):
             passes(arm, 0.2)
             episode.succeed()
+        camera = Camera()
+        camera.is_stuck.set()
+        with (
+            arm.episodes(tmp_path, cameras={"wrist": camera}) as episodes,
+            pytest.raises(StaleState, match="no picture of the camera wrist arrived"),
+            episodes.episode() as episode,
+        ):
+            passes(arm, 0.2)
+        camera.ends.set()
     found = ha.load_episodes(tmp_path)
-    assert [episode.label for episode in found] == ["failure", "failure"]
+    assert [episode.label for episode in found] == ["failure"] * 3
     assert found[0].reason == "no value of the stream p arrived"
 
 

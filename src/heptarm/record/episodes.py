@@ -514,7 +514,12 @@ class Episode(Sealed):
         recorder = self._recorder
         assert recorder is not None
         try:
-            stalled = self._missing() or self._stalled()
+            terms = self._set._terms
+            stalled = (
+                self._missing(terms.streams, "value of the stream")
+                or self._stalled()
+                or self._missing(terms.cameras, "picture of the camera")
+            )
             if error is not None and self._label != "failure":
                 self.fail(_line(f"{type(error).__name__}: {error}"))
             elif stalled:
@@ -548,12 +553,12 @@ class Episode(Sealed):
                 raise
             _log.warning("%s", failure)
 
-    def _missing(self) -> str:
-        """Which camera or stream has given nothing at all; "": none."""
-        for name, feed in self._set._feeds.items():
-            if name != ACTION and not feed.count and feed.failure is None and not feed.defect:
-                is_camera = name in self._set._terms.cameras
-                return f"no {'picture of the camera' if is_camera else 'value of the stream'} {name} arrived"
+    def _missing(self, names: Iterable[str], what: str) -> str:
+        """Which camera or stream of these has given nothing at all; "": none."""
+        for name in names:
+            feed = self._set._feeds[name]
+            if not feed.count and feed.failure is None and not feed.defect:
+                return f"no {what} {name} arrived"
         return ""
 
     def _stalled(self) -> str:
