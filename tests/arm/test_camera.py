@@ -123,7 +123,11 @@ def test_a_late_picture_belongs_to_the_state_of_its_moment(peer: Peer) -> None:
     ("given", "words"),
     [
         (lambda: (False, None), "gives no picture: the camera reports that there is none"),
-        (lambda: np.zeros((4, 6)), "a picture must be an array of bytes"),
+        (
+            lambda: np.zeros((4, 6)),
+            r"a picture must be an array of uint8 of shape .* got an array of float64 of shape \(4, 6\)",
+        ),
+        (lambda: np.zeros((4, 6, 4), np.uint8), r"got an array of uint8 of shape \(4, 6, 4\)"),
         (lambda: 1 / 0, "gives no picture: ZeroDivisionError"),
     ],
 )

@@ -107,6 +107,8 @@ def test_the_episodes_of_a_folder_are_chosen_on_the_page(tmp_path: Path) -> None
         player.step(0.05)
         assert "episode-00000.mcap must be a recording" in player.about.content
         assert player.episode.value == "episode-00001", "what was shown stays"
+    with played(tmp_path) as player:  # the first one cannot be read: the next one is shown
+        assert player.episode is not None and player.episode.value == "episode-00001"
     with pytest.raises(ha.CommandRejected, match="has no episodes"):
         (tmp_path / "empty").mkdir()
         open_player(tmp_path / "empty", PanelOptions(port=0))

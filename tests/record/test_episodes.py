@@ -184,7 +184,7 @@ def test_the_commands_list_episodes_and_make_a_data_set(
     ]
     assert command.convert(folder, tmp_path / "data", to="lerobot", rate=40.0) == 0
     printed = capsys.readouterr().out
-    assert printed.startswith("1 episodes, ") and printed.rstrip().endswith(f"in {tmp_path / 'data'}")
+    assert printed.startswith("1 episode, ") and printed.rstrip().endswith(f"in {tmp_path / 'data'}")
     assert json.loads((tmp_path / "data/meta/info.json").read_text())["fps"] == 40
     assert command.convert(folder, tmp_path / "data", to="lerobot", label=("failure",), overwrite=True) == 0
     with pytest.raises(CommandRejected, match="there must be episodes with steps, got none"):

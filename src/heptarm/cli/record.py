@@ -25,6 +25,7 @@ from heptarm.values.camera import Camera
 from heptarm.values.checks import within
 from heptarm.values.files import refuse_existing
 from heptarm.values.state import GROUP_NAMES
+from heptarm.values.text import counted
 from heptarm.viewers.live import LiveView
 from heptarm.viewers.recorded import save_rerun
 
@@ -283,9 +284,14 @@ def _made(found: Demonstrations, where: Path, *, as_json: bool) -> int:
     """Report the data set that was made of episodes."""
     steps = sum(map(len, found))
     if as_json:
-        emit({"out": str(where), "episodes": len(found), "steps": steps})
+        unreadable = [str(path) for path in found.unreadable]
+        emit({"out": str(where), "episodes": len(found), "steps": steps, "unreadable": unreadable})
     else:
-        print(f"{len(found)} episodes, {steps} steps in {where}")
+        print(f"{counted(len(found), 'episode')}, {counted(steps, 'step')} in {where}")
+        if found.unreadable:
+            print(
+                f"left out, as not readable: {counted(len(found.unreadable), 'file')}; the warnings name them"
+            )
     return 0
 
 

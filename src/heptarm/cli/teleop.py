@@ -28,6 +28,7 @@ from heptarm.skills.teleoperation import teleoperate
 from heptarm.values.camera import Camera
 from heptarm.values.checks import integer, within
 from heptarm.values.io import GripperWiring
+from heptarm.values.text import counted
 from heptarm.values.workspace import Workspace
 
 _ACCESS = Access()
@@ -185,7 +186,7 @@ def teleop(
             if found is not None:
                 print(found)
         if record is not None:
-            print(f"{len(stats)} episodes in {record}")
+            print(f"{counted(len(stats), 'episode')} in {record}")
     return 0
 
 

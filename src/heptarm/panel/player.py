@@ -43,12 +43,28 @@ def open_player(file: Path, options: PanelOptions) -> Player:
                 value=str(file),
                 hint="arm.episodes(folder) and heptarm teleop --record record some",
             )
-        return Player(load(episodes[0]), options, episodes=episodes)
+        return Player(_first(episodes), options, episodes=episodes)
     try:
         recorded = load(file, arm="recorded")
     except CommandRejected:
         return Player(load(file), options)
     return Player(recorded, options, ghost=load(file, arm="simulated"))
+
+
+def _first(files: Sequence[Path]) -> Recording:
+    """The first of the files that can be read.
+
+    Raises:
+        CommandRejected: there is none; the text is that of the first one.
+    """
+    failure: CommandRejected | None = None
+    for path in files:
+        try:
+            return load(path)
+        except CommandRejected as error:
+            failure = failure or error
+    assert failure is not None
+    raise failure
 
 
 class Player:
@@ -58,7 +74,7 @@ class Player:
         recording: what is played.
         options: of the panel; those that concern control do not matter.
         ghost: another recording over the same time line, drawn translucent; None: none.
-        episodes: files among which the page chooses; the recording is the first one's. None: there are no others.
+        episodes: files among which the page chooses; the recording is one of them. None: there are no others.
 
     Attributes:
         url: with the token, to print once.
@@ -97,7 +113,11 @@ class Player:
         self._ended = threading.Event()
         self._episodes = {path.stem: path for path in episodes}
         #: Which episode is shown; None: there are no others.
-        self.episode = server.gui.add_dropdown("episode", tuple(self._episodes)) if self._episodes else None
+        self.episode = (
+            server.gui.add_dropdown("episode", tuple(self._episodes), initial_value=recording.path.stem)
+            if self._episodes
+            else None
+        )
         self._played = "" if self.episode is None else str(self.episode.value)
         self._refusal = ""  # of the episode that was chosen last
         begin = float(self._t[0])

@@ -6,6 +6,7 @@ dropped. The first step is the one at which everything has arrived once.
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,15 +30,19 @@ from heptarm.record.episodes import (
     episode_files,
     label_filter,
 )
-from heptarm.record.pictures import decoded
+from heptarm.record.pictures import decoded, size_of
 from heptarm.record.recording import Recording, load
 from heptarm.values.checks import Array, frozen, instance, within
 from heptarm.values.files import path_of
 from heptarm.values.sealed import Sealed
-from heptarm.values.text import lines
+from heptarm.values.text import counted, lines
+
+_log = logging.getLogger("heptarm.record")
 
 #: Signals of the states that steps have, with their numbers.
 SIGNALS = {"q": 7, "dq": 7, "tau_ext": 7, "pose": 7, "wrench": 6}
+#: Files that are named where they could not be read; the warnings name all.
+_NAMED = 5
 #: A sample at the end of a step still belongs to it [s].
 _ROUNDING = 1e-6
 
@@ -87,6 +92,13 @@ class Demonstration:
         if name in self.signals:
             return self.signals[name]
         known = ", ".join(self.signals)
+        if not len(self):
+            raise CommandRejected(
+                f"{self.path.name} has no steps, and must have some for {name!r}; it has {known}",
+                parameter="name",
+                value=name,
+                hint="leave out episodes without steps: if len(episode)",
+            )
         raise CommandRejected(f"name must be one of {known}, got {name!r}", parameter="name", value=name)
 
     @property
@@ -100,13 +112,13 @@ class Demonstration:
         fixes = f", {int(self.corrected.sum())} corrected" if self.corrected.any() else ""
         why = f" ({self.reason})" if self.reason else ""
         return (
-            f"{self.path.name}  {self.label}{why}  {self.duration:.1f} s, {len(self)} steps"
+            f"{self.path.name}  {self.label}{why}  {self.duration:.1f} s, {counted(len(self), 'step')}"
             f"{f', dropped: {drops}' if drops else ''}{fixes}  {self.task}"
         )
 
     def __repr__(self) -> str:
         """Short form."""
-        return f"<Demonstration {self.path.name}, {self.label}, {len(self)} steps>"
+        return f"<Demonstration {self.path.name}, {self.label}, {counted(len(self), 'step')}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +143,17 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
 
     Attributes:
         folder: where they are.
+        unreadable: files of the folder that could not be read, and were left out.
     """
 
     folder: Final[Path]
+    unreadable: Final[tuple[Path, ...]]
 
-    def __init__(self, folder: Path, episodes: Iterable[Demonstration]) -> None:
+    def __init__(
+        self, folder: Path, episodes: Iterable[Demonstration], *, unreadable: Iterable[Path] = ()
+    ) -> None:
         self.folder, self._episodes = folder, tuple(episodes)
+        self.unreadable = tuple(unreadable)
 
     def __len__(self) -> int:
         """Number of episodes."""
@@ -149,7 +166,7 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
     def __getitem__(self, index: int | slice) -> Demonstration | Demonstrations:
         """An episode by its place, or several."""
         if isinstance(index, slice):
-            return Demonstrations(self.folder, self._episodes[index])
+            return Demonstrations(self.folder, self._episodes[index], unreadable=self.unreadable)
         return self._episodes[index]
 
     @property
@@ -157,6 +174,13 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
         """Number of episodes by label."""
         counts = Counter(episode.label for episode in self._episodes)
         return {label: counts[label] for label in LABELS if counts[label]}
+
+    @property
+    def _left_out(self) -> str:
+        """How many files could not be read, and the first of them; "": none."""
+        names = [path.name for path in self.unreadable]
+        more = ", ..." if len(names) > _NAMED else ""
+        return f"{counted(len(names), 'file')}: {', '.join(names[:_NAMED])}{more}" if names else ""
 
     def statistics(self) -> dict[str, SignalStatistics]:
         """Least, largest, mean and standard deviation of each signal, stream and the action, by name.
@@ -195,13 +219,14 @@ class Demonstrations(Sealed, Sequence[Demonstration]):
             "steps": str(steps),
             "dropped": ", ".join(f"{name} {count}" for name, count in dropped.items() if count),
             "corrected": str(sum(int(episode.corrected.sum()) for episode in self._episodes) or ""),
+            "unreadable": self._left_out,
             "tasks": "; ".join(dict.fromkeys(episode.task for episode in self._episodes if episode.task)),
         }
-        return lines(f"{len(self)} episodes in {self.folder}", rows)
+        return lines(f"{counted(len(self), 'episode')} in {self.folder}", rows)
 
     def __repr__(self) -> str:
         """Short form."""
-        return f"<Demonstrations {self.folder}, {len(self)} episodes>"
+        return f"<Demonstrations {self.folder}, {counted(len(self), 'episode')}>"
 
 
 def load_episodes(
@@ -209,13 +234,15 @@ def load_episodes(
 ) -> Demonstrations:
     """Read the episodes that `Arm.episodes` has recorded to a folder.
 
+    A file that cannot be read is left out with a warning that names it, and is in `Demonstrations.unreadable`.
+
     Args:
         folder: of the files.
         labels: which ones: "success", "failure", "unlabelled", "unfinished".
         rate: steps per second [Hz]; None: that with which each was recorded.
 
     Raises:
-        CommandRejected: there is no such folder, it has no episodes, a file cannot be read; or no such label.
+        CommandRejected: there is no such folder, it has no episodes, or none that can be read; or no such label.
         LimitError: a rate outside its range.
         MissingExtra: the package mcap is not installed.
     """
@@ -229,8 +256,28 @@ def load_episodes(
             value=str(where),
             hint="arm.episodes(folder) records them as episode-00000.mcap and so on",
         )
-    found = (in_steps(load(path), rate=steps) for _, path in files)
-    return Demonstrations(where, (episode for episode in found if episode.label in chosen))
+    found: list[Demonstration] = []
+    failures: dict[Path, ValueError] = {}
+    for _, path in files:
+        try:
+            found.append(in_steps(load(path), rate=steps))
+        except ValueError as error:  # of this file alone, CommandRejected above all: the others are read
+            failures[path] = error
+    if not found:
+        path, first = next(iter(failures.items()))
+        if len(failures) == 1 and isinstance(first, CommandRejected):
+            raise first
+        raise CommandRejected(
+            f"{where} must have episodes that can be read, got none among {counted(len(failures), 'file')}; "
+            f"{path.name}: {first}",
+            parameter="folder",
+            value=str(where),
+            hint="record them again, or choose another folder",
+        ) from first
+    for path, failure in failures.items():
+        _log.warning("%s cannot be read and is left out: %s", path.name, failure)
+    chosen_ones = (episode for episode in found if episode.label in chosen)
+    return Demonstrations(where, chosen_ones, unreadable=failures)
 
 
 def in_steps(recording: Recording, *, rate: float | None = None) -> Demonstration:
@@ -268,6 +315,8 @@ def in_steps(recording: Recording, *, rate: float | None = None) -> Demonstratio
         for name, size in SIGNALS.items()
         if name in run and run[name].shape[1:] == (size,) and np.isfinite(run[name][rows]).any()
     }
+    if not len(grid):  # of those, everything of the states is empty
+        signals = {name: frozen(np.zeros((0, size))) for name, size in SIGNALS.items()}
     for name, stream in run.streams.items():
         if name != ACTION:
             signals[name] = frozen(stream.values[places[name][0]] if len(grid) else stream.values[:0])
@@ -302,7 +351,8 @@ def of_one_kind(episodes: Iterable[Demonstration]) -> list[Demonstration]:
     """The episodes that have steps, for a data set.
 
     Raises:
-        CommandRejected: there are none, or they differ in signals, streams, cameras, actions or rate.
+        CommandRejected: there are none, or they differ in signals, streams, cameras, actions or rate; or a camera has
+            pictures of several sizes.
     """
     used = [episode for episode in episodes if len(episode)]
     if not used:
@@ -311,6 +361,8 @@ def of_one_kind(episodes: Iterable[Demonstration]) -> list[Demonstration]:
             parameter="episodes",
             hint="choose other labels, or record some with arm.episodes(...)",
         )
+    for episode in used:
+        _check_pictures(episode)
     first, kind = used[0], _kind(used[0])
     for episode in used[1:]:
         other = _kind(episode)
@@ -324,6 +376,25 @@ def of_one_kind(episodes: Iterable[Demonstration]) -> list[Demonstration]:
                 hint="delete the episode, or convert a folder for each kind",
             )
     return used
+
+
+def _check_pictures(episode: Demonstration) -> None:
+    """Refuse an episode in which a camera has changed the size of its pictures.
+
+    Raises:
+        CommandRejected: one has.
+    """
+    for name, files in episode.views.items():
+        sizes = dict.fromkeys(size_of(file) for file in dict.fromkeys(files))
+        if len(sizes) > 1:
+            found = " and ".join(f"{width} x {height}" for width, height in sizes)
+            raise CommandRejected(
+                f"the camera {name} must have pictures of one size in an episode, "
+                f"got {found} pixels (width x height) in {episode.path.name}",
+                parameter="episodes",
+                value=str(episode.path),
+                hint="delete the episode, or leave it out",
+            )
 
 
 def _kind(episode: Demonstration) -> dict[str, object]:

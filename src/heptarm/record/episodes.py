@@ -30,6 +30,7 @@ from heptarm.values.checks import finite_entries, instance, integer, numbers, sh
 from heptarm.values.files import unwritable
 from heptarm.values.frames import check_printable
 from heptarm.values.sealed import Sealed
+from heptarm.values.text import counted, printable
 
 _log = logging.getLogger("heptarm.record")
 
@@ -38,6 +39,7 @@ Label: TypeAlias = Literal["success", "failure", "unlabelled", "unfinished"]
 LABELS: tuple[Label, ...] = ("success", "failure", "unlabelled", "unfinished")
 #: What is recorded of a sensor: a function that returns numbers, or None where there is nothing new.
 NumberSource: TypeAlias = Callable[[], Any]
+_Shape: TypeAlias = tuple[int, ...]
 #: Name of the stream of what the program commands; see `Episode.act`.
 ACTION = "action"
 #: Facts at the beginning of an episode's file, and at its end.
@@ -93,18 +95,34 @@ class _Feed:
         self._begin: int | None = None
         self._last = 0
         self.longest = 0.0
+        self.count = 0
         self.failure: Exception | None = None
+        self.defect = ""
+        self._shape: _Shape | None = None
+        self._shape_before: _Shape | None = None
 
     def begin(self) -> None:
         """Begin an episode: what arrived before is not its."""
         self._arrived.clear()
+        self._shape_before = self._shape
+        self.defect = ""
+        self.longest, self.count = 0.0, 0
         self._begin = self._last = self._clock()
-        self.longest = 0.0
 
     def end(self) -> None:
         """End the episode."""
         self.look()
         self._begin = None
+
+    def forget(self) -> None:
+        """Have a shape that came with this episode bind no other one."""
+        self._shape = self._shape_before
+
+    def misfit(self, shape: _Shape) -> _Shape | None:
+        """The shape of what came before, if it is another one; None: this one fits."""
+        if self._shape is None:
+            self._shape = shape
+        return None if shape == self._shape else self._shape
 
     def look(self) -> float:
         """The longest silence of this episode so far [s]."""
@@ -118,7 +136,26 @@ class _Feed:
             now = self._clock()
             self.longest = max(self.longest, (now - self._last) * 1e-9)
             self._last = now
+            self.count += 1
             self._arrived.append((at, content))
+
+    def add_if_fit(
+        self, at: int, content: Any, shape: _Shape, reason: Callable[[_Shape, _Shape], str]
+    ) -> None:
+        """Take what a thread of ours has read; in an episode another shape than before is a defect.
+
+        Args:
+            at: time of our clock [ns].
+            content: what is written.
+            shape: its shape.
+            reason: makes words of the shape before and this one.
+        """
+        if self._begin is None or at < self._begin:
+            return
+        if (before := self.misfit(shape)) is None:
+            self.add(at, content)
+        elif not self.defect:
+            self.defect = f"{self.name} {reason(before, shape)}"
 
     def write(self, file: RecordingFile) -> None:
         """Write what has arrived."""
@@ -143,7 +180,7 @@ class _Watcher:
             except Exception as error:  # of a function that is yours; the episode reports it
                 if not self._ending.is_set():
                     self._feed.failure = error
-                    _log.warning("%s gives nothing any more: %s", self._feed.name, error)
+                    _log.warning("%s gives nothing any more: %s", self._feed.name, _line(str(error)))
                 return
 
     def close(self) -> None:
@@ -234,6 +271,20 @@ def _text(value: str, name: str) -> str:
     return text
 
 
+def _line(text: str) -> str:
+    """Any text as a reason: one line of printable characters, not too long."""
+    return printable(" ".join(text.split()))[:_LONGEST]
+
+
+def _other_count(before: _Shape, now: _Shape) -> str:
+    return f"must have {counted(before[0], 'number')} as before, got {now[0]}"
+
+
+def _other_size(before: _Shape, now: _Shape) -> str:
+    first, then = (" x ".join(map(str, shape)) for shape in (before, now))
+    return f"must have pictures of {first} pixels as before (height x width), got {then}"
+
+
 class EpisodeSet(Sealed):
     """Episodes of one task, each in a file of its own in a folder; made by `Arm.episodes`, used in a `with` block.
 
@@ -312,7 +363,7 @@ class EpisodeSet(Sealed):
 
         Raises:
             CommandRejected: there is no such stream, or it has a function.
-            ShapeError: no numbers.
+            ShapeError: no numbers, or not as many as before in this set.
         """
         if self._terms.streams.get(name, name) is not None:
             known = ", ".join(key for key, source in self._terms.streams.items() if source is None) or "none"
@@ -322,11 +373,30 @@ class EpisodeSet(Sealed):
                 value=name,
                 hint="name the stream in arm.episodes(..., streams={name: None})",
             )
-        self._feeds[name].add(self._source.nanos(), row_of(values, "values"))
+        self._feed(name, row_of(values, "values"))
+
+    def _feed(self, name: str, row: list[float]) -> None:
+        """Add numbers that the program gives.
+
+        Raises:
+            ShapeError: not as many as before.
+        """
+        feed = self._feeds.get(name)
+        if feed is None:  # the set is not open
+            return
+        if (before := feed.misfit((len(row),))) is not None:
+            what = "action" if name == ACTION else f"the stream {name}"
+            raise ShapeError(
+                f"{what} must have {counted(before[0], 'number')} as before in this set, got {len(row)}",
+                parameter=name,
+                value=row,
+                hint="give as many each time; for another number of them begin another folder",
+            )
+        feed.add(self._source.nanos(), row)
 
     def __repr__(self) -> str:
         """Short form."""
-        return f"<EpisodeSet {self.folder}, {self.count} episodes>"
+        return f"<EpisodeSet {self.folder}, {counted(self.count, 'episode')}>"
 
 
 def row_of(values: npt.ArrayLike, name: str) -> list[float]:
@@ -363,7 +433,8 @@ def _number_reader(feed: _Feed, source: NumberSource, clock: Callable[[], int]) 
     def read() -> None:
         given = source()
         if given is not None:
-            feed.add(clock(), row_of(given, feed.name))
+            row = row_of(given, feed.name)
+            feed.add_if_fit(clock(), row, (len(row),), _other_count)
 
     return read
 
@@ -371,7 +442,7 @@ def _number_reader(feed: _Feed, source: NumberSource, clock: Callable[[], int]) 
 def _picture_reader(feed: _Feed, stream: PictureStream, to_ours: Callable[[int], int]) -> Callable[[], None]:
     def read() -> None:
         picture = stream.read(timeout=1e6)
-        feed.add(to_ours(picture.stamp), picture.pixels)
+        feed.add_if_fit(to_ours(picture.stamp), picture.pixels, picture.pixels.shape, _other_size)
 
     return read
 
@@ -379,7 +450,8 @@ def _picture_reader(feed: _Feed, stream: PictureStream, to_ours: Callable[[int],
 class Episode(Sealed):
     """One episode; made by `EpisodeSet.episode`, recorded while its `with` block runs.
 
-    An error that ends the block labels it a failure, with the error as the reason.
+    An error that ends the block labels it a failure, with the error as the reason. So do a camera or a stream that
+    gives nothing, or that changes its size. Without any label it is "unlabelled".
 
     Attributes:
         task: what is done, in words.
@@ -392,7 +464,7 @@ class Episode(Sealed):
         self._path = owner.folder
         self._label: Label = "unlabelled"
         self._reason = ""
-        self._is_discarded = False
+        self._is_discarded = self._is_over = False
         self._recorder: Recorder | None = None
 
     def __enter__(self) -> Episode:
@@ -421,7 +493,12 @@ class Episode(Sealed):
         )
         for feed in owner._feeds.values():
             feed.begin()
-        self._recorder.start()
+        try:
+            self._recorder.start()
+        except BaseException:
+            for feed in owner._feeds.values():  # otherwise they would keep what arrives
+                feed.end()
+            raise
         owner._running = self
         return self
 
@@ -431,25 +508,25 @@ class Episode(Sealed):
         """End the file with its label.
 
         Raises:
-            StaleState: a camera or a stream has stalled, or failed; the episode is a failure.
+            StaleState: a camera or a stream has stalled or failed, gave nothing, or changed its size; the episode is a
+                failure.
         """
-        owner, recorder = self._set, self._recorder
+        recorder = self._recorder
         assert recorder is not None
-        stalled = self._stalled()
-        for feed in owner._feeds.values():
-            feed.end()
-        owner._running = None
-        if error is not None and self._label != "failure":
-            self.fail(" ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST])
-        elif stalled:
-            self.fail(stalled)
-        recorder.conclude({LABEL: self._label, REASON: self._reason})
         try:
-            recorder.close()
-        except HeptarmError as failure:
-            if error is None:
-                raise
-            _log.warning("%s", failure)
+            terms = self._set._terms
+            stalled = (
+                self._missing(terms.streams, "value of the stream")
+                or self._stalled()
+                or self._missing(terms.cameras, "picture of the camera")
+            )
+            if error is not None and self._label != "failure":
+                self.fail(_line(f"{type(error).__name__}: {error}"))
+            elif stalled:
+                self.fail(stalled)
+            recorder.conclude({LABEL: self._label, REASON: self._reason})
+        finally:  # whatever goes wrong, the file does not grow on
+            self._close(recorder, is_failing=error is not None)
         if self._is_discarded:
             self._path.unlink(missing_ok=True)
         elif stalled and error is None:
@@ -458,13 +535,41 @@ class Episode(Sealed):
                 hint="look after the camera or sensor, and record the episode again",
             )
 
+    def _close(self, recorder: Recorder, *, is_failing: bool) -> None:
+        """End recording and feeds.
+
+        Raises:
+            HeptarmError: the file could not be written to its end, and the block ends without another error.
+        """
+        self._is_over, self._set._running = True, None
+        for feed in self._set._feeds.values():
+            feed.end()
+            if self._is_discarded or feed.defect:
+                feed.forget()
+        try:
+            recorder.close()
+        except HeptarmError as failure:
+            if not is_failing:
+                raise
+            _log.warning("%s", failure)
+
+    def _missing(self, names: Iterable[str], what: str) -> str:
+        """Which camera or stream of these has given nothing at all; "": none."""
+        for name in names:
+            feed = self._set._feeds[name]
+            if not feed.count and feed.failure is None and not feed.defect:
+                return f"no {what} {name} arrived"
+        return ""
+
     def _stalled(self) -> str:
-        """Which camera or stream has given nothing for long; "": none."""
+        """Which camera or stream has given nothing for long, or what does not fit; "": none."""
         for name, feed in self._set._feeds.items():
             if name == ACTION:
                 continue
             if feed.failure is not None:
-                return f"{name} failed: {feed.failure}"[:_LONGEST]
+                return _line(f"{name} failed: {feed.failure}")
+            if feed.defect:
+                return feed.defect
             if feed.look() > STALL:
                 return f"{name} gave nothing for {feed.longest:.1f} s"
         return ""
@@ -494,31 +599,64 @@ class Episode(Sealed):
         Without it the actions of an episode are the joints' set-points of the next step.
 
         Raises:
-            ShapeError: no numbers.
+            ShapeError: no numbers, or not as many as before in this set.
             LimitError: one is not finite.
+            CommandRejected: the episode has ended.
         """
-        feed = self._set._feeds.get(ACTION)
-        row = row_of(action, "action")
-        if feed is not None:
-            feed.add(self._set._source.nanos(), row)
+        self._check_going("act")
+        self._set._feed(ACTION, row_of(action, "action"))
 
     def note(self, text: str) -> None:
-        """Put a mark on the time line; see `Recorder.note`."""
+        """Put a mark on the time line; see `Recorder.note`.
+
+        Raises:
+            CommandRejected: the episode has ended.
+        """
+        self._check_going("note")
         if self._recorder is None:
             raise LocalProtocolError("the episode has not begun", hint="use it in a with block")
         self._recorder.note(text)
 
     def succeed(self, reason: str = "") -> None:
-        """Label it a success."""
+        """Label it a success; of several labels in its block the last one counts.
+
+        Raises:
+            CommandRejected: the episode has ended.
+        """
+        self._check_going("succeed")
         self._reason, self._label = _text(reason, "reason"), "success"
 
     def fail(self, reason: str = "") -> None:
-        """Label it a failure, for a reason in words."""
+        """Label it a failure, for a reason in words; of several labels in its block the last one counts.
+
+        Raises:
+            CommandRejected: the episode has ended.
+        """
+        self._check_going("fail")
         self._reason, self._label = _text(reason, "reason"), "failure"
 
     def discard(self) -> None:
-        """Delete it at the end of the block."""
+        """Delete it at the end of the block.
+
+        Raises:
+            CommandRejected: the episode has ended.
+        """
+        self._check_going("discard")
         self._is_discarded = True
+
+    def _check_going(self, name: str) -> None:
+        """Refuse a call after the block, which would change nothing in the file.
+
+        Raises:
+            CommandRejected: the episode has ended.
+        """
+        if self._is_over:
+            raise CommandRejected(
+                f"the episode has ended, its file {self._path.name} is closed: {name} must be called in its block",
+                parameter="episode",
+                value=str(self._path),
+                hint=f"call episode.{name} within the with block; to remove an episode delete its file",
+            )
 
     def __repr__(self) -> str:
         """Short form."""

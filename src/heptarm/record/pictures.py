@@ -26,6 +26,17 @@ def decoded(file: bytes) -> npt.NDArray[np.uint8]:
         return np.asarray(opened.convert("RGB"))
 
 
+def size_of(file: bytes) -> tuple[int, int]:
+    """Width and height of the picture of a JPEG file, which is not decoded.
+
+    Raises:
+        MissingExtra: the package Pillow is not installed.
+    """
+    image = require("PIL.Image", extra="record")
+    with image.open(io.BytesIO(file)) as opened:
+        return int(opened.width), int(opened.height)
+
+
 @dataclass(frozen=True, eq=False)
 class Pictures:
     """Pictures of a simulated camera, in order; `heptarm.load(...).pictures`.

@@ -404,12 +404,14 @@ class Recorder(Sealed):
         if self._is_closed or self._file is None:
             return
         self._is_closed = True
-        for restore in self._restore:
-            try:
-                restore()
-            except HeptarmError as error:
-                _log.info("the rate of the states stays as it was for the recording: %s", error)
-        self._ended.set()
+        try:
+            for restore in self._restore:
+                try:
+                    restore()
+                except HeptarmError as error:
+                    _log.info("the rate of the states stays as it was for the recording: %s", error)
+        finally:
+            self._ended.set()
         self._thread.join()
         if self._failure is not None:
             raise HeptarmError(

@@ -315,7 +315,7 @@ def _recording(path: Path, content: _Content) -> Recording:
             content.pictures, line, dropped=int((content.end or {}).get("pictures_dropped", 0))
         ),
         views={name: _pictures(found, line) for name, found in content.views.items()},
-        streams={name: _numbers(found, line) for name, found in content.streams.items()},
+        streams={name: _numbers(name, found, line) for name, found in content.streams.items()},
         outcome=content.end or {},
     )
 
@@ -325,9 +325,14 @@ def _pictures(found: Sequence[tuple[int, bytes]], line: _TimeLine, *, dropped: i
     return Pictures(times, tuple(data for _, data in found), dropped)
 
 
-def _numbers(found: Sequence[tuple[int, bytes]], line: _TimeLine) -> RecordedNumbers:
-    values = np.array([json.loads(data)["values"] for _, data in found], dtype=np.float64)
-    return RecordedNumbers(line([at for at, _ in found]), values)
+def _numbers(name: str, found: Sequence[tuple[int, bytes]], line: _TimeLine) -> RecordedNumbers:
+    rows = [json.loads(data)["values"] for _, data in found]
+    sizes = dict.fromkeys(map(len, rows))
+    if len(sizes) > 1:
+        raise ValueError(
+            f"the stream {name} must have as many numbers each time, got {' and '.join(map(str, sizes))}"
+        )
+    return RecordedNumbers(line([at for at, _ in found]), np.array(rows, dtype=np.float64))
 
 
 def _events(entries: Sequence[tuple[int, str, bytes]], line: _TimeLine) -> Iterator[RecordedEvent]:

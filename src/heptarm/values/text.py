@@ -80,6 +80,11 @@ def listing(values: Iterable[float], unit: str = "") -> str:
     return f"{texts[0] if len(set(texts)) == 1 else ' '.join(texts)} {unit}".rstrip()
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things whose plural ends with s: "1 episode", "2 episodes"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def lines(title: str, rows: Mapping[str, str]) -> Listing:
     """A title and aligned rows below it; empty ones are left out."""
     shown = {name: text for name, text in rows.items() if text}

@@ -207,7 +207,7 @@ class CalledSource:
                 self._failure = CommandRejected(
                     f"the function of the camera gives no picture: {text}",
                     parameter="source",
-                    hint="it returns an array of bytes, or True and the array as cv2.VideoCapture.read does",
+                    hint="it returns an array of uint8, or True and the array as cv2.VideoCapture.read does",
                 )
                 return
             moment = self._clock.nanos() - self._latency
@@ -247,9 +247,11 @@ def _pixels(given: object) -> npt.NDArray[np.uint8]:
             raise ShapeError("the camera reports that there is none")
         given = given[1]
     found = given if isinstance(given, np.ndarray) else None
-    if found is None or found.dtype != np.uint8 or found.ndim not in (2, 3) or not found.size:
+    is_flat = found is not None and (found.ndim == 2 or (found.ndim == 3 and found.shape[2] == 3))
+    if found is None or found.dtype != np.uint8 or not is_flat or not found.size:
+        got = shown(given) if found is None else f"an array of {found.dtype} of shape {found.shape}"
         raise ShapeError(
-            f"a picture must be an array of bytes, height by width or with 3 colours, got {shown(given)}"
+            f"a picture must be an array of uint8 of shape (height, width, 3) or (height, width), got {got}"
         )
     return found
 
