@@ -113,7 +113,7 @@ def test_the_command_refuses_what_contradicts_itself(tmp_path: Path) -> None:
             ["peginhole"],
             "policy must be a file, or a task whose policy is part of heptarm, reach, peg-in-hole",
         ),
-        (["push"], "heptarm rl train push"),
+        (["polish"], "heptarm rl train polish"),
     ):
         done = refused("rl", "eval", *words)
         assert done.returncode == 1 and why in done.stderr and "Traceback" not in done.stderr
