@@ -61,8 +61,9 @@ def test_an_application_of_the_shape_of_the_sdk(
         return driven(program, version, command, str(CYCLES))
 
     def late(said: str | Exception) -> str:
-        # a machine that answers too late ends the session: the client has counted fewer cycles
-        return "answers came late" if isinstance(said, str) and f"in {CYCLES} cycles" not in said else ""
+        # a machine that answers too late ends the session: the client has counted fewer cycles, or lost messages
+        is_whole = isinstance(said, str) and f"in {CYCLES} cycles" in said and " 0 lost" in said
+        return "" if isinstance(said, Exception) or is_whole else "answers came late"
 
     said = retry(drive, late)
     for before in range(4):
@@ -71,7 +72,7 @@ def test_an_application_of_the_shape_of_the_sdk(
     assert found is not None, said
     moved, cycles, monitored, waited = map(float, found.groups())
     assert cycles == CYCLES and monitored > 0 and waited > 0
-    assert moved > 0.035 if command == "torque" else abs(moved - 0.04) < 2e-3
+    assert moved > 0.035 if command == "torque" else abs(moved - 0.04) < 4e-3, said
     assert "0 malformed" in said
 
 

@@ -30,7 +30,7 @@ from heptarm.values.robot import robot
 from tests.cli.running import refused, run
 from tests.retry import retry
 
-FAST = "sim://iiwa14?speed=2"
+ARM = "sim://iiwa14"
 POINT = (0.55, 0.1, 0.4)
 
 
@@ -61,7 +61,7 @@ def tried(arm: ha.Arm, *arguments: Any, within: float = np.inf, **named: Any) ->
 
 @pytest.fixture(scope="module")
 def reached() -> EpisodeReport:
-    with ha.connect(FAST, watchdog=5.0) as arm:
+    with ha.connect(ARM, watchdog=5.0) as arm:
         # beside other tests a machine may be held up for longer than is allowed on an arm
         settings = DeploySettings(guard=PolicyGuard(stale=2.0), homing=0.6)
         return tried(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], within=0.02, settings=settings)
@@ -74,14 +74,14 @@ def test_the_shipped_policy_reaches_its_targets(reached: EpisodeReport) -> None:
 
 
 def test_the_one_with_the_feature_does_so_gently_and_late() -> None:
-    with ha.connect(FAST, watchdog=5.0) as arm:
+    with ha.connect(ARM, watchdog=5.0) as arm:
         settings = DeploySettings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
         report = tried(arm, shipped(feature=True), [POINT], within=0.012, settings=settings)
     assert report.success_rate == 1.0 and report.mean < 0.012
 
 
 def test_a_moving_target_is_followed() -> None:
-    with ha.connect(FAST, watchdog=5.0) as arm:
+    with ha.connect(ARM, watchdog=5.0) as arm:
         moving = circle((0.6, 0.0, 0.4), 0.1, period=8.0)
         report = tried(arm, shipped(feature=True), [moving])
     assert report.distances[0, 60:].max() < 0.08
@@ -94,7 +94,7 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
         pytest.raises(ha.LimitError, match="trained for the LBR iiwa 14"),
     ):
         deploy(arm, shipped(feature=True), [POINT])
-    with ha.connect(FAST, watchdog=5.0) as arm:
+    with ha.connect(ARM, watchdog=5.0) as arm:
         before = arm.state.q
         for bad in ([2.0, 0, 0.4], [np.nan, 0, 0.4], [0.5, 0.1]):
             with pytest.raises(ha.CommandRejected):
@@ -136,7 +136,7 @@ class Wild:
 
 def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
     guard = PolicyGuard(low=(0.3, -0.3, 0.3), high=(0.7, 0.3, 0.8))
-    with ha.connect(FAST, watchdog=5.0) as arm:
+    with ha.connect(ARM, watchdog=5.0) as arm:
         report = tried(arm, Wild(), [POINT, POINT], settings=DeploySettings(guard=guard, homing=0.6))
         arm.wait_for_rest()
     assert (report.paths > np.array(guard.low) - 0.03).all()
@@ -156,7 +156,7 @@ class Diverged:
 
 
 def test_a_policy_that_diverges_ends_at_rest_and_its_episode_is_marked(tmp_path: Path) -> None:
-    with ha.connect(FAST, watchdog=5.0) as arm, arm.record(tmp_path / "run.mcap"):
+    with ha.connect(ARM, watchdog=5.0) as arm, arm.record(tmp_path / "run.mcap"):
         with pytest.raises(
             ha.CommandRejected, match=r"episodes\[0\]: an action of the policy must be finite"
         ):
@@ -265,7 +265,7 @@ def test_the_speed_of_the_command_is_the_ceiling_of_the_arm(monkeypatch: pytest.
         arm.speed = before
         with pytest.raises(ha.NotReady, match="as far as here"):
             deploy_command(
-                Path("peg-in-hole"), speed=0.2, target=CommandTarget(text=f"{FAST}&scene=peg-in-hole")
+                Path("peg-in-hole"), speed=0.2, target=CommandTarget(text=f"{ARM}?scene=peg-in-hole")
             )
         assert arm.speed == after
 

@@ -80,18 +80,21 @@ def of(twist: list[float], *buttons: str) -> devices.DeviceInput:
 
 
 def test_the_arm_moves_while_the_dead_man_button_is_held_and_ends_by_the_quit_button(arm: ha.Arm) -> None:
-    y = arm.state.pose.y
+    y, speed = arm.state.pose.y, 0.1
+    looks: list[float] = []
 
     def decide(reading: int) -> devices.DeviceInput:
+        looks.append(time.monotonic())
         if reading < 20:
             assert abs(arm.state.pose.y - y) < 1e-3, "the stick alone moves nothing"
             return of(LEFT)
         return of(LEFT, "LB") if arm.state.pose.y < y + 0.03 else of(LEFT, "START", "LB")
 
-    stats = skills.teleoperate(arm, Person(decide), scale=0.1, watchdog=2.0, duration=60.0)
+    stats = skills.teleoperate(arm, Person(decide), scale=speed, watchdog=2.0, duration=60.0)
     moved = arm.wait_for_rest().pose
-    # a target that comes late is passed and come back to
-    assert 0.02 < moved.y - y < 0.06 and abs(moved.z - arm.state.pose.z) < 2e-3
+    # a target that comes late is passed and come back to, and the arm moves on while nobody looks
+    unseen = speed * float(np.diff(looks).max())
+    assert 0.02 < moved.y - y < 0.06 + unseen and abs(moved.z - arm.state.pose.z) < 2e-3
     assert stats.sent > 0 and stats.refused == 0
 
 
