@@ -276,10 +276,11 @@ def models_header() -> str:
                 for field in ("q_min", "q_max", "dq_max", "ddq_max", "dddq_max", "tau_max")
             ),
             chain_of(arm),
+            [arm.d_bs, arm.d_se, arm.d_ew, arm.d_wf],
             [float(value) for value in rigid_bodies(arm)],
         ]
         text = ",\n     ".join("{" + ", ".join(map(repr, row)) + "}" for row in rows)
-        lines.append(f'    {{"{name}",\n     {text}}},')
+        lines.append(f'    {{"{name}", "{arm.title}",\n     {text}}},')
     return "\n".join([*lines, MODELS_END])
 
 
@@ -293,11 +294,12 @@ namespace heptarm {
 
 /// Facts of a robot: for kinematics, and for the guards of FRI.
 struct RobotModel {
-    const char* name;
+    const char *name, *title;
     double q_min[7], q_max[7];  ///< [rad]
     double dq_max[7], ddq_max[7], dddq_max[7];  ///< [rad/s], [rad/s2], [rad/s3]
     double tau_max[7];  ///< [Nm]
     double chain[24];  ///< origin of each joint, flange [m]
+    double lengths[4];  ///< base to shoulder, shoulder to elbow, elbow to wrist, wrist to flange [m]
     double bodies[105];  ///< link data, `struct robot` of native/dynamics.h
 };
 

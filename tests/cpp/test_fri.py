@@ -72,7 +72,7 @@ def test_an_application_of_the_shape_of_the_sdk(
     assert found is not None, said
     moved, cycles, monitored, waited = map(float, found.groups())
     assert cycles == CYCLES and monitored > 0 and waited > 0
-    assert moved > 0.035 if command == "torque" else abs(moved - 0.04) < 4e-3, said
+    assert moved > 0.035 if command == "torque" else abs(moved - 0.04) < 2e-3, said
     assert "0 malformed" in said
 
 

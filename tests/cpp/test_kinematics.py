@@ -111,7 +111,7 @@ def test_what_has_no_solution_is_refused_as_in_python(ask: Ask) -> None:
         (
             words("iiwa14", "solve", [2, 0, 0.5], [0, 0, 0, 1]),
             51,
-            "the iiwa14 reaches 0.020 to 0.820 m (bring",
+            "the LBR iiwa 14 R820 reaches 0.020 to 0.820 m (bring",
         ),
         (words("iiwa14", "solve", *here, "e1", [3.1]), 51, "E1 is the angle of A3, which must be in"),
         (words("iiwa14", "solve", *here, "status", [8]), 2, "status must be 0 to 7, got 8"),

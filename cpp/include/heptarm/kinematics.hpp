@@ -40,8 +40,8 @@ public:
 
     /// Args: the robot, "iiwa7", "iiwa14", "med7" or "med14"; throws std::invalid_argument for another name.
     explicit Kinematics(const std::string& model) : model_(&robot_model(model)) {
-        const double* z = model_->chain + 2;  // heights of the joints, each in the link before it
-        arm_.d_bs = z[0] + z[3], arm_.d_se = z[6] + z[9], arm_.d_ew = z[12] + z[15], arm_.d_wf = z[18] + z[21];
+        const double* d = model_->lengths;
+        arm_.d_bs = d[0], arm_.d_se = d[1], arm_.d_ew = d[2], arm_.d_wf = d[3];
         arm_.chain.origin[1][2] = arm_.d_bs, arm_.chain.origin[3][2] = arm_.d_se, arm_.chain.origin[5][2] = arm_.d_ew;
         arm_.chain.flange[2] = arm_.d_wf;
         std::copy_n(model_->q_min, 7, arm_.q_min);
@@ -171,7 +171,7 @@ private:
         for (int i = 0; i < 3; i++) wrist[i] = goal[std::size_t(4 * i + 3)] - arm_.d_wf * goal[std::size_t(4 * i + 2)];
         const double away = std::hypot(wrist[0], wrist[1], wrist[2] - arm_.d_bs);
         const std::string least = text(std::abs(arm_.d_se - arm_.d_ew)), most = text(arm_.d_se + arm_.d_ew);
-        LimitError error("the wrist would be " + text(away) + " m from the shoulder; the " + model_->name + " reaches " + least + " to " + most + " m",
+        LimitError error("the wrist would be " + text(away) + " m from the shoulder; the " + model_->title + " reaches " + least + " to " + most + " m",
                          int(Code::unreachable), "bring the target nearer, or change its orientation");
         error.parameter = "pose", error.value = text(away), error.allowed = "[" + least + ", " + most + "] m";
         return error;
@@ -180,7 +180,7 @@ private:
     LimitError no_posture(const SolveOptions& options) const {
         if (options.e1 && !(model_->q_min[2] <= *options.e1 && *options.e1 <= model_->q_max[2])) {
             const std::string range = "[" + text(model_->q_min[2], "%.4f") + ", " + text(model_->q_max[2], "%.4f") + "] rad";
-            LimitError error("E1 is the angle of A3, which must be in " + range + " on the " + model_->name + ", got " + text(*options.e1, "%.4f") + " rad",
+            LimitError error("E1 is the angle of A3, which must be in " + range + " on the " + model_->title + ", got " + text(*options.e1, "%.4f") + " rad",
                              int(Code::unreachable), "keep E1 inside the limits of A3, or leave it free");
             error.parameter = "e1", error.value = text(*options.e1, "%.4f"), error.allowed = range;
             return error;
