@@ -84,7 +84,7 @@ call(Trigger, "detach_tool")
 tool("gripper with peg", 0.225, 1.19)  # from now on the peg's end is the tool frame
 move(HEAD[0], HEAD[1], 0.3)
 
-presumed = (HOLE[0] + 0.002, HOLE[1] - 0.001, HOLE[2])  # as a camera would have found it
+presumed = (HOLE[0] - 0.002, HOLE[1] + 0.001, HOLE[2])  # as a camera would have found it
 move(presumed[0], presumed[1], presumed[2] + 0.02)
 move(presumed[0], presumed[1], presumed[2] + 0.004)  # where an episode of the policy begins
 
