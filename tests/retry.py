@@ -38,7 +38,7 @@ PAUSE = 1.0
 
 _LATE_ANSWERS = ("this machine answers late", "QualityLost")
 _LATE_TARGETS = ("no target arrived", "Starved")
-_SILENCE = ("its watchdog time is", "nothing received from", "the newest state is")
+_SILENCE = ("its watchdog time is", "nothing received for", "the newest state is")
 _FILE = "RETRIES_OF_HEPTARM"
 _log = logging.getLogger(__name__)
 
@@ -99,6 +99,13 @@ def silent(outcome: object) -> str:
     else:
         said = str(outcome) if isinstance(outcome, Exception) else ""
     return "one side was silent" if any(one in said for one in _SILENCE) else ""
+
+
+def reported(text: str) -> str:
+    """The cause that the text of a result gives; "": none of this machine."""
+    if any(late_target in text for late_target in _LATE_TARGETS):
+        return "servo targets came late"
+    return "one side was silent" if any(one in text for one in _SILENCE) else ""
 
 
 def held_up(arm: ha.Arm, since: int) -> str:

@@ -502,8 +502,8 @@ private:
                 const double silence = 1e-9 * static_cast<double>(at - received_);
                 const double allowed = std::max(2 * welcome_.heartbeat, 1.0);
                 if (silence > allowed)
-                    throw ConnectionLost("nothing received from " + peer_ + " for " + wire::text_of(silence) +
-                                             " s, allowed are " + wire::text_of(allowed) + " s",
+                    throw ConnectionLost("the connection to " + peer_ + " is lost: nothing received for " +
+                                             wire::text_of(silence) + " s, allowed are " + wire::text_of(allowed) + " s",
                                          int(Code::silent), "check the network and the load of both machines");
             }
         } catch (...) {

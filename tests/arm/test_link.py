@@ -214,7 +214,7 @@ def test_a_standstill_of_this_process_is_no_silence_of_the_cabinet() -> None:
         heartbeat.look(now)
         if now <= 2 * second:
             heartbeat.check(now, "cabinet")
-    with pytest.raises(ha.ConnectionLost, match=r"nothing received from cabinet for 9.9 s"):
+    with pytest.raises(ha.ConnectionLost, match=r"connection to cabinet is lost: nothing received for 9.9 s"):
         heartbeat.check(now, "cabinet")
     heartbeat.received = now
     heartbeat.look(now)

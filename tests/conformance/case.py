@@ -15,6 +15,8 @@ import heptarm as ha
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal, TrajectoryPoint
 from heptarm.values.checks import Array
 from tests.conformance.client import Client, ReceivedFeedback, ReceivedResult, SentGoal
+from tests.conformance.stage import Stage
+from tests.retry import reported, retry
 
 Case = Callable[[Client], None]
 Found = TypeVar("Found")
@@ -110,9 +112,12 @@ def last(wanted: TrajectoryGoal, client: Client) -> Array:
 
 
 def succeeds(client: Client, wanted: TrajectoryGoal) -> SentGoal:
-    sent = client.send(wanted)
-    assert sent.accepted, sent
-    ended = client.result(sent)
+    def attempt() -> tuple[SentGoal, ReceivedResult]:
+        sent = client.send(wanted)
+        assert sent.accepted, sent
+        return sent, client.result(sent)
+
+    sent, ended = retry(attempt, lambda outcome: reported(outcome[1].text) if type(outcome) is tuple else "")
     assert ended.outcome is GoalOutcome.SUCCEEDED and ended.code is ErrorCode.SUCCESSFUL, ended
     if len(wanted.joints) == 7:
         assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH
@@ -174,6 +179,16 @@ def newest(arm: ha.Arm) -> ha.State:
         except ha.StaleState:
             time.sleep(0.02)
     raise AssertionError("no states come")
+
+
+def braked(stage: Stage) -> None:
+    """Wait until the cabinet has ended the motion of a silent node; a busy one is late, too."""
+    with ha.connect(stage.target, control=False, watchdog=5.0, timeout=30.0) as arm:
+        for _ in range(1000):
+            if not newest(arm).motion.active:
+                return
+            time.sleep(0.02)
+    raise AssertionError("the cabinet does not end the motion")
 
 
 def undisturbed(client: Client, measure: Callable[[], Found]) -> Found:

@@ -56,7 +56,7 @@ def test_a_lost_connection_has_its_black_box(peer: Peer, folder: Path) -> None:
         arm.move(ha.ptp(HOME))
     assert again.value.black_box == path
     arm.close()
-    assert any("connection lost" in event.text for event in ha.load(path).events)
+    assert any("the connection to" in event.text for event in ha.load(path).events)
     assert len(list(folder.iterdir())) == 1
 
 

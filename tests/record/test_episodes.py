@@ -227,6 +227,24 @@ def check_data_set(data: Path, episodes: ha.Demonstrations) -> None:
     assert 0.3 < stats["observation.images.wrist"]["mean"][0][0][0] < 0.8
 
 
+def test_an_episode_begins_when_a_camera_that_is_slow_to_start_gives_pictures(
+    peer: Peer, tmp_path: Path
+) -> None:
+    camera = Camera()
+
+    def slow() -> npt.NDArray[np.uint8]:
+        time.sleep(0.0 if camera.shots else 0.7)
+        return camera()
+
+    with peer.arm() as arm, arm.episodes(tmp_path, cameras=[slow]) as episodes:
+        assert camera.shots
+        with episodes.episode() as episode:
+            begun = camera.shots
+            until(lambda: camera.shots > begun + 2)
+            episode.succeed()
+    assert [episode.label for episode in ha.load_episodes(tmp_path)] == ["success"]
+
+
 def test_a_camera_that_stalls_and_an_error_make_a_failure_and_the_rest_stays(
     peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
-from tests.conformance.case import long, quiet, rests, step
+from tests.conformance.case import braked, long, quiet, rests, step
 from tests.conformance.stage import Stage
 from tests.ros1.peer import PATIENCE, Client, NodeProcess, call, collect, until
 
@@ -108,12 +107,14 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
 
 
 @pytest.mark.long  # every run has it with the node of ROS 2
-def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
+def test_a_node_that_the_system_stops_for_a_while(
+    other: Client, spare: Stage, spare_node: NodeProcess
+) -> None:
     """The cabinet brakes the arm, the goal ends, and the node continues."""
     sent = other.send(step(other, time=9.0, size=6.0))
     until(lambda: other.feedback(sent), "the goal does not begin")
     spare_node.process.send_signal(signal.SIGSTOP)
-    time.sleep(4.5)  # a busy cabinet forgives as long as it was late itself
+    braked(spare)
     spare_node.process.send_signal(signal.SIGCONT)
     ended = other.result(sent)
     assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -14,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
-from tests.conformance.case import long, quiet, rests, stays, step, succeeds, under_way
+from tests.conformance.case import braked, long, quiet, rests, stays, step, succeeds, under_way
 from tests.conformance.stage import ROOT, Stage
 from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, until
 
@@ -117,13 +116,13 @@ def test_a_cabinet_that_dies_and_comes_back(
     assert all(a < b for a, b in zip(stamps, stamps[1:])), "no state twice"  # noqa: RUF007
 
 
-def test_a_node_that_the_system_stops_for_a_while(victim: Client, tough: NodeProcess) -> None:
+def test_a_node_that_the_system_stops_for_a_while(victim: Client, spare: Stage, tough: NodeProcess) -> None:
     """The cabinet brakes the arm, the goal ends, and the node continues."""
     here = victim.place().q
     sent = victim.send(step(victim, time=9.0, size=6.0))
     under_way(victim, here)
     tough.process.send_signal(signal.SIGSTOP)
-    time.sleep(4.5)  # a busy cabinet forgives as long as it was late itself
+    braked(spare)
     tough.process.send_signal(signal.SIGCONT)
     ended = victim.result(sent)
     assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended

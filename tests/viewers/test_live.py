@@ -91,14 +91,25 @@ def test_an_episode_is_a_file_of_rerun_with_its_pictures_streams_and_actions(
     peer: Peer, tmp_path: Path
 ) -> None:
     folder, file = tmp_path / "set", tmp_path / "episode.rrd"
-    picture = np.full((8, 12, 3), 90, np.uint8)
+    taken: list[float] = []
+
+    def camera() -> np.ndarray:
+        taken.append(0.0)
+        return np.full((8, 12, 3), 90, np.uint8)
+
     with (
         peer.arm() as arm,
-        arm.episodes(folder, cameras=[lambda: picture], streams={"force": None}) as episodes,
+        arm.episodes(folder, cameras=[camera], streams={"force": None}) as episodes,
         episodes.episode() as episode,
     ):
-        states = arm.state.stamp
-        until(lambda: episodes.push("force", [1.0, 2.0]) is None and arm.state.stamp - states > 200_000_000)
+        states, before = arm.state.stamp, len(taken)
+        until(
+            lambda: (
+                episodes.push("force", [1.0, 2.0]) is None
+                and arm.state.stamp - states > 200_000_000
+                and len(taken) - before > 2
+            )
+        )
         episode.succeed()
     run = ha.load(folder / "episode-00000.mcap")
     with pytest.raises(CommandRejected, match="no states of a known robot"):

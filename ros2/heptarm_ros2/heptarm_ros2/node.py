@@ -276,7 +276,7 @@ class HeptarmNode(LifecycleNode):
     def on_link(self, error: str) -> None:
         """Log that the arm was connected or the connection was lost."""
         if error and not self._ending.is_set():
-            self.get_logger().error(f"connection lost: {error}")
+            self.get_logger().error(error)
         elif not self._ending.is_set():
             self.get_logger().info("connected")
 

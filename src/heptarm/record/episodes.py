@@ -169,7 +169,7 @@ class _Watcher:
 
     def __init__(self, feed: _Feed, read: Callable[[], None], *, pause: float) -> None:
         self._feed, self._read, self._pause = feed, read, pause
-        self._ending = threading.Event()
+        self._ending, self._has_begun = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="heptarm-episodes", daemon=True)
         self._thread.start()
 
@@ -182,6 +182,12 @@ class _Watcher:
                     self._feed.failure = error
                     _log.warning("%s gives nothing any more: %s", self._feed.name, _line(str(error)))
                 return
+            finally:
+                self._has_begun.set()
+
+    def warm_up(self) -> None:
+        """Wait for the first reading; the episode reports one that does not come."""
+        self._has_begun.wait(STALL)
 
     def close(self) -> None:
         """End it; a function that waits for its sensor is left alone."""
@@ -305,7 +311,7 @@ class EpisodeSet(Sealed):
         self._is_open = False
 
     def __enter__(self) -> EpisodeSet:
-        """Open folder, cameras and streams.
+        """Open folder, cameras and streams, and wait for the first picture of each camera, at most two seconds.
 
         Raises:
             CommandRejected: the folder cannot be written; or a camera cannot be opened.
@@ -317,19 +323,21 @@ class EpisodeSet(Sealed):
         except OSError as error:
             raise unwritable(self.folder, error) from error
         clock = self._source.nanos
+        cameras: list[_Watcher] = []
         with ExitStack() as stack:
             for name, opened in self._terms.cameras.items():
                 stream = opened()
                 stack.callback(stream.close)
                 feed = self._feeds[name] = _Feed(name, clock, _view_writer(name))
-                stack.callback(
-                    _Watcher(feed, _picture_reader(feed, stream, self._source.to_ours), pause=0.0).close
-                )
+                cameras.append(_Watcher(feed, _picture_reader(feed, stream, self._source.to_ours), pause=0.0))
+                stack.callback(cameras[-1].close)
             for name, source in (*self._terms.streams.items(), (ACTION, None)):
                 feed = self._feeds[name] = _Feed(name, clock, _number_writer(name))
                 if source is not None:
                     pause = 0.5 / (self._terms.rate * self._terms.factor)  # one that is late misses no step
                     stack.callback(_Watcher(feed, _number_reader(feed, source, clock), pause=pause).close)
+            for camera in cameras:  # one that is slow to start would shorten the first episode
+                camera.warm_up()
             self._stack = stack.pop_all()
         self._is_open = True
         return self

@@ -232,7 +232,7 @@ class HeptarmNode:
     def on_link(self, error: str) -> None:
         """Log that the arm was connected or the connection was lost."""
         if error:
-            rospy.logerr(f"connection lost: {error}")
+            rospy.logerr(error)
         else:
             rospy.loginfo("connected")
         self._wake.set()

@@ -525,11 +525,7 @@ class Connection:
             return self._closed_error()
         if not self.in_control:
             return None
-        lost = ConnectionLost(
-            f"the connection is lost: {error.text}",
-            code=error.code,
-            hint="arm.reconnect() connects again",
-        )
+        lost = ConnectionLost(self.link.lost().text, code=error.code, hint="arm.reconnect() connects again")
         return lost.with_black_box(self.black_box.last)
 
     def _new_link(
@@ -939,7 +935,7 @@ class Connection:
     def _on_lost(self, error: HeptarmError) -> None:
         """End all programs with the error; an observer then reconnects by itself, a controller does not."""
         lost_at = self.clock.nanos()
-        self.journal.add(ERROR, f"connection lost: {error.text}")
+        self.journal.add(ERROR, error.text)
         error.with_black_box(self.capture("connection lost"))
         self.events.lose(error)
         self.feed.wake()

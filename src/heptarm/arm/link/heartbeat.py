@@ -65,7 +65,7 @@ class Heartbeat:
             silence, allowed = over_tcp, max(allowed, _MAX_TCP_SILENCE)
         if silence > allowed:
             raise ConnectionLost(
-                f"nothing received from {peer} for {silence:.1f} s, allowed are {allowed:g} s",
+                f"the connection to {peer} is lost: nothing received for {silence:.1f} s, allowed are {allowed:g} s",
                 code=int(Code.SILENT),
                 hint="check the network and the load of both machines",
             )

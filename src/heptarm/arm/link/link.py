@@ -5,7 +5,7 @@ Theory of operation
 
 **States.** A link is *opening* (Hello, the key's proof, Welcome, six pings that measure the cabinet's clock),
 then *open*, then *ended*. It ends once, by `_fail`: the first error is kept, the sockets close, everybody who
-waits is woken. All later calls raise that error (`_lost`: a new exception for each caller). Nothing
+waits is woken. All later calls raise that error (`lost`: a new exception for each caller). Nothing
 reconnects here; `connection` does, with a new link.
 
 **Frames** are written and read by `heptarm.wire.session`, which counts them and knows no socket. In the usual
@@ -349,7 +349,7 @@ class Link:
             received = exchange(kind, kind.TYPE, now, message.encode())
         except OSError as error:
             self._fail(self._transport.lost(error))
-            raise self._lost() from error
+            raise self.lost() from error
         if received == _PLAIN_ANSWER:
             self._heartbeat.received = now
             return _ACCEPTED
@@ -363,7 +363,7 @@ class Link:
             return printable_message(self._session.answer(*received))
         except RemoteProtocolError as error:
             self._fail(error)
-            raise self._lost() from error
+            raise self.lost() from error
 
     def _ask(self, message: Message, timeout: float, on_answer: Callable[[Message], None] | None) -> Message:
         """Send a request and wait for its answer, in the cases that `_ask_at_once` leaves."""
@@ -408,7 +408,7 @@ class Link:
         if pending.answer is not None:
             return pending.answer
         if self._error is not None:
-            raise self._lost()
+            raise self.lost()
         raise Timeout(
             f"the cabinet did not answer {type(message).__name__} within {timeout:g} s",
             hint="check the network and the load of both machines, or use connect(..., timeout=...)",
@@ -456,17 +456,17 @@ class Link:
         if line is None:
             with self._sending:
                 if self._error is not None:
-                    raise self._lost()
+                    raise self.lost()
                 data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
                 self._transmit(data)
             return
         if self._error is not None:
-            raise self._lost()
+            raise self.lost()
         number = line.send_target(kind, numbers, now=now)
         if line.needs_copy(now, 0.5 * watchdog):
             with self._sending:
                 if self._error is not None:
-                    raise self._lost()
+                    raise self.lost()
                 data = self._session.send_numbers(
                     kind, numbers, time=self.offset.to_cabinet(now), number=number
                 )
@@ -484,7 +484,7 @@ class Link:
         """Probe the cabinet's clock; the answer updates `offset`."""
         with self._sending:
             if self._error is not None:
-                raise self._lost()
+                raise self.lost()
             sent = self._clock.nanos()
             data = self._session.send(Ping(sent=sent), time=sent)
             self._arrivals.departure = PingDeparture(sent, self._clock.nanos())
@@ -494,7 +494,7 @@ class Link:
         """Send a message over TCP; returns the id of the request, 0 if it is none."""
         with self._sending:
             if self._error is not None:
-                raise self._lost()
+                raise self.lost()
             request = 0
             if pending is not None:
                 request = self._session.next_request()
@@ -666,8 +666,8 @@ class Link:
             self._datagrams.close()
         self._requests.abandon()
 
-    def _lost(self) -> HeptarmError:
-        """Make a new error for each caller: one exception raised in two threads mixes up their tracebacks."""
+    def lost(self) -> ConnectionLost:
+        """A new error for each caller: one exception raised in two threads mixes up their tracebacks."""
         error = self._error
         assert error is not None
         if isinstance(error, ConnectionLost):

@@ -455,7 +455,7 @@ class MotionHandle(Sealed):
         """End with the error of a lost connection."""
         self._last_sample = self._connection.feed.count
         lost = ConnectionLost(
-            f"the connection was lost during motion {self._id}: {error.text}",
+            f"motion {self._id} was interrupted: {error.text}",
             code=error.code,
             hint="arm.reconnect(), then check where the arm is",
         )

@@ -72,7 +72,6 @@ class ReconnectingStates:
 
     def _lose(self, why: str) -> None:
         self._link_error = why
-        _log.error("connection lost: %s", why)
         self._on_link(why)
 
     def _reconnect(self) -> None:

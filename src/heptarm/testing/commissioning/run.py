@@ -130,7 +130,7 @@ def _try(step: CommissioningStep, arm: Arm, person: Person) -> StepOutcome:
     except NotReady as error:
         return StepOutcome(step, Agreement.SKIPPED, text=f"the robot is not ready: {error}")
     except ConnectionLost as error:  # the cabinet has stopped the arm; this settles nothing
-        return StepOutcome(step, Agreement.SKIPPED, text=f"the connection was lost: {error}")
+        return StepOutcome(step, Agreement.SKIPPED, text=str(error))
     except HeptarmError as error:
         return StepOutcome(step, Agreement.DIFFERS, text=f"{type(error).__name__}: {error}")
     agrees = all(comparison.agrees for comparison in comparisons)
