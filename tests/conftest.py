@@ -29,6 +29,7 @@ pytest_plugins = [
     "tests.processes",
     "tests.hangs",
     "tests.retry",
+    "tests.postponed",
     "tests.browser",
     "tests.doubled",
 ]

@@ -4,7 +4,7 @@ FRI answers that come late and servo targets that do not come are faults that he
 that is busy with something else it is right to. Such a test shows nothing about heptarm; it runs again. Each such case
 names its cause and is counted over the whole run with all its workers. More than a few mean that this machine is not
 what the tests take it for: then nothing is tried again any more, and the run fails. A check that fails is never tried
-again.
+again here; `tests.postponed` does so once, when nothing else runs.
 """
 
 from __future__ import annotations
