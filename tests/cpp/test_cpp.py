@@ -7,7 +7,6 @@ import json
 import os
 import random
 import re
-import shutil
 import socket
 import subprocess
 import threading
@@ -20,39 +19,19 @@ from heptarm.wire.codes import Code
 from heptarm.wire.messages import MAJOR
 from tests.arm.standstill import stand_still
 from tests.cli.running import sim
+from tests.cpp.native import INCLUDES, ROOT, compiled
 from tests.long import few
 from tests.retry import retry, silent
 from tests.schema.python_side import recoded
 from tests.simulators import FASTER
 
-ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "schema" / "golden"
-FLAGS = (
-    "-std=c++17",
-    "-O1",
-    "-Wall",
-    "-Wextra",
-    "-Wshadow",
-    "-Werror",
-    "-pthread",
-    "-I",
-    str(ROOT / "cpp" / "include"),
-)
 KEY = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj"
-
-
-def compiled(source: Path, folder: Path, *flags: str) -> Path:
-    compiler = shutil.which("g++") or shutil.which("clang++")
-    if compiler is None:
-        pytest.skip("no C++ compiler here: the C++ client is not tested")
-    program = folder / source.stem
-    subprocess.run([compiler, *FLAGS, *flags, "-o", str(program), str(source)], check=True, timeout=800)
-    return program
 
 
 @pytest.fixture(scope="session")
 def probe(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled(Path(__file__).parent / "probe.cpp", tmp_path_factory.mktemp("cpp"))
+    return compiled(Path(__file__).parent / "probe.cpp", tmp_path_factory.mktemp("cpp"), "-O1")
 
 
 @pytest.fixture(scope="module")
@@ -275,7 +254,7 @@ def test_nobody_there(probe: Path) -> None:
 def test_example_runs(name: str, tmp_path: Path, address: str) -> None:
     # the example `fri` needs the loop and runs in test_fri.py
     # the probe uses the same header, optimised: what only the optimiser warns of is found there
-    program = compiled(ROOT / "cpp" / "examples" / f"{name}.cpp", tmp_path, "-O0")
+    program = compiled(ROOT / "cpp" / "examples" / f"{name}.cpp", tmp_path)
     environment = {one: value for one, value in os.environ.items() if one != "HEPTARM_KEY"}
     with contextlib.ExitStack() as stack:
         if name == "servo":  # a stream in real time
@@ -308,5 +287,4 @@ def test_snippets_of_the_guide_compile(tmp_path: Path) -> None:
     source = tmp_path / "page.cpp"
     source.write_text(whole[0] + head + body)  # the program first, with no headers but its own
     # the header is read once for both; the examples are compiled to the end, linked and run
-    loop = [f"-I{ROOT / one}" for one in ("native", "src/heptarm/fri/loop/include")]
-    compiled(source, tmp_path, "-fsyntax-only", *loop)
+    compiled(source, tmp_path, "-fsyntax-only", *INCLUDES)

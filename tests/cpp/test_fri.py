@@ -55,7 +55,7 @@ def driven(program: Path, version: str, command: str, *more: str) -> str:
 def test_an_application_of_the_shape_of_the_sdk(
     loop: list[str], tmp_path: Path, version: str, command: str
 ) -> None:
-    program = compiled(ROOT / "examples/fri_cpp/sdk_sine.cpp", loop, tmp_path)
+    program = compiled(ROOT / "examples/fri_cpp/sdk_sine.cpp", tmp_path, parts=loop)
 
     def drive() -> str:
         return driven(program, version, command, str(CYCLES))
@@ -78,7 +78,7 @@ def test_an_application_of_the_shape_of_the_sdk(
 
 @pytest.mark.long
 def test_sessions_of_an_arm(loop: list[str], tmp_path: Path) -> None:
-    program = compiled(ROOT / "cpp/examples/fri.cpp", loop, tmp_path)
+    program = compiled(ROOT / "cpp/examples/fri.cpp", tmp_path, parts=loop)
     with sim() as ready:
         done = subprocess.run(
             [str(program), f"127.0.0.1:{ready['port']}", "127.0.0.1"],
@@ -99,7 +99,7 @@ def test_sessions_of_an_arm(loop: list[str], tmp_path: Path) -> None:
 def test_poses_of_an_application_of_the_shape_of_the_sdk(
     loop: list[str], tmp_path: Path, version: str
 ) -> None:
-    program = compiled(ROOT / "examples/fri_cpp/sdk_pose.cpp", loop, tmp_path)
+    program = compiled(ROOT / "examples/fri_cpp/sdk_pose.cpp", tmp_path, parts=loop)
     said = retry(
         lambda: driven(program, version, "pose"),
         lambda said: "answers came late" if isinstance(said, str) and "ends at" not in said else "",
@@ -111,7 +111,7 @@ def test_poses_of_an_application_of_the_shape_of_the_sdk(
 
 @pytest.mark.long
 def test_signals_of_a_session_of_an_arm(loop: list[str], tmp_path: Path) -> None:
-    program = compiled(ROOT / "tests/cpp/fri_signals.cpp", loop, tmp_path)
+    program = compiled(ROOT / "tests/cpp/fri_signals.cpp", tmp_path, parts=loop)
     with sim() as ready:
         command = [str(program), f"127.0.0.1:{ready['port']}"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)

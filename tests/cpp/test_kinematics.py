@@ -25,7 +25,7 @@ Ask = Callable[..., list[str]]
 def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
     folder = tmp_path_factory.mktemp("kinematics")
     parts = objects(folder, ("kinematics", "redundancy"))
-    program = compiled(Path(__file__).parent / "kinematics.cpp", parts, folder)
+    program = compiled(Path(__file__).parent / "kinematics.cpp", folder, parts=parts)
 
     def asked(lines: Iterable[str]) -> list[str]:
         done = subprocess.run(

@@ -248,6 +248,7 @@ def test_the_command_line_refuses_before_anything_connects(
         ((*peg, "--twin", "nonsense"), "--twin must be none or a simulator"),
         ((*reach, "--twin", "sim://nothing"), "target must be an address or a simulator"),
         ((*reach, "--follow", "--ask"), "--ask and --follow must not be given together"),
+        ((*reach, "--at", "0.5", "0", "0.4", "--follow"), "--at and --follow must not be given together"),
         ((*reach, "--at", "3", "0", "0.4"), "is outside the guard's box"),
         ((*reach, "--random", "0"), "--random must be at least 1"),
         (("peg-in-hole", "--target", "sim://iiwa14?speed=2"), f"--target '{scene}&speed=2'"),

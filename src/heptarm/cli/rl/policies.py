@@ -420,9 +420,12 @@ def deploy(
             parameter="tip",
             hint="leave them out",
         )
-    if ask and follow:
+    chosen = [name for name, given in (("--at", at), ("--ask", ask), ("--follow", follow)) if given]
+    if len(chosen) > 1:
         raise CommandRejected(
-            "--ask and --follow must not be given together", parameter="ask", hint="leave out one of them"
+            f"{' and '.join(chosen)} must not be given together",
+            parameter=chosen[-1].removeprefix("--"),
+            hint="each of them chooses the targets: give one",
         )
     _refuse_reports(out, overwrite=overwrite, film=film)
     recording = _recording(network, out, overwrite=overwrite)
@@ -430,7 +433,7 @@ def deploy(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
     targets = [] if ask else _targets(network, at, random, follow, seed)
-    if at and not (ask or follow):
+    if at:
         for point in targets:
             settings.guard.check(point)
     with target.connect() as arm:
