@@ -154,7 +154,7 @@ def test_every_command_uses_the_key(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     if name == "rl deploy":
-        monkeypatch.setattr("heptarm.cli.rl.policies.policy_named", lambda *_: shipped())
+        monkeypatch.setattr("heptarm.cli.rl.deploy.policy_named", lambda *_: shipped())
     if name == "stop":  # stops before it connects, without a key
         monkeypatch.setattr("heptarm.cli.stop.halt", lambda *_, **__: None)
     if name == "live":  # its extra is not installed here

@@ -15,7 +15,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.cli.options import CommandTarget
-from heptarm.cli.rl.policies import deploy as deploy_command
+from heptarm.cli.rl.deploy import deploy as deploy_command
 from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.deploy import DeploySettings, circle, deploy
 from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
@@ -193,7 +193,7 @@ def test_the_guard_brings_commands_back() -> None:
 
 def test_deploying_needs_neither_torch_nor_mujoco() -> None:
     code = (
-        "import sys; import heptarm.cli.rl.policies, heptarm.rl.deploy\n"
+        "import sys; import heptarm.cli.rl.deploy, heptarm.rl.deploy\n"
         "from heptarm.rl.policy import shipped; shipped(feature=True)\n"
         "sys.exit(any(m in sys.modules for m in ('torch', 'mujoco')))"
     )
@@ -219,10 +219,11 @@ def test_the_command_line_refuses_what_a_policy_with_contacts_has_not() -> None:
         (("--tip", "0.2"), "--at and --tip must be given together"),
         (("--at", "0.6", "0.1", "0.24"), "--at and --tip must be given together"),
         (("--random", "0"), "--random must be at least 1"),
+        (("--seconds", "0"), "seconds must be in [0.5, 600] s, got 0 s"),
     ):
         done = refused("rl", "deploy", "peg-in-hole", *words)
         assert done.returncode != 0 and why in done.stderr, done.stderr
-    for words in (("--tip", "0.2"), ("--through", "fri")):
+    for words in (("--tip", "0.2"), ("--through", "fri"), ("--seconds", "16")):
         done = refused("rl", "deploy", *words)
         assert done.returncode != 0 and "are of policies with contacts" in done.stderr
 

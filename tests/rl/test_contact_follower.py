@@ -13,6 +13,7 @@ from heptarm.rl.contact.peg_in_hole import PegInHole
 from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.contact.pilot import ContactPilot
 from heptarm.rl.contact.task import ContactTask
+from heptarm.rl.deploy_contact import ContactSettings
 from heptarm.rl.policy import Policy, shipped, shipped_contact
 from heptarm.values.pose import Pose
 
@@ -107,6 +108,23 @@ def test_a_policy_that_diverges_ends_its_episode() -> None:
         for _ in range(60):
             bench.tick()
     assert bench.follower.ended == "failure" and bench.tick() is None
+
+
+def test_an_episode_may_take_longer_than_in_training() -> None:
+    still = constant(PegInHole(), 0.0)
+
+    def lasts(settings: ContactSettings) -> float:
+        bench = Bench(ContactFollower(still, settings=settings))
+        bench.follower.on_target(HOLE)
+        while not bench.follower.ended:
+            bench.tick()
+        assert bench.follower.ended == "time"
+        return len(bench.sent) * TICK * 1e-9
+
+    assert lasts(ContactSettings()) == pytest.approx(PegInHole().steps / PegInHole().rate, abs=0.02)
+    assert lasts(ContactSettings(seconds=16.0)) == pytest.approx(16.0, abs=0.02)
+    with pytest.raises(LimitError, match=r"seconds must be in \[0.5, 600\] s, got 1000 s"):
+        ContactSettings(seconds=1000.0)
 
 
 def constant(task: ContactTask, action: float) -> Policy[Any]:

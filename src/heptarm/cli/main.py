@@ -64,7 +64,7 @@ BRIDGES = {"libiiwa": "bridge:libiiwa", "kst": "bridge:kst"}
 LEARNING = {
     "train": "rl.policies:train",
     "eval": "rl.policies:evaluate",
-    "deploy": "rl.policies:deploy",
+    "deploy": "rl.deploy:deploy",
     "record": "rl.record:record",
 }
 SIMULATIONS = {"app": "sim.application:application", "fri": "sim.fri:fri"}

@@ -51,8 +51,8 @@ _CLEAR = 0.02
 _APPROACH, _RETREAT = 0.1, 0.05
 #: The zero of the wrench is the mean of so many seconds at rest: a single reading is as uncertain as what it measures.
 _ZEROING = 0.5
-#: Longest wait for these [s].
-_PATIENCE = 30.0
+#: Longest wait for these, and longest time of an episode [s].
+_PATIENCE, _LONGEST = 30.0, 600.0
 #: A tick that is so late on the robot's clock is counted [ns].
 _LATE = 10_000_000
 
@@ -70,6 +70,7 @@ class ContactSettings:
             as well.
         speed: largest of the set-point [m/s]; `arm.speed` scales it.
         latency: added between seeing and commanding [s].
+        seconds: an episode ends after so long [s]; None: after the task's `steps`, as in training.
         stale: without a newer state for so long the deployment ends, and without a target the arm stops [s].
     """
 
@@ -80,6 +81,7 @@ class ContactSettings:
     peak: float = 60.0
     speed: float = 0.25
     latency: float = 0.0
+    seconds: float | None = None
     stale: float = 0.25
 
     def __post_init__(self) -> None:
@@ -89,7 +91,13 @@ class ContactSettings:
         within(self.peak, "peak", 1.0, 1000.0, unit="N")
         within(self.speed, "speed", 0.0, 1.0, above=True, unit="m/s")
         within(self.latency, "latency", 0.0, 0.5, unit="s")
+        if self.seconds is not None:
+            within(self.seconds, "seconds", 0.5, _LONGEST, unit="s")
         within(self.stale, "stale", 0.02, 2.0, unit="s")
+
+    def timed(self, task: ContactTask) -> ContactTask:
+        """A task whose episodes may take as long as here."""
+        return task if self.seconds is None else replace(task, steps=round(self.seconds * task.rate))
 
 
 def spring_of(task: ContactTask, settings: ContactSettings) -> CartesianImpedance:
@@ -154,6 +162,7 @@ def deploy_contact(
     """
     chosen = settings or ContactSettings()
     task = deployed_task(instance(policy, Policy, "policy").task, ContactTask, arm.robot)  # type: ignore[type-abstract]
+    task = chosen.timed(task)
     check_contact(task, chosen, arm.speed, bodies=bodies, gripper=gripper)
     goals = _goals(task, targets)
     frames = [origins] * len(goals) if isinstance(origins, Pose) else list(origins)
@@ -165,7 +174,7 @@ def deploy_contact(
             parameter="origins",
         )
     arm.subscribe(rate=2.0 * _FINE * task.rate)
-    run = _Run(arm, policy, chosen, bodies, gripper)
+    run = _Run(arm, policy, task, chosen, bodies, gripper)
     for number, origin in enumerate(frames):
         with inside(f"origins[{number}]"):
             run.check_start(origin)
@@ -258,14 +267,15 @@ class _Run:
         self,
         arm: ArmVerbs,
         policy: Policy[Any],
+        task: ContactTask,
         settings: ContactSettings,
         bodies: Bodies | None,
         gripper: Gripper | None,
     ) -> None:
         self._arm, self._settings = arm, settings
         self._bodies, self._gripper = bodies, gripper
-        self._task: ContactTask = policy.task
-        self._pilot = ContactPilot(policy)
+        self._task = task
+        self._pilot = ContactPilot(policy, steps=task.steps)
         self._spring = spring_of(self._task, settings)
         begins = self._task.starts(np.random.default_rng(0), 100)
         #: The middle of the starts, in the frame of the task.

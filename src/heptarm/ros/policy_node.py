@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from heptarm.errors import HeptarmError
 from heptarm.rl.contact.follower import ContactFollower
 from heptarm.rl.contact.task import ContactTask
-from heptarm.rl.deploy_contact import spring_of
+from heptarm.rl.deploy_contact import ContactSettings, spring_of
 from heptarm.rl.follower import Follower
 from heptarm.rl.policy import policy_named
 from heptarm.values.pose import Pose
@@ -34,6 +34,7 @@ class PolicyParameters:
         base_frame: of its base.
         policy: file of the policy, or "reach" or "peg-in-hole": the included one of that task; "": "reach".
         feature: of the included policies of reach, the one that also sees the way to the target.
+        seconds: with contacts: an episode ends after so long [s]; 0: after as long as in training.
     """
 
     _: KW_ONLY
@@ -42,6 +43,7 @@ class PolicyParameters:
     base_frame: str = "link_0"
     policy: str = ""
     feature: bool = True
+    seconds: float = 0.0
 
 
 class PolicyRos(Protocol):
@@ -78,16 +80,18 @@ class PolicyNode:
 
     Raises:
         CommandRejected: no such policy, or one that the node cannot run.
+        LimitError: a time outside its range.
         ShapeError: not seven different names of joints.
     """
 
     def __init__(self, ros: PolicyRos, parameters: PolicyParameters) -> None:
         policy = policy_named(parameters.policy, feature=parameters.feature)
         is_contact = isinstance(policy.task, ContactTask)
+        settings = ContactSettings(seconds=parameters.seconds or None)
         self._lock = threading.RLock()  # in ROS 1 every topic has a thread of its own
         self._ros, self._base = ros, parameters.base_frame
         self._work: _Reach | _Contact = (
-            _Contact(ros, parameters, ContactFollower(policy), self._lock)
+            _Contact(ros, parameters, ContactFollower(policy, settings=settings), self._lock)
             if is_contact
             else _Reach(ros, parameters, Follower(policy, parameters.joint_names))
         )

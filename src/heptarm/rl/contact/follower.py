@@ -34,8 +34,8 @@ class ContactFollower:
 
     Args:
         policy: of a task with contacts that needs neither gripper, camera nor joint positions.
-        settings: `force` and `peak` are those of a deployment; without a state for `stale` nothing is sent, and after
-            two seconds the episode is over.
+        settings: `force`, `peak` and `seconds` are those of a deployment; without a state for `stale` nothing is sent,
+            and after two seconds the episode is over.
 
     Attributes:
         task: the policy's.
@@ -60,7 +60,7 @@ class ContactFollower:
                 hint="heptarm.rl.deploy_contact.deploy_contact deploys it",
             )
         self.rate, self.settings, self.ended = task.rate * _FINE, settings or ContactSettings(), ""
-        self._pilot = ContactPilot(policy)
+        self._pilot = ContactPilot(policy, steps=self.settings.timed(task).steps)
         self._goal = np.zeros(task.targets(np.random.default_rng(0), 1).shape[1])
         self._origin: Pose | None = None
         self._tip: Pose | None = None

@@ -23,14 +23,16 @@ class ContactPilot:
 
     Args:
         policy: of a task with contacts.
+        steps: most decisions of an episode; None: as many as in training.
 
     Attributes:
         task: the policy's.
         now: what was measured last, with the set-point in force.
     """
 
-    def __init__(self, policy: Policy[Any]) -> None:
+    def __init__(self, policy: Policy[Any], *, steps: int | None = None) -> None:
         self.task: ContactTask = policy.task
+        self._most = self.task.steps if steps is None else steps
         self._decisions = Decisions(policy, rate=self.task.rate)
         self._frames: deque[Array] = deque()
         self._step = self._settled = 0
@@ -44,7 +46,7 @@ class ContactPilot:
     @property
     def is_over(self) -> bool:
         """Whether nothing has been missing for half a second, or the episode has had all of its decisions."""
-        return self._settled >= _SETTLED * self.task.rate or self._step >= self.task.steps
+        return self._settled >= _SETTLED * self.task.rate or self._step >= self._most
 
     def begin(self, pose: Array, target: Array, bodies: Mapping[str, Array], *, q: Array) -> None:
         """Start an episode with the arm at rest.
