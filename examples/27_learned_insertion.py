@@ -10,7 +10,7 @@ import numpy as np
 
 import heptarm as ha
 from heptarm.rl.contact.peg_in_hole import PegInHole
-from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
+from heptarm.rl.deploy_contact import deploy_contact
 from heptarm.rl.policy import Policy, shipped_contact
 
 PEG_IN_HOLE = "sim://iiwa14?scene=peg-in-hole"
@@ -46,7 +46,6 @@ with ha.connect(target, watchdog=2.0) as arm, arm.tool(GRIPPER):
             policy,
             [policy.task.presumed(hole, error) for error in errors],
             errors,
-            settings=ContactSettings(seconds=16.0),  # twice as long as in training
             progress=lambda number, missing: print(f"{number + 1}: {missing * 1e3:.1f} mm missing"),
         )
 print(report.summary())

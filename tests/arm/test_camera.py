@@ -103,6 +103,18 @@ def test_a_function_is_a_camera(peer: Peer) -> None:
         gate.release(20)
 
 
+@pytest.mark.parametrize("is_of_opencv", [True, False])
+def test_pictures_are_red_green_and_blue_of_opencv_too(peer: Peer, is_of_opencv: bool) -> None:
+    red = np.zeros((4, 6, 3), np.uint8)
+    red[..., 0] = 200
+
+    def read() -> object:
+        return (True, red[..., ::-1]) if is_of_opencv else red.copy()
+
+    with peer.arm() as arm, arm.camera(read) as stream:
+        np.testing.assert_array_equal(stream.read(timeout=60.0).pixels, red)
+
+
 def test_a_late_picture_belongs_to_the_state_of_its_moment(peer: Peer) -> None:
     gate = threading.Event()
 

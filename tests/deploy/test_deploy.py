@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -17,18 +18,19 @@ import heptarm as ha
 from heptarm.cli.options import CommandTarget
 from heptarm.cli.rl.deploy import deploy as deploy_command
 from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.pick_place import PickPlace
 from heptarm.rl.deploy import DeploySettings, circle, deploy
-from heptarm.rl.deploy_contact import ContactSettings, deploy_contact
+from heptarm.rl.deploy_contact import ContactSettings, _Run, deploy_contact
 from heptarm.rl.film import film
 from heptarm.rl.pilot import Pilot, PolicyGuard, Watch
-from heptarm.rl.policy import shipped, shipped_contact
+from heptarm.rl.policy import Policy, shipped, shipped_contact
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.station import held_peg
 from heptarm.rl.task import ReachTask
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
 from tests.cli.running import refused, run
-from tests.retry import retry
+from tests.retry import retry, starved
 
 ARM = "sim://iiwa14"
 POINT = (0.55, 0.1, 0.4)
@@ -324,3 +326,53 @@ def test_a_force_above_the_guard_ends_the_episode_at_rest() -> None:
                 arm, broken, policy.task.presumed(hole, error), [error], settings=ContactSettings(stale=2.0)
             )
         arm.wait_for_rest()
+
+
+class SlowGripper:
+    """A gripper that takes longer than a servo motion waits for set-points."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+
+    def close(self) -> None:
+        time.sleep(1.5)
+        self.calls.append("close")
+
+    def open(self) -> None:
+        self.calls.append("open")
+
+
+@pytest.mark.slow
+def test_set_points_go_on_while_a_gripper_closes() -> None:
+    task = PickPlace()
+    closing: Any = [(np.zeros((task.observation_size, 4)), np.array([0.0, 0.0, 0.0, 1.0]))]
+    still = Policy(
+        task, layers=closing, mean=np.zeros(task.observation_size), std=np.ones(task.observation_size)
+    )
+    gripper: Any = SlowGripper()
+    with ha.connect(ARM, watchdog=5.0) as arm:
+        arm.move(ha.ptp(ha.deg(0, 25, 0, -90, 0, 65, 0)))
+        here = arm.pose()
+        settings = ContactSettings(frame="flange", seconds=2.5, stale=0.6)
+        report = retry(
+            lambda: deploy_contact(
+                arm, still, here, settings=settings, bodies=lambda: {"cube": here}, gripper=gripper
+            ),
+            starved,
+        )
+    assert report.distances.shape == (1, 25) and gripper.calls[-1] == "close"
+
+
+def test_an_episode_that_a_force_ends_has_failed_at_full_depth_too() -> None:
+    run = object.__new__(_Run)
+    run._task = PegInHole()
+    assert all(run._failed(missing) > PegInHole().radius for missing in (-1e-3, 0.0, 0.02))
+
+
+def test_the_speed_of_the_command_holds_on_the_way_to_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = Mock(robot=robot("iiwa14"), speed=1.0, is_virtual=True)
+    arm.record.side_effect = ha.NotReady("as far as here")
+    monkeypatch.setattr(CommandTarget, "connect", lambda _: nullcontext(arm))
+    with pytest.raises(ha.NotReady, match="as far as here"):
+        deploy_command(speed=0.05, target=CommandTarget(text=ARM))
+    assert arm.speed == 0.05

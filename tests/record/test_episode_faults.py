@@ -251,6 +251,30 @@ def test_a_stream_that_gives_nothing_makes_a_failure(peer: Peer, tmp_path: Path)
     assert found[0].reason == "no value of the stream p arrived"
 
 
+def test_one_wrong_reading_of_a_stream_costs_one_episode(peer: Peer, tmp_path: Path) -> None:
+    given = [0.0]
+    with peer.arm() as arm, arm.episodes(tmp_path, rate=50.0, streams={"f": lambda: list(given)}) as episodes:
+        with (
+            pytest.raises(StaleState, match=r"f failed: f\[0\] must be finite"),
+            episodes.episode() as episode,
+        ):
+            given[0] = np.nan
+            until(lambda: bool(episode._stalled()))
+            given[0] = 1.0
+            episode.succeed()
+        with episodes.episode() as episode:
+            until(lambda: episodes._feeds["f"].count > 2)
+            episode.succeed()
+    assert [episode.label for episode in ha.load_episodes(tmp_path)] == ["failure", "success"]
+
+
+def test_a_stream_has_no_name_of_a_column_of_data_sets(peer: Peer, tmp_path: Path) -> None:
+    with peer.arm() as arm:
+        for name in ("velocity", "joint_positions", "joint_velocities"):
+            with pytest.raises(CommandRejected, match=f"not be one of .*got '{name}'"):
+                arm.episodes(tmp_path, streams={name: None})
+
+
 def test_an_episode_without_steps_has_empty_signals(
     peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -101,6 +101,14 @@ def test_what_cannot_begin_is_refused(bench: Bench) -> None:
         ContactFollower(constant(PickPlace(), 0.0))
 
 
+def test_nothing_is_kept_while_it_waits_for_a_target(bench: Bench) -> None:
+    for _ in range(1000):
+        bench.tick()
+    assert not bench.follower._loads
+    bench.follower.on_target(HOLE)
+    assert [bench.tick() for _ in range(49)] == [None] * 49 and bench.tick() is not None
+
+
 def test_a_policy_that_diverges_ends_its_episode() -> None:
     bench = Bench(ContactFollower(constant(shipped_contact(PegInHole).task, np.nan)))
     bench.follower.on_target(HOLE)
@@ -121,8 +129,8 @@ def test_an_episode_may_take_longer_than_in_training() -> None:
         assert bench.follower.ended == "time"
         return len(bench.sent) * TICK * 1e-9
 
-    assert lasts(ContactSettings()) == pytest.approx(PegInHole().steps / PegInHole().rate, abs=0.02)
-    assert lasts(ContactSettings(seconds=16.0)) == pytest.approx(16.0, abs=0.02)
+    assert lasts(ContactSettings()) == pytest.approx(2 * PegInHole().steps / PegInHole().rate, abs=0.02)
+    assert lasts(ContactSettings(seconds=4.0)) == pytest.approx(4.0, abs=0.02)
     with pytest.raises(LimitError, match=r"seconds must be in \[0.5, 600\] s, got 1000 s"):
         ContactSettings(seconds=1000.0)
 

@@ -9,6 +9,11 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.rl.contact.peg_in_hole import PegInHole
+from heptarm.rl.contact.pick_place import PickPlace
+from heptarm.rl.contact.polish import Polish
+from heptarm.rl.contact.push import Push
+from heptarm.rl.contact.task import ContactTask
 from heptarm.rl.evaluate import evaluate, held_back
 from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
@@ -103,3 +108,22 @@ def test_arrays_that_do_not_belong_together_make_no_report() -> None:
         EpisodeReport(
             ReachTask(), np.zeros((2, 3)), np.zeros((3, 4)), np.zeros((3, 5, 3)), joints=np.zeros((3, 5, 7))
         )
+
+
+@pytest.mark.parametrize("kind", [PegInHole, Push, PickPlace, Polish])
+def test_a_picture_marks_places_only(kind: type[ContactTask], tmp_path: Path) -> None:
+    task = kind()
+    targets = task.targets(np.random.default_rng(3), 4)
+    goals = task.goals(targets)
+    paths, joints = np.zeros((4, 10, 3)), np.zeros((4, 10, 7))
+    report = EpisodeReport(task, targets, np.ones((4, 9)), paths, joints=joints)
+    assert report.plot(tmp_path / "paths.png").is_file()
+    if kind is Polish:
+        assert goals is None
+    else:
+        assert goals is not None and goals.shape == (4, 3)
+    if kind in (Push, PickPlace):
+        assert goals is not None
+        np.testing.assert_array_equal(goals[:, :2], targets[:, 2:])
+    narrow = EpisodeReport(Polish(), targets[:, :1], np.ones((4, 9)), paths, joints=joints)
+    assert narrow.plot(tmp_path / "narrow.png").is_file()

@@ -14,15 +14,17 @@ pytest.importorskip("torch", reason="torch is not installed")
 
 import heptarm as ha
 from heptarm.cli.rl import policies
-from heptarm.cli.rl.jobs import cases_of
+from heptarm.cli.rl.jobs import JobOptions, cases_of, table_at
+from heptarm.cli.rl.record import _keep
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.contact.peg_in_hole import PegInHole
-from heptarm.rl.jobs import RecordJob, Script
+from heptarm.rl.jobs import RecordedEpisode, RecordJob, Script
 from heptarm.rl.sim.randomisation import STRONG
 from heptarm.rl.sweep import sweep, with_setting, with_settings
 from heptarm.rl.task import ReachTask
 from heptarm.rl.train.recipe import Recipe
 from tests.cli.running import objects, refused
+from tests.rl.test_pool import Square
 
 PICK_PLACE = Path(__file__).parents[2] / "examples/learning/pick_place.py"
 
@@ -36,7 +38,7 @@ def test_a_sweep_has_all_combinations_of_seeds_and_values() -> None:
         (1, {"gamma": "0.95", "steps": "10"}),
     ]
     assert cases_of("", 7, []) == [(7, {})] and [seed for seed, _ in cases_of("4,2", 0, [])] == [4, 2]
-    for text in ("gamma", "gamma=", "=1", "gamma=1,"):
+    for text in ("gamma", "gamma=", "=1", "gamma=1,", "gamma=0.9,0.9"):
         with pytest.raises(CommandRejected, match="NAME=VALUE"):
             list(sweep([text]))
     for text in ("4..1", "0..x", "1,1", "-1", "a"):
@@ -78,6 +80,50 @@ def test_the_help_has_the_numbers_of_steps_of_the_recipes() -> None:
         Recipe(PegInHole()).steps,
     ]
     assert [float(one) for one in re.findall(r"\d\.\d", shown)] == [steps / 1e6 for steps in known]
+
+
+def test_a_job_whose_result_cannot_be_kept_leaves_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cases = [({"number": n}, Square(f"square {n}", n, tmp_path)) for n in (4, 5)]
+
+    def figures(_: object, value: int) -> dict[str, object]:
+        if value == 16:
+            raise OSError(28, "No space left on device")
+        return {"square": value}
+
+    table = table_at(tmp_path / "new" / "squares", overwrite=False)
+    assert JobOptions(workers=1).run(cases, figures, table=table) == 1
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["square"] for row in rows] == ["", "25"] and "No space left" in rows[0]["error"]
+    table.unlink()
+    table.mkdir()  # in the way
+    with pytest.raises(CommandRejected, match="cannot be written: is a directory"):
+        JobOptions(workers=1).run(cases, figures, table=table)
+    assert "25" in capsys.readouterr().out, "the table is printed all the same"
+
+
+def test_a_recording_keeps_what_is_finished_and_replaces_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = RecordedEpisode(0, "success", b"first")
+    (tmp_path / "episode-00000.mcap").write_bytes(b"of another program")
+    _keep(tmp_path, done)
+    _keep(tmp_path, RecordedEpisode(1, "success", b"second"))
+    assert [file.read_bytes() for file in sorted(tmp_path.glob("*.mcap"))] == [
+        b"of another program",
+        b"first",
+        b"second",
+    ]
+
+    def fails(_: RecordJob, recorded: list[RecordedEpisode]) -> None:
+        recorded.append(done)
+        raise ZeroDivisionError("of the script")
+
+    monkeypatch.setattr(RecordJob, "_record", fails)
+    made = RecordJob("episodes", Script.load(PICK_PLACE), "sim://iiwa14", (0, 1)).run()
+    assert made.episodes == (done,) and made.error == "ZeroDivisionError: of the script"
 
 
 def test_a_script_is_a_file_with_a_function(tmp_path: Path) -> None:
@@ -154,7 +200,7 @@ def test_episodes_of_a_script_do_not_depend_on_who_records_them(tmp_path: Path) 
     objects("rl", "record", str(PICK_PLACE), str(tmp_path / "set"), "--episodes", "1", *target)
     found = ha.load_episodes(tmp_path / "set")
     assert [episode.number for episode in found] == list(range(8)) and found[0].task == "Move the cube"
-    (alone,) = RecordJob("one", Script.load(PICK_PLACE), target[1], (6,), rate=10.0).run()
+    (alone,) = RecordJob("one", Script.load(PICK_PLACE), target[1], (6,), rate=10.0).run().episodes
     (tmp_path / "alone").mkdir()
     (tmp_path / "alone/episode-00006.mcap").write_bytes(alone.content)
     (again,) = ha.load_episodes(tmp_path / "alone")

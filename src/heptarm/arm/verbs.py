@@ -512,7 +512,7 @@ class ArmVerbs(Sealed):
 
         Args:
             source: a simulated camera; or a function that returns a picture, bytes of shape (height, width, 3) or
-                (height, width), or True and the picture.
+                (height, width), in red, green and blue; or True and the picture in OpenCV's blue, green and red.
             depth: have distances, too; of a simulated camera.
             labels: have the bodies that each pixel shows, too; of a simulated camera.
             latency: age of a picture when the program gets it [s]: a simulated camera holds its pictures back for so

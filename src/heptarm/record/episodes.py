@@ -50,6 +50,8 @@ STALL = 2.0
 FASTEST, _QUALITY, _MOST, _LONGEST = 500.0, 92, 1000, 1000
 #: Highest number of an episode.
 _LAST = 10**9
+#: After a failure a function is called again so much later [s].
+_RETRY = 0.1
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _FILE = re.compile(r"episode-(\d{5,})\.mcap")
 
@@ -105,7 +107,7 @@ class _Feed:
         """Begin an episode: what arrived before is not its."""
         self._arrived.clear()
         self._shape_before = self._shape
-        self.defect = ""
+        self.defect, self.failure = "", None
         self.longest, self.count = 0.0, 0
         self._begin = self._last = self._clock()
 
@@ -178,10 +180,10 @@ class _Watcher:
             try:
                 self._read()
             except Exception as error:  # of a function that is yours; the episode reports it
-                if not self._ending.is_set():
+                if not self._ending.is_set() and self._feed.failure is None:
                     self._feed.failure = error
-                    _log.warning("%s gives nothing any more: %s", self._feed.name, _line(str(error)))
-                return
+                    _log.warning("%s failed: %s", self._feed.name, _line(str(error)))
+                self._ending.wait(_RETRY)  # the next episode may succeed
             finally:
                 self._has_begun.set()
 
@@ -258,6 +260,9 @@ _TAKEN = {
     "q",
     "dq",
     "tau_ext",
+    "velocity",
+    "joint_positions",
+    "joint_velocities",
     "pose",
     "wrench",
     "correction",
@@ -540,7 +545,8 @@ class Episode(Sealed):
         elif stalled and error is None:
             raise StaleState(
                 f"the episode {self._path.name} is a failure: {stalled}",
-                hint="look after the camera or sensor, and record the episode again",
+                hint="look after the camera or sensor, and record the episode again; a camera that has failed is "
+                "opened by the next set",
             )
 
     def _close(self, recorder: Recorder, *, is_failing: bool) -> None:

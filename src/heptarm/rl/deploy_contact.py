@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -51,6 +52,8 @@ _CLEAR = 0.02
 _APPROACH, _RETREAT = 0.1, 0.05
 #: The zero of the wrench is the mean of so many seconds at rest: a single reading is as uncertain as what it measures.
 _ZEROING = 0.5
+#: So many times as long as in training may an episode take: an arm is slower now and then, and nobody waits in vain.
+_PATIENT = 2
 #: Longest wait for these, and longest time of an episode [s].
 _PATIENCE, _LONGEST = 30.0, 600.0
 #: A tick that is so late on the robot's clock is counted [ns].
@@ -70,7 +73,7 @@ class ContactSettings:
             as well.
         speed: largest of the set-point [m/s]; `arm.speed` scales it.
         latency: added between seeing and commanding [s].
-        seconds: an episode ends after so long [s]; None: after the task's `steps`, as in training.
+        seconds: an episode ends after so long [s]; None: after twice as long as in training.
         stale: without a newer state for so long the deployment ends, and without a target the arm stops [s].
     """
 
@@ -97,7 +100,8 @@ class ContactSettings:
 
     def timed(self, task: ContactTask) -> ContactTask:
         """A task whose episodes may take as long as here."""
-        return task if self.seconds is None else replace(task, steps=round(self.seconds * task.rate))
+        steps = _PATIENT * task.steps if self.seconds is None else round(self.seconds * task.rate)
+        return replace(task, steps=steps)
 
 
 def spring_of(task: ContactTask, settings: ContactSettings) -> CartesianImpedance:
@@ -174,22 +178,24 @@ def deploy_contact(
             parameter="origins",
         )
     arm.subscribe(rate=2.0 * _FINE * task.rate)
-    run = _Run(arm, policy, task, chosen, bodies, gripper)
-    for number, origin in enumerate(frames):
-        with inside(f"origins[{number}]"):
-            run.check_start(origin)
     episodes = []
-    for number, (origin, goal) in enumerate(zip(frames, goals, strict=True)):
-        with marked(arm, number):
-            episodes.append(run.episode(origin, goal))
-        if progress is not None:
-            progress(number, float(episodes[-1].missing[-1]))
+    with ThreadPoolExecutor(1, "heptarm-gripper") as hand:
+        run = _Run(arm, policy, task, chosen, bodies, gripper, hand)
+        for number, origin in enumerate(frames):
+            with inside(f"origins[{number}]"):
+                run.check_start(origin)
+        for number, (origin, goal) in enumerate(zip(frames, goals, strict=True)):
+            with marked(arm, number):
+                episodes.append(run.episode(origin, goal))
+            if progress is not None:
+                progress(number, float(episodes[-1].missing[-1]))
     facts = {
         "engine": "arm",
         "robot": arm.robot.title,
         "virtual": arm.is_virtual,
         "through": chosen.through,
         "latency": chosen.latency,
+        "seconds": task.steps / task.rate,
         "late_ticks": sum(episode.late for episode in episodes),
         "guard": {"force": sum(episode.ended == "force" for episode in episodes)},
         "ended": [episode.ended for episode in episodes],
@@ -271,9 +277,11 @@ class _Run:
         settings: ContactSettings,
         bodies: Bodies | None,
         gripper: Gripper | None,
+        hand: ThreadPoolExecutor,
     ) -> None:
         self._arm, self._settings = arm, settings
-        self._bodies, self._gripper = bodies, gripper
+        self._bodies, self._gripper, self._hand = bodies, gripper, hand
+        self._grips: deque[Future[object]] = deque()
         self._task = task
         self._pilot = ContactPilot(policy, steps=task.steps)
         self._spring = spring_of(self._task, settings)
@@ -304,6 +312,8 @@ class _Run:
         tip.zero(_ZEROING)
         through = self._by_torques if self._settings.through == "fri" else self._by_servo
         found = through(tip, origin, target)
+        while self._grips:
+            self._grips.popleft().result()
         height = float(found.poses[-1][2]) - float(self._start.xyz[2])
         arm.move(
             lin_rel(z=-max(height, 0.0) - _CLEAR, frame=origin, moving=frame, speed_mps=_RETREAT),
@@ -329,7 +339,16 @@ class _Run:
         ) as servo:
             found = self._decide(servo, tip, origin, target)
         has_met = servo.result is not None and servo.result.cause is Cause.CONDITION
-        return replace(found, ended="force") if has_met else found
+        if not has_met or found.ended == "force":
+            return found
+        missing, forces = found.missing.copy(), found.forces.copy()
+        missing[-1] = self._failed(missing[-1])
+        forces[-1] = max(forces[-1], settings.peak)  # the cabinet felt it
+        return replace(found, ended="force", missing=missing, forces=forces)
+
+    def _failed(self, missing: float) -> float:
+        """What is missing of an episode that has failed, however near it is to its end."""
+        return max(missing, 0.0) + 2.0 * self._task.radius
 
     def _by_torques(self, tip: _Tip, origin: Pose, target: Array) -> _Episode:
         """Set-points of an impedance of torques over FRI."""
@@ -387,8 +406,7 @@ class _Run:
             forces.append(float(np.linalg.norm(wrench[:3])))
             missing.append(pilot.missing)
         left = task.steps - len(missing)
-        # one that ended early has failed
-        last_missing = pilot.missing + (task.radius if ended else 0.0)
+        last_missing = self._failed(pilot.missing) if ended else pilot.missing
         return _Episode(
             np.array(poses + [poses[-1]] * left),
             np.array(joints + [joints[-1]] * left),
@@ -404,9 +422,16 @@ class _Run:
         return {name: _numbers(origin.inverse() @ place) for name, place in seen.items()}
 
     def _grip(self, last: Array, command: Array) -> None:
-        """Close or open the gripper where the policy has changed its mind."""
+        """Close or open the gripper where the policy has changed its mind; set-points go on meanwhile.
+
+        Raises:
+            HeptarmError: an earlier grip has failed.
+        """
+        while self._grips and self._grips[0].done():
+            self._grips.popleft().result()
         if self._gripper is not None and self._task.has_gripper and last[6] != command[6]:
-            self._gripper.close() if command[6] > 0.0 else self._gripper.open()
+            act = self._gripper.close if command[6] > 0.0 else self._gripper.open
+            self._grips.append(self._hand.submit(act))
 
 
 class _Drive(Protocol):

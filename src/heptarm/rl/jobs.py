@@ -175,7 +175,20 @@ class RecordedEpisode:
 
 
 @dataclass(frozen=True, slots=True)
-class RecordJob(Job[tuple[RecordedEpisode, ...]]):
+class RecordedEpisodes:
+    """What a job has recorded.
+
+    Attributes:
+        episodes: all that were finished.
+        error: why the others of the job were not recorded; "": there are no others.
+    """
+
+    episodes: tuple[RecordedEpisode, ...]
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordJob(Job[RecordedEpisodes]):
     """Record episodes of a script on a virtual arm of their own; returns their files.
 
     The random numbers of an episode depend on seed and number alone, not on the job that records it.
@@ -211,15 +224,24 @@ class RecordJob(Job[tuple[RecordedEpisode, ...]]):
                 hint="each worker starts its own: sim://iiwa14, or sim://iiwa14?scene=bins",
             )
 
-    def run(self) -> tuple[RecordedEpisode, ...]:
-        """Record them, one after the other."""
+    def run(self) -> RecordedEpisodes:
+        """Record them, one after the other; an error leaves those before it."""
+        recorded: list[RecordedEpisode] = []
+        try:
+            self._record(recorded)
+        except Exception as error:  # the script's own may be any
+            if not recorded:
+                raise
+            return RecordedEpisodes(tuple(recorded), f"{type(error).__name__}: {error}")
+        return RecordedEpisodes(tuple(recorded))
+
+    def _record(self, recorded: list[RecordedEpisode]) -> None:
         script, random = self.script, np.random.default_rng()
 
         def reset() -> None:
             if script.reset is not None:
                 script.reset(arm, random)
 
-        recorded = []
         with (
             TemporaryDirectory(prefix="heptarm-episodes-") as folder,
             connect(self.target, watchdog=_WATCHDOG) as arm,
@@ -232,7 +254,6 @@ class RecordJob(Job[tuple[RecordedEpisode, ...]]):
                 episode = episodes.episode(number=number)
                 self._demonstrate(arm, episode, random)
                 recorded.append(RecordedEpisode(number, episode.label, episode.path.read_bytes()))
-        return tuple(recorded)
 
     def _demonstrate(self, arm: Arm, episode: Episode, random: np.random.Generator) -> None:
         """Record an episode; an error of the task makes it a failure, as its label has it, and no more."""

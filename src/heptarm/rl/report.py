@@ -220,15 +220,17 @@ class EpisodeReport:
         figures = require("matplotlib.figure", extra="rl")
         figure = figures.Figure(figsize=(13, 4.2), layout="constrained")
         side, above, over = figure.subplots(1, 3)
+        goals = self.task.goals(self.targets)
         for axes, (x, y), names in ((side, (0, 2), "xz"), (above, (0, 1), "xy")):
-            for line, target in zip(self.paths[:most], self.targets[:most], strict=True):
+            for line in self.paths[:most]:
                 axes.plot(line[:, x], line[:, y], linewidth=0.7, alpha=0.7)
-                axes.plot(target[x], target[y], "k+", markersize=5)
+            if goals is not None:
+                axes.plot(goals[:most, x], goals[:most, y], "k+", markersize=5)
             axes.set_xlabel(f"{names[0]} [m]")
             axes.set_ylabel(f"{names[1]} [m]")
             axes.set_aspect("equal")
         side.set_title("paths, from the side")
-        above.set_title("from above; + targets")
+        above.set_title("from above" if goals is None else "from above; + targets")
         time = np.arange(1, self.distances.shape[1] + 1) / self.task.rate
         mm = 1e3 * self.distances
         over.fill_between(

@@ -22,15 +22,15 @@ def sweep(texts: Sequence[str]) -> Iterator[dict[str, str]]:
     """All combinations of the values of some settings, each written as "NAME=VALUE,VALUE".
 
     Raises:
-        CommandRejected: a text of another form, or a setting twice.
+        CommandRejected: a text of another form, or a setting or a value of it twice.
     """
     given: dict[str, list[str]] = {}
     for text in texts:
         name, _, values = text.partition("=")
         listed = values.split(",")
-        if not name or not all(listed) or name in given:
+        if not name or not all(listed) or len(set(listed)) < len(listed) or name in given:
             raise CommandRejected(
-                f"sweep must be NAME=VALUE,VALUE with each name once, got {text!r}",
+                f"sweep must be NAME=VALUE,VALUE with each name and each value once, got {text!r}",
                 parameter="sweep",
                 value=text,
                 hint="for example --sweep learning_rate=3e-4,1e-3",

@@ -116,6 +116,10 @@ class ReachTask:
         half = np.asarray(self.size) / 2
         return np.asarray(self.centre) + random.uniform(-half, half, (count, 3))
 
+    def goals(self, targets: Array) -> Array:
+        """Where targets are, base frame, shape (n, 3) [m]: they are places themselves."""
+        return targets
+
     # ------------------------------------------------------------------------------ what a decision is
 
     def begin(self, q: Array) -> Array:

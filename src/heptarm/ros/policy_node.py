@@ -34,7 +34,7 @@ class PolicyParameters:
         base_frame: of its base.
         policy: file of the policy, or "reach" or "peg-in-hole": the included one of that task; "": "reach".
         feature: of the included policies of reach, the one that also sees the way to the target.
-        seconds: with contacts: an episode ends after so long [s]; 0: after as long as in training.
+        seconds: with contacts: an episode ends after so long [s]; 0: after twice as long as in training.
     """
 
     _: KW_ONLY

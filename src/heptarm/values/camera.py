@@ -290,7 +290,7 @@ class Picture(Value):
     """What a camera saw, with the arm at that moment.
 
     Attributes:
-        pixels: red, green, blue of a simulated camera, shape (height, width, 3); of your own, what it gave.
+        pixels: red, green, blue, shape (height, width, 3); of a camera of your own that is grey, shape (height, width).
         stamp: the cabinet's clock when it was taken [ns].
         q: joint positions then, shape (7,) [rad].
         flange: pose of the flange in the base then.

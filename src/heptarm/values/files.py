@@ -174,6 +174,20 @@ def refuse_existing(path: Path, *, overwrite: bool, name: str = "path") -> Path:
     return path
 
 
+def make_folder(folder: Path, *, name: str = "path") -> Path:
+    """Make a folder, and those above it, where there is none; returns it.
+
+    Raises:
+        CommandRejected: it cannot be made.
+    """
+    path_of(folder, name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error, name=name) from error
+    return folder
+
+
 def read_arrays(path: Path, what: str, *, hint: str = "") -> dict[str, npt.NDArray[Any]]:
     """The arrays of a .npz file by name; numbers and texts only, no code.
 

@@ -25,7 +25,8 @@ from heptarm.values.sealed import Sealed
 
 _log = logging.getLogger("heptarm.arm")
 
-#: What your own camera gives: a picture, or whether there is one and the picture, as `cv2.VideoCapture.read` does.
+#: What your own camera gives: a picture in red, green and blue, or what `cv2.VideoCapture.read` returns: whether there
+#: is one, and the picture in OpenCV's blue, green and red.
 PictureSource: TypeAlias = Callable[[], Any]
 #: Longest age of a picture when your camera gives it [s].
 OLDEST = 2.0
@@ -237,15 +238,16 @@ def opened_camera(text: str) -> PictureSource:
 
 
 def _pixels(given: object) -> npt.NDArray[np.uint8]:
-    """The picture that a function has returned.
+    """The picture that a function has returned, in red, green and blue.
 
     Raises:
         ShapeError: it is none.
     """
+    is_of_opencv = False
     if isinstance(given, tuple) and len(given) == 2:
-        if not given[0]:
+        is_of_opencv, given = True, given[1] if given[0] else None
+        if given is None:
             raise ShapeError("the camera reports that there is none")
-        given = given[1]
     found = given if isinstance(given, np.ndarray) else None
     is_flat = found is not None and (found.ndim == 2 or (found.ndim == 3 and found.shape[2] == 3))
     if found is None or found.dtype != np.uint8 or not is_flat or not found.size:
@@ -253,7 +255,7 @@ def _pixels(given: object) -> npt.NDArray[np.uint8]:
         raise ShapeError(
             f"a picture must be an array of uint8 of shape (height, width, 3) or (height, width), got {got}"
         )
-    return found
+    return np.ascontiguousarray(found[..., ::-1]) if is_of_opencv and found.ndim == 3 else found
 
 
 class StateSource(Protocol):

@@ -77,7 +77,7 @@ def deploy(
     seconds: Annotated[
         float | None,
         Parameter(
-            help="With contacts: an episode ends after so long [s]. Default: after as long as in training."
+            help="With contacts: an episode ends after so long [s]. Default: after twice as long as in training."
         ),
     ] = None,
     speed: Speed = 0.5,
@@ -145,6 +145,7 @@ def deploy(
             settings.guard.check(point)
     with target.connect() as arm:
         deployed_task(network.task, ReachTask, arm.robot)
+        arm.speed = min(arm.speed, speed)
         if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         if ask:

@@ -16,9 +16,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from heptarm.cli.output import emit
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.rl.pool import Job, JobResult, run_jobs
 from heptarm.rl.sweep import sweep
+from heptarm.values.files import make_folder, refuse_existing, unwritable
 
 JOBS = Group("Many at once")
 Seeds = Annotated[
@@ -75,43 +76,69 @@ class JobOptions:
 
         Args:
             cases: the jobs, each with what distinguishes it from the others.
-            figures: what a job has found, of the job and what it returned, called as soon as it has ended.
+            figures: what a job has found, of the job and what it returned, called as soon as it has ended; the job has
+                failed if it raises a HeptarmError or an OSError.
             table: CSV file for the table; None: none.
             as_json: print a JSON object for each job as it ends, and no table.
 
         Returns:
             Exit code of the command: 1 if a job has failed.
+
+        Raises:
+            CommandRejected: the table cannot be written, after it has been printed.
         """
         facts = {id(job): case for case, job in cases}
         rows: dict[int, dict[str, object]] = {}
         out = sys.stdout
 
         def show(result: JobResult[Any]) -> None:
-            found = {} if result.error else figures(result.job, result.value)
+            found: Mapping[str, object] = {}
+            error = result.error
+            if not error:
+                try:
+                    found = figures(result.job, result.value)
+                except (
+                    HeptarmError,
+                    OSError,
+                ) as failure:  # of one job, such as a full disk; the others go on
+                    error = str(failure)
             about = {"seconds": result.seconds, "attempts": result.attempts, "worker": result.worker}
-            row = rows[id(result.job)] = {**facts[id(result.job)], **found, **about, "error": result.error}
+            row = rows[id(result.job)] = {**facts[id(result.job)], **found, **about, "error": error}
             if as_json:
                 emit(row, file=out)
             else:
                 shown = {name: _text(name, value) for name, value in found.items()}
-                how = result.error or ", ".join(f"{name} {text}" for name, text in shown.items())
+                how = error or ", ".join(f"{name} {text}" for name, text in shown.items())
                 print(f"{len(rows)} of {len(cases)}: {result.job.name}: {how}", file=sys.stderr, flush=True)
 
         with redirect_stdout(sys.stderr):  # Ray prints there what befalls its machines
             run_jobs([job for _, job in cases], workers=self.workers, ray=self.ray, progress=show)
         ordered = [rows[id(job)] for _, job in cases]
         names = list(dict.fromkeys(name for row in ordered for name in row))
-        if table is not None:
-            with table.open("w", encoding="utf-8", newline="") as file:
-                writer = csv.DictWriter(file, names)
-                writer.writeheader()
-                writer.writerows(ordered)
         if not as_json:
             found = {name for row in ordered for name, value in row.items() if value not in ("", None)}
             _print(ordered, [name for name in names if name in found and name not in _HIDDEN])
-            if table is not None:
-                print(f"written: {table}", file=sys.stderr)
+        if table is not None:
+            try:
+                with table.open("w", encoding="utf-8", newline="") as file:
+                    writer = csv.DictWriter(file, names)
+                    writer.writeheader()
+                    writer.writerows(ordered)
+            except OSError as failure:
+                raise unwritable(table, failure, name="out") from failure
+            print(f"written: {table}", file=sys.stderr)
         return int(any(row["error"] for row in ordered))
+
+
+def table_at(out: Path, *, overwrite: bool) -> Path:
+    """The file of a table, in a folder that is there, before anything runs.
+
+    Raises:
+        CommandRejected: it exists, or the folder cannot be made.
+    """
+    table = refuse_existing(out.with_suffix(".csv"), overwrite=overwrite, name="out")
+    make_folder(table.parent, name="out")
+    return table
 
 
 #: Nothing was given on the command line.

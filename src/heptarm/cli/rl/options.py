@@ -1,4 +1,4 @@
-"""Options that the commands of policies share."""
+"""Options that several commands of policies have."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import Json, Model, Overwrite
 from heptarm.cli.output import emit
-from heptarm.cli.rl.jobs import HERE, JobOptions, Seeds, Sweeps, cases_of, name_of
+from heptarm.cli.rl.jobs import HERE, JobOptions, Seeds, Sweeps, cases_of, name_of, table_at
 from heptarm.cli.rl.options import LARGEST_SEED, POLICY, Seed
 from heptarm.cli.rl.reports import refuse_reports, write_report
 from heptarm.errors import CommandRejected, require
@@ -184,8 +184,8 @@ def _train_jobs(
         job.name: out.with_name(f"{out.stem}-{job.name.replace('=', '').replace(' ', '-')}.npz")
         for _, job in made
     }
-    table = out.with_suffix(".csv")
-    for file in (table, *files.values(), *(path.with_suffix(".png") for path in files.values())):
+    table = table_at(out, overwrite=overwrite)
+    for file in (*files.values(), *(path.with_suffix(".png") for path in files.values())):
         refuse_existing(file, overwrite=overwrite, name="out")
 
     def figures(job: Job[Any], value: Any) -> dict[str, object]:
@@ -268,9 +268,7 @@ def evaluate(
     integer(episodes, "--episodes", 1, _EPISODES)
     integer(seed, "--seed", 0, LARGEST_SEED)
     if len(policies) > 1 or seeds or sweep or jobs != HERE:
-        table = (
-            None if out is None else refuse_existing(out.with_suffix(".csv"), overwrite=overwrite, name="out")
-        )
+        table = None if out is None else table_at(out, overwrite=overwrite)
         cases = [
             _evaluation(
                 str(policy), {"seed": number, "randomisation": randomisation, **settings}, episodes, engine

@@ -11,12 +11,14 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import Json
 from heptarm.cli.rl.jobs import HERE, JobOptions
+from heptarm.errors import CommandRejected
 from heptarm.record.episodes import next_number
-from heptarm.rl.jobs import RecordJob, Script
+from heptarm.rl.jobs import RecordedEpisode, RecordJob, Script
 from heptarm.rl.pool import Job
 from heptarm.values.camera import Camera
 from heptarm.values.checks import integer
-from heptarm.values.files import unwritable
+from heptarm.values.files import make_folder
+from heptarm.values.text import counted
 
 #: Most episodes of a job: it starts a virtual cabinet, and is run again as a whole if its worker is lost.
 _BATCH = 5
@@ -56,7 +58,7 @@ def record(
     The function demonstrate does the task once, with random numbers of the episode, and returns whether it succeeded.
     An episode is the same whichever worker records it. For example:
 
-        heptarm rl record examples/30_many_demonstrations.py push-aside --episodes 40 --workers 2
+        heptarm rl record examples/learning/pick_place.py picked --episodes 40 --workers 2
     """
     found, first = Script.load(script), next_number(folder)
     last = first + integer(episodes, "episodes", 1, 100_000)
@@ -76,18 +78,32 @@ def record(
             cameras=cameras,
         )
         cases.append((case, job))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise unwritable(folder, error, name="folder") from error
+    make_folder(folder, name="folder")
 
     def figures(_: Job[Any], recorded: Any) -> dict[str, object]:
-        for episode in recorded:
-            file = folder / f"episode-{episode.number:05d}.mcap"
-            half = file.with_suffix(".part")
-            half.write_bytes(episode.content)
-            half.replace(file)
-        counts = Counter(episode.label for episode in recorded)
+        for episode in recorded.episodes:
+            _keep(folder, episode)
+        if recorded.error:
+            raise CommandRejected(
+                f"{counted(len(recorded.episodes), 'episode')} were recorded, then: {recorded.error}"
+            )
+        counts = Counter(episode.label for episode in recorded.episodes)
         return {label: counts[label] for label in ("success", "failure", "unlabelled")}
 
     return jobs.run(cases, figures, as_json=as_json)
+
+
+def _keep(folder: Path, episode: RecordedEpisode) -> None:
+    """Write an episode; one that another program has recorded under its number meanwhile stays."""
+    number = episode.number
+    while True:
+        file = folder / f"episode-{number:05d}.mcap"
+        try:
+            file.open("xb").close()  # takes the name
+        except FileExistsError:
+            number = next_number(folder)
+        else:
+            break
+    half = file.with_suffix(".part")
+    half.write_bytes(episode.content)
+    half.replace(file)

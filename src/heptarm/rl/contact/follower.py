@@ -91,7 +91,7 @@ class ContactFollower:
         self._tip, self._stamp, self._seen = tip, stamp, now
         if not self._is_under_way and np.linalg.norm(tip.xyz - self._rested_at) > _AT_REST:
             self._rest()
-        if is_new:
+        if is_new and self._origin is not None:
             self._loads.append(load)
         if self._is_under_way and np.linalg.norm((load - self._zero)[:3]) > self.settings.peak:
             self._end("force")

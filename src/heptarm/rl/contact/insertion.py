@@ -82,6 +82,10 @@ class InsertTask(ContactTask):
         found[:, 3], found[:, 4] = angle * np.cos(axis), angle * np.sin(axis)
         return found
 
+    def goals(self, targets: Array) -> Array:
+        """The true rims."""
+        return targets[:, :3]
+
     def starts(self, random: np.random.Generator, count: int) -> Array:
         """Above the presumed rim."""
         found = np.zeros((count, 6))

@@ -92,6 +92,10 @@ class PickPlace(ContactTask):
         result: Array = side + random.uniform(-self.reach, self.reach, (count, 4))
         return result
 
+    def goals(self, targets: Array) -> Array:
+        """Where the cube is to be, on the table."""
+        return np.column_stack([targets[:, 2:4], np.zeros(len(targets))])
+
     def starts(self, random: np.random.Generator, count: int) -> Array:
         """Above the middle."""
         found = np.zeros((count, 6))

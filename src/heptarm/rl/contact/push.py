@@ -93,6 +93,10 @@ class Push(ContactTask):
         result: Array = places + [-0.02, 0.0, 0.08, 0.0]
         return result
 
+    def goals(self, targets: Array) -> Array:
+        """Where the puck is to be, on the table."""
+        return np.column_stack([targets[:, 2:4], np.zeros(len(targets))])
+
     def starts(self, random: np.random.Generator, count: int) -> Array:
         """Before the area of the puck."""
         found = np.zeros((count, 6))

@@ -187,6 +187,10 @@ class ContactTask(ABC):
     def targets(self, random: np.random.Generator, count: int) -> Array:
         """What the episodes are about, shape (count, k)."""
 
+    def goals(self, targets: Array) -> Array | None:
+        """Where targets are, shape (n, k) to (n, 3) [m], for pictures; None: they are no places."""
+        return None
+
     @abstractmethod
     def starts(self, random: np.random.Generator, count: int) -> Array:
         """Poses of the tip at the start of episodes, shape (count, 6) [m, rad]."""
