@@ -85,7 +85,7 @@ def record(
             _keep(folder, episode)
         if recorded.error:
             raise CommandRejected(
-                f"{counted(len(recorded.episodes), 'episode')} were recorded, then: {recorded.error}"
+                f"recorded {counted(len(recorded.episodes), 'episode')}, then: {recorded.error}"
             )
         counts = Counter(episode.label for episode in recorded.episodes)
         return {label: counts[label] for label in ("success", "failure", "unlabelled")}
